@@ -78,8 +78,8 @@ def _check_workers(client: Any, scheduler: str, patience_s: float) -> None:
         words = difference(here, there) if isinstance(there, dict) else f"no fingervision ({there})"
         if words:
             raise ProcessError(
-                f"Every worker must run what runs here, but {address} has {words}: install the same there "
-                "and restart it."
+                f"Every worker must have the versions that are installed here, but {address} has {words}: install "
+                "the same there and restart it."
             )
 
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.drawing_form import DrawingForm
 from fingervision.domain.further_check import FurtherCheck, PictureForm
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
@@ -217,6 +218,8 @@ class Effect:
         simulated camera sees the two points moved, which for drifts and scales is the same.
     at_frames : bool
         Whether it is defined on the samples: a simulation looks at it with the frames, not in between.
+    in_drawing : DrawingForm or None
+        How it acts beside a drawing whose bodies' poses were measured; None where these do not show it.
     demonstrated : bool
         Whether a few short runs can tell it from everything else: `fingervision demo` hides one of these.
     """
@@ -247,6 +250,7 @@ class Effect:
     odd: tuple[str, ...] = ()
     in_picture: Callable[[Values], PictureForm] | None = None
     at_frames: bool = False
+    in_drawing: DrawingForm | None = None
     demonstrated: bool = False
 
     def search(self, history: History) -> tuple[Parameter, ...] | str:

@@ -1,5 +1,6 @@
 """One finger opens more than the other."""
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
@@ -24,5 +25,9 @@ EFFECT = PointEffect(
     checks={FurtherCheck.TURN: True},
     odd=("share",),
     demonstrated=True,
+    in_drawing=DrawingForm(
+        DrawnPart.LINKS_OPPOSITE,
+        Parameter("share", "", -0.5, 0.5, "of the opening that the right finger has more than half", typical=0.01),
+    ),
     act=act,
 )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
@@ -24,5 +25,8 @@ EFFECT = PointEffect(
     residual="a step where the load on the pivot changes sign; poses of the bodies tell which pivot",
     parameters=(Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02),),
     needs_bodies=True,
+    in_drawing=DrawingForm(
+        DrawnPart.PIVOT, Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02), reference=0.01
+    ),
     act=act,
 )

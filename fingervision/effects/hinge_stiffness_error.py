@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
@@ -24,5 +25,8 @@ EFFECT = PointEffect(
     residual="force only",
     parameters=(Parameter("ratio", "", -0.9, 0.9, "relative error of the stiffness"),),
     needs_force=True,
+    in_drawing=DrawingForm(
+        DrawnPart.HINGE, Parameter("ratio", "", -0.9, 0.9, "relative error", typical=0.1), reference=0.05
+    ),
     act=act,
 )

@@ -1,5 +1,6 @@
 """Input offset: the zero of the recorded input is wrong."""
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
@@ -24,5 +25,8 @@ EFFECT = DriveEffect(
     residual="nearly a constant; follows the slope of a curved model",
     parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05),),
     checks={FurtherCheck.REZERO: True},
+    in_drawing=DrawingForm(
+        DrawnPart.CONSTANT, Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05)
+    ),
     act=act,
 )

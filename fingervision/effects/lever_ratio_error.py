@@ -1,5 +1,6 @@
 """Lever ratio error: the amplification differs (link length, hinge position)."""
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
@@ -22,5 +23,8 @@ EFFECT = PointEffect(
     residual="proportional to the opening",
     parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the lever ratio", typical=0.1),),
     checks={FurtherCheck.SLOT: False, FurtherCheck.TRAVEL: False},
+    in_drawing=DrawingForm(
+        DrawnPart.LINKS_ALIKE, Parameter("ratio", "", -0.3, 0.3, "relative error of the opening", typical=0.01)
+    ),
     act=act,
 )

@@ -1,5 +1,6 @@
 """Link length error: a link is longer or shorter than drawn, so that a hinge or measuring point sits elsewhere."""
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
@@ -21,5 +22,8 @@ EFFECT = PointEffect(
     residual="in proportion to the opening; poses of the bodies tell which link",
     parameters=(Parameter("ratio", "", -0.1, 0.1, "relative error of the link's length", typical=0.01),),
     needs_bodies=True,
+    in_drawing=DrawingForm(
+        DrawnPart.LINK, Parameter("ratio", "", -0.1, 0.1, "relative error of the length", typical=0.01), reference=0.003
+    ),
     act=act,
 )

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
@@ -27,5 +28,8 @@ EFFECT = PointEffect(
     residual="proportional to the gap",
     parameters=(Parameter("ratio", "", -0.2, 0.2, "relative error of the scale", typical=0.02),),
     checks={FurtherCheck.SLOT: True},
+    in_drawing=DrawingForm(
+        DrawnPart.PICTURE, Parameter("ratio", "", -0.2, 0.2, "relative error", typical=0.01), reference=0.01
+    ),
     act=act,
 )

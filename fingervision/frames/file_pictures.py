@@ -12,7 +12,7 @@ from fingervision.frames.coded_times import is_shown
 from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.matroska_times import ClusterTimes
-from fingervision.frames.missing_references import missing_references
+from fingervision.frames.missing_references import OWN_RECORDING, missing_references
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
@@ -44,7 +44,8 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     packets, last_end_s, at_end = 0, None, ""
     losses = StreamLosses(container.format.name, stream)
     codec = stream.codec_context.name
-    unfollowed = missing_references(path, stream, container.format.name)
+    is_judged = container.metadata.get("comment") == OWN_RECORDING
+    unfollowed = {} if is_judged else missing_references(path, stream, container.format.name)
     with listening(codec) as heard:
         jpegs = SoundJpeg(codec)
         jpegs.learn(_first_packets(path, stream))

@@ -100,9 +100,10 @@ class NetworkStream:
             self._container.close()
             raise DeviceError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
         self._stream = self._container.streams.video[0]
-        # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed.
+        # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed. By its
+        # parameters, since there may be no encoder by the name of its decoder (AV1).
         self._kept = av.open(io.BytesIO(), "w", format="matroska")
-        self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream)
+        self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream, opaque=True)
         codec = self._stream.codec_context
         codec.options = STRICT | EXPORTED
         DamageTrail.prepare(codec)

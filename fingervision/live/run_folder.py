@@ -128,7 +128,9 @@ def _new_folder(out: Path) -> Path:
                 f"The folder {out} cannot be written ({error.strerror}): name another with --out."
             ) from error
         return path
-    raise OutputError(f"The folder {out} is full of runs of this second: name another with --out.")
+    raise OutputError(
+        f"The folder {out} has no free name for a run of this second: try again, or name another with --out."
+    )
 
 
 def _about(description: Description, task: Task, began: datetime) -> dict[str, Any]:

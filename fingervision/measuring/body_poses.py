@@ -179,8 +179,8 @@ class BodyTracker:
         )
         if abs(error) > MOST_SIZE_ERROR:
             raise DataError(
-                f"The drawing must have the size of what is seen, but on frame {index} {words}: check the scale and "
-                "the lengths of the drawing."
+                f"The drawing must have the size of the mechanism in the picture, but on frame {index} {words}: check "
+                "the scale and the lengths of the drawing."
             )
         self._shared = replace(self._shared, size_error=abs(error))
         self.placed = replace(self.placed, notes=(*self.placed.notes, f"{words}; u of the poses holds it."))

@@ -109,7 +109,7 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
     here, there = px - px.mean(axis=1)[:, None], mm - mm.mean(axis=1)[:, None]
     size = float(np.sqrt(np.sum(there**2)))
     if size == 0.0 or float(np.sqrt(np.sum(here**2))) == 0.0:
-        raise UsageError("--at must give points at different places, but they are one.")
+        raise UsageError("--at must give points at different places, but two of them are the same.")
     scale = float(np.sqrt(np.sum(here**2))) / size
     if abs(scale / px_per_mm - 1.0) > OTHER_SCALE:
         raise UsageError(
@@ -174,7 +174,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     size = (width, height, step)
     if any(_climbed(drawn, mechanism, entry[1], size, 0.0)[0] < ALIKE for entry in others):
         raise DataError(
-            f"The drawing {mechanism.name} lies on the picture in {1 + len(others)} ways as well as one: give --at "
+            f"The drawing {mechanism.name} fits the picture equally well in {1 + len(others)} ways: give --at "
             "X,Y=XMM,YMM for three points of it."
         )
     # A symmetric drawing: its front is towards the camera, turned as little as may be.
@@ -248,7 +248,7 @@ def levels_of(grey: Array, mechanism: Mechanism, place: Placement) -> tuple[floa
     small = grey[::step, ::step]
     if inside.all() or not inside.any():
         raise DataError(
-            f"The drawing {mechanism.name} must lie in the picture and leave some of its ground, but covers "
+            f"The drawing {mechanism.name} must lie inside the picture and leave some background visible, but covers "
             f"{'all' if inside.any() else 'none'} of it: check --at and the scale."
         )
     return float(np.median(small[inside])), float(np.median(small[~inside]))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import OutputError
 from fingervision.domain.status import Status
-from fingervision.measuring.clock.alignment import ClockOffset
+from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.series import GapSeries
 
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
@@ -128,7 +128,7 @@ def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
 
 
 def _pieces(series: GapSeries) -> list[slice]:
-    """Yield stretches of frames without a hole, because no line is drawn across missing frames."""
+    """Stretches of frames without a hole, because no line is drawn across missing frames."""
     frames, _ = series.frame_numbers()
     if not frames.size:
         return []

@@ -9,7 +9,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import FrameSource
 from fingervision.gauges.recording import GaugeRecording
-from fingervision.measuring.clock.alignment import ClockOffset
+from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.drive_at import drive_at
 from fingervision.measuring.frame_loop import Prepared, Progress, measure_frames, prepared
 from fingervision.measuring.outcome import Clock, clock_for, summary_of, undriven

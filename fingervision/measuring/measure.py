@@ -11,7 +11,7 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import FrameSource
 from fingervision.gauges.recording import GaugeRecording
-from fingervision.measuring.clock.alignment import ClockOffset
+from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.clock.common_clock import join_drive
 from fingervision.measuring.frame_loop import Progress, measure_frames, prepared
 from fingervision.measuring.gap_figure import draw_gap

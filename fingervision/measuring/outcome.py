@@ -6,7 +6,7 @@ from typing import Any
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
-from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
+from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.common_clock import clock_of, refusal, sentence
 from fingervision.measuring.clock.common_clock import in_words as clock_in_words
 from fingervision.measuring.frame_loop import Prepared

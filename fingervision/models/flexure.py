@@ -1,7 +1,7 @@
 """One flexure of a drawing: the shapes that it adds or cuts, its height along its axis, and the effect of its width."""
 
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import cos, radians, sin, sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -11,13 +11,16 @@ from fingervision.domain.gripper import PointMm
 from fingervision.models.hinge_correction import plane_strain_share
 from fingervision.models.notch import Notch
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar
+from fingervision.models.strip_width import strip_share
 from fingervision.models.width_effect import ConstrainedZone
 
 Array = NDArray[np.float64]
 
 FlexureKind = Literal["circular", "elliptic", "filleted", "leaf"]
-_LEAF_IN_NOTCHES = 1.178
-"""3 pi / 8: a thin notch bends as a leaf of its thickness and 1.178 sqrt(t R) of length (Paros and Weisbord)."""
+_HEIGHT_THAT_BENDS = 0.13
+"""Of the thickness, that a fillet adds on either side: the height is then 1.26 times the neck's, and twice as stiff."""
+_POISSON = 0.34
+"""Of the share: it changes by 0.006 from 0.2 to 0.34, and acts times nu^2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,15 +100,36 @@ class Flexure:
         return np.asarray(t + 2.0 * self.fillet_mm * (1.0 - np.sqrt(1.0 - within**2)))
 
     def notch(self, plate_mm: float) -> Notch:
-        """The notch with the same bending behaviour: itself, or an equivalent of a leaf or straight neck."""
-        t = self.thickness_mm
+        """The notch of a circular or elliptic flexure."""
+        return Notch(self.thickness_mm, self.half_length_mm, self.depth_mm, plate_mm)
+
+    @property
+    def _bent_mm(self) -> float:
+        """Length that bends, of a leaf or a straight neck: fillets as far as they are twice as stiff at most."""
+        straight, r = self.half_length_mm - self.fillet_mm, self.fillet_mm
+        if r == 0.0:
+            return 2.0 * straight
+        rise = min(_HEIGHT_THAT_BENDS * self.thickness_mm / r, 1.0)
+        return 2.0 * (straight + r * sqrt(1.0 - (1.0 - rise) ** 2))
+
+    def width_share(self, plate_mm: float) -> float:
+        """How far the plate's width holds it back in bending: 0 in plane stress, 1 in plane strain.
+
+        Of a strip the mean of two: of one whose ends turn, and of one whose ends keep their direction.
+        """
         if self.is_notch:
-            return Notch(t, self.half_length_mm, self.depth_mm, plate_mm)
-        radius = (2.0 * self.half_length_mm / _LEAF_IN_NOTCHES) ** 2 / t
-        return Notch(t, radius, radius, plate_mm)
+            return plane_strain_share(self.notch(plate_mm))
+        return 0.5 * sum(strip_share(plate_mm / self._bent_mm, _POISSON))
+
+    def width_doubt(self, plate_mm: float) -> float:
+        """How far that share may be off, because it is not known how a strip's ends move."""
+        if self.is_notch:
+            return 0.0
+        bent, swayed = strip_share(plate_mm / self._bent_mm, _POISSON)
+        return 0.5 * (swayed - bent)
 
     def zone(self, plate_mm: float) -> ConstrainedZone:
         """Zone in which the plate's width restrains the flexure, and how strongly."""
-        share = plane_strain_share(self.notch(plate_mm))
+        share = self.width_share(plate_mm)
         height = 0.5 * self.thickness_mm + self.depth_mm
         return ConstrainedZone(self.at_mm, self.axis_deg, self.half_length_mm, height, share)

@@ -119,7 +119,8 @@ def _segment(flexure: Flexure, span: tuple[float, float], plate_mm: float, mater
     E, G, b = material.youngs_modulus_mpa / held, material.shear_modulus_mpa, plate_mm
     bending = [float(np.sum(dx * arm**k * 12.0 / (E * b * h**3))) for k in range(3)]
     shear = float(_SHEAR * np.sum(dx / (G * b * h)))
-    return np.array([[float(np.sum(dx / (E * b * h))), 0.0, 0.0],
+    # Stretched, the strip is free to narrow.
+    return np.array([[float(np.sum(dx / (material.youngs_modulus_mpa * b * h))), 0.0, 0.0],
                      [0.0, bending[2] + shear, bending[1]],
                      [0.0, bending[1], bending[0]]])  # fmt: skip
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from fingervision.models.fillet_stress import fillet_factors
 from fingervision.models.flexure_span import FlexureSpan
-from fingervision.models.hinge_correction import HingeTheory, plane_strain_share
+from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.hinge_stress import notch_factors
 from fingervision.models.mechanism import Mechanism
 
@@ -48,7 +48,7 @@ def nominal_stress_mpa(
     held = 1.0
     if theory is HingeTheory.CORRECTED:
         factors = _factors(span, plate_mm)
-        share = plane_strain_share(span.notch(plate_mm)) if width_effect else 0.0
+        share = span.flexure.width_share(plate_mm) if width_effect else 0.0
         across = share * mechanism.material.poisson_ratio
         held = float(np.sqrt(1.0 - across + across**2))
     stress = factors[0] * np.abs(tension) / (plate_mm * height)
@@ -57,7 +57,7 @@ def nominal_stress_mpa(
 
 
 def _factors(span: FlexureSpan, plate_mm: float) -> tuple[float, float]:
-    """Stress concentration in tension and in bending: of a notch, of a straight neck's fillets, none of a leaf."""
+    """Stress concentration in tension and in bending: of a notch, of a straight neck's fillets; 1 for a leaf."""
     flexure = span.flexure
     if flexure.is_notch:
         return notch_factors(span.notch(plate_mm))

@@ -1,7 +1,7 @@
 """A planar flexure mechanism as its drawing states it: bodies, flexures, supports, drive, probes."""
 
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, pi
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,10 @@ from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape
+from fingervision.models.width_effect import force_uncertainty
+
+_SAME_AREA = 1e-2
+"""Areas are those of polygons through the arcs, good to 1e-3."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +112,12 @@ class Mechanism:
     body_names: tuple[str, ...] = ()
 
     @property
+    def width_error(self) -> float:
+        """Relative uncertainty of the force by how far the plate's width holds the flexures back."""
+        doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
+        return 2.0 * force_uncertainty(self.material) + self.material.poisson_ratio**2 * doubt
+
+    @property
     def region(self) -> PlanarRegion:
         """The body: shapes and flexures, with corners where faces begin and end."""
         steps = (*self.bodies, *(step for flexure in self.flexures for step in flexure.steps()))
@@ -151,6 +161,12 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             )
         if flexure.kind == "leaf":
             _check_leaf(flexure, region, uncut, name)
+        elif flexure.is_notch and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
+            raise DataError(
+                f"The cuts of flexure {flexure.name} of {name} must open through the faces of what they part, but a "
+                f"whole ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm is a closed hole; make it "
+                "larger, or check its unit."
+            )
     for place, flexure in enumerate(mechanism.flexures):
         for other in mechanism.flexures[:place]:
             apart = hypot(flexure.at_mm[0] - other.at_mm[0], flexure.at_mm[1] - other.at_mm[1])
@@ -166,6 +182,12 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
     for face in (*mechanism.fixed, mechanism.drive.face):
         if hypot(*face.box_mm) > 1e6:
             raise DataError(f"face {face.name} of {name} must have a box of finite size.")
+
+
+def _is_hole(area_mm2: float, flexure: Flexure) -> bool:
+    """Whether a closed part of the outline is one whole cut of a flexure."""
+    cut_mm2 = pi * flexure.half_length_mm * flexure.depth_mm
+    return area_mm2 < 0.0 and abs(area_mm2 + cut_mm2) < _SAME_AREA * cut_mm2
 
 
 def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, name: str) -> None:

@@ -6,6 +6,7 @@ no such sum, and is refused.
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,13 @@ from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Face, Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
 from fingervision.models.mechanism_faces import driven_components
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.rigid_motion import MRAD, BodyPose
 
 Array = NDArray[np.float64]
 
-_FORCE_ERROR = 0.15
-"""Of rigid bodies: the paper's sample is 10 % too stiff without its links' own compliance (mechanics.md, section 5)."""
 _SAMPLES = 65
 _ON = 1e-6
 _BESIDE = 0.05
@@ -181,8 +181,20 @@ class MechanismChain:
 
     @property
     def force_error(self) -> float:
-        """Relative error of the force from treating bodies as rigid."""
-        return _FORCE_ERROR
+        """Relative error of the force from treating bodies as rigid, by comparison with the lumped model."""
+        return self._errors[0]
+
+    @property
+    def stress_error(self) -> float:
+        """Relative error of the stress in the flexures, estimated in the same way."""
+        return self._errors[1]
+
+    @cached_property
+    def _errors(self) -> tuple[float, float]:
+        elastic = MechanismFrame(self.mechanism, theory=self.theory)
+        force = abs(self.stiffness_n_mm / elastic.stiffness_n_mm - 1.0)
+        stress = abs(self.state(1.0).stress_mpa / elastic.state(1.0).stress_mpa - 1.0)
+        return force + elastic.force_error, stress + elastic.stress_error
 
     def touch_input_mm(self) -> dict[str, float]:
         """Empty: this model does not include contact."""
@@ -240,7 +252,7 @@ class MechanismChain:
                     if one in self._reached and other not in self._reached:
                         self._reached[other] = [*self._reached[one], place]
             if len(self._reached) == before:
-                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that hangs on nothing.")
+                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that nothing holds.")
         return self._reached[body]
 
     def _inward(self, point: tuple[float, float]) -> Array:

@@ -38,7 +38,10 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     for held, label in ((False, "drive_free"), (True, "drive_held")):
         for place, value in enumerate(model.modes_hz(drive_held=held), 1):
             figures[f"mode_{place}_{label}_hz"] = value
-    errors = {"model_error_force_percent": 100.0 * model.force_error}
+    errors = {
+        "model_error_force_percent": 100.0 * model.force_error,
+        "model_error_stress_percent": 100.0 * model.stress_error,
+    }
     if isinstance(model, MechanismPlate):
         across = out_of_plane(model.mechanism)
         figures["first_out_of_plane_mode_hz"] = across.modes_hz[0]

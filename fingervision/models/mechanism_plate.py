@@ -19,12 +19,13 @@ from fingervision.models.modal_model import FreeModes, ModalModel, Observable
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import PlaneMesh, triangulate
-from fingervision.models.width_effect import force_uncertainty
 
 Array = NDArray[np.float64]
 
 _ACROSS, _BODY = 4.0, 0.025
 """Triangles across what is thin, and edge length over the body's size: as for the paper's sample."""
+_STRESS_ERROR = 0.01
+"""Beside meshes twice and three times as fine: 0.3 % (`tests/benchmarks/models_held_out.py`)."""
 _BESIDE_CORNER = 0.5
 """Of the thinnest flexure: stress nearer to a sharp corner is a figure of the mesh, and is left out."""
 
@@ -138,7 +139,12 @@ class MechanismPlate:
     @property
     def force_error(self) -> float:
         """Relative error of the force, from the mesh and the width effect."""
-        return 0.005 + 2.0 * force_uncertainty(self.mechanism.material)
+        return 0.005 + self.mechanism.width_error
+
+    @property
+    def stress_error(self) -> float:
+        """Relative error of the stress in the flexures, from the mesh."""
+        return _STRESS_ERROR
 
     def touch_input_mm(self) -> dict[str, float]:
         """Input nearest to zero at which each contact first touches, in small displacements.

@@ -129,7 +129,7 @@ class PlanarRegion:
 
 @lru_cache(maxsize=_MOST_KEPT)
 def _loops_of(steps: tuple[tuple[bool, Shape], ...], marks_mm: tuple[Point, ...]) -> tuple[Loop, ...]:
-    """Outline of a body; kept, because every kind of model of a drawing asks for it."""
+    """Outline of a body; cached, because every kind of model of a drawing uses it."""
     return PlanarRegion(steps, marks_mm)._traced()  # noqa: SLF001 (its own class)
 
 
@@ -164,8 +164,8 @@ def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
             x, y = piece.end_mm
             what = "ends" if near.size == 0 else "touches itself in a point"
             raise DataError(
-                f"The outline must close and part the body everywhere, but it {what} at ({x:.6g}, {y:.6g}) mm; "
-                "let the shapes overlap there, or stay apart."
+                f"The outline must be closed and separate the body from the void everywhere, but it {what} at "
+                f"({x:.6g}, {y:.6g}) mm; let the shapes overlap there, or stay apart."
             )
         following[place] = int(near[0])
     loops = []

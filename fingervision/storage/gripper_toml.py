@@ -23,6 +23,8 @@ _SECTIONS: Mapping[str, type] = MappingProxyType(
 _MAY_BE_ANY_SIGN = frozenset({"lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "lever.l4_mm", "lever.hinge1_axis_deg",
                               "lever.hinge2_axis_deg", "lever.drive_face_y_mm",
                               "material.thermal_expansion_per_k"})  # fmt: skip
+_STATED = 1.05
+"""Of a drawn width: how far a stated one may be above it."""
 _MEET_MM = 0.02
 _METRES_BELOW_MM = 2.0
 _LEAST_DENSITY, _MOST_DENSITY = 30.0, 25000.0
@@ -192,6 +194,17 @@ def _check(gripper: Gripper, origin: str) -> None:
         raise DataError(
             f"hinge.thickness_mm in {origin} must be smaller than the web that the notches cut, {hinge.web_mm:g} mm, "
             f"but is {hinge.thickness_mm:g}; a hinge cannot be thicker than its web."
+        )
+    widest_mm = max(links.pillar_and_root_mm[1] - links.pillar_and_root_mm[0], links.shuttle_width_mm)
+    if hinge.web_mm > _STATED * widest_mm:
+        raise DataError(
+            f"hinge.web_mm in {origin} must be no more than the links that the notches cut, {widest_mm:g} mm, but is "
+            f"{hinge.web_mm:g}; correct the one or the other."
+        )
+    if body.plate_mm > body.height_mm:
+        raise DataError(
+            f"body.plate_mm in {origin} must be no more than body.height_mm, {body.height_mm:g} mm, but is "
+            f"{body.plate_mm:g}; is it in micrometres?"
         )
     drawn = (lever.hinge1_mm[0] - lever.l2_mm, lever.hinge1_mm[1] - lever.l1_mm)
     _must_meet("lever.hinge2_mm", lever.hinge2_mm, "hinge 1 less (l2, l1)", drawn, origin)

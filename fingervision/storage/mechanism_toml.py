@@ -187,8 +187,8 @@ class _Reader(DrawingReader):
             corners = tuple((x, y) for x, y in points)
             if len(set(corners)) < len(corners) or crosses_itself(corners):
                 raise DataError(
-                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does; put its "
-                    "points in order, each once."
+                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does not; put "
+                    "its points in order, each once."
                 )
             return Polygon(corners)
         values = self.numbers(table, key, _SHAPES[key], what)
@@ -244,7 +244,7 @@ class _Reader(DrawingReader):
         if "wall_mm" in table:
             x0, y0, x1, y1 = self.numbers(table, "wall_mm", 4, what)
             if hypot(x1 - x0, y1 - y0) == 0.0:
-                raise DataError(f"{what}.wall_mm in {self.origin} must be two points, but they are one.")
+                raise DataError(f"{what}.wall_mm in {self.origin} must be two different points, but both are the same.")
             return Contact(name, face, None, ((x0, y0), (x1, y1)))
         box_mm = self.grown(self.numbers(table, "against_box_mm", 4, what), f"{what}.against_box_mm", flat=True)
         return Contact(name, face, Face(f"{name}, other face", box_mm))

@@ -9,6 +9,7 @@ import numpy as np
 
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.missing_references import OWN_RECORDING
 from fingervision.frames.received import OwnPacket
 from fingervision.vision.grey import to_grey
 
@@ -52,6 +53,7 @@ class RecordedVideo:
         place = path.with_name(f".{path.name}.part") if keep else path
         try:
             self._container = av.open(f"file:{place}", "w", format="mp4", options=dict(CONTAINER))
+            self._container.metadata["comment"] = OWN_RECORDING
             if keep:
                 self._keep(keep)
                 place.replace(path)
@@ -141,7 +143,7 @@ class RecordedVideo:
     def _copy(self, packets: tuple[OwnPacket, ...]) -> None:
         assert self._first_s is not None  # noqa: S101 - set by the caller
         if self._stream is None and self._template is not None:
-            self._stream = self._container.add_stream_from_template(self._template)
+            self._stream = self._container.add_stream_from_template(self._template, opaque=True)
             self._stream.time_base = TIME_BASE
         for own in packets:
             packet = own.packet

@@ -45,7 +45,7 @@ def without_additions(
     light : ndarray of float, shape (levels,)
         Light of every grey level.
     kind : int
-        What it is: SHADOW or GLARE.
+        What it is: SHADOW, FADING or GLARE.
     fits : list of ProfileFit
         The mean profile of the left and of the right finger.
     """

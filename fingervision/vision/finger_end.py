@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
-from fingervision.vision.finger_shape import PARAMETERS
+from fingervision.vision.finger_shape import INNER_C, INNER_R, OUTER_C, OUTER_R, PARAMETERS
 from fingervision.vision.outline_points import OutlinePoints
 
 Floats = NDArray[np.float64]
@@ -28,6 +28,13 @@ BIWEIGHT_REACH, SIGMAS_IN_MEDIAN = 4.685, 1.4826
 LOOKS = ((100.0, 0.0), (10.0, 10.0), (1.5, 1.0), (1.0, 1.0))
 # A shape whose residuals spread over more than so many sigma is no shape.
 WORST_MISFIT = 1e3
+# Other starts are tried where so many points are set aside, and taken where the weights add up to so much more, at no
+# more than so many times the misfit.
+FEWEST_ASIDE, LEAST_GAIN, MORE_MISFIT = 3, 1.5, 1.3
+# Radii that such a fit begins at as well (shares of the finger's breadth).
+OTHER_RADII = (0.1, 0.2, 0.35)
+# With more misfit than this the outline is of another shape, whatever the radii.
+NO_SHAPE = 4.0
 # Rounding leaves no less of a pivot than this.
 SMALLEST_PIVOT = 1e-15
 
@@ -81,3 +88,22 @@ def fit_finger_end(points: OutlinePoints, start: Floats, origin: Floats, u_prior
     seen = (points.x, points.y, points.u, points.is_row, points.blur)
     misfit = _fit(*seen, start, origin, u_prior, p, covariance, residual, robust)
     return FingerEnd(p, covariance, origin, misfit, residual, robust)
+
+
+def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_prior: Floats) -> FingerEnd:
+    """Repeat the fit from other radii where it rejects points, because a wrong fillet makes its corner look like dust.
+
+    The initial estimate of a radius assumes a right-angled corner, which a tapered finger does not have.
+    """
+    best = fit_finger_end(points, start, origin, u_prior)
+    if np.count_nonzero(best.robust <= 0.0) < FEWEST_ASIDE or best.misfit > NO_SHAPE:
+        return best
+    inner, outer = best.parameters[[INNER_R, OUTER_R]]
+    width = abs(best.parameters[INNER_C] - best.parameters[OUTER_C])
+    for radius in (0.0, *(share * width for share in OTHER_RADII), min(inner, outer), max(inner, outer)):
+        again = start.copy()
+        again[[INNER_R, OUTER_R]] = radius
+        other = fit_finger_end(points, again, origin, u_prior)
+        if other.misfit <= MORE_MISFIT * best.misfit and other.robust.sum() > best.robust.sum() + LEAST_GAIN:
+            best = other
+    return best

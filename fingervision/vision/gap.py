@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
-from fingervision.vision.cornered_outline import cornered_measuring_point
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
-from fingervision.vision.finger_end import FingerEnd, fit_finger_end
+from fingervision.vision.finger_end import FingerEnd, fit_from_any_radius
 from fingervision.vision.finger_shape import OUTER_M, PARAMETERS
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.first_guess import first_guess
@@ -23,6 +22,7 @@ from fingervision.vision.local_outline import FLATTEST, local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
+from fingervision.vision.polygonal_outline import polygonal_measuring_point
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW
 from fingervision.vision.residuals import (
     SHARED_POINTS,
@@ -55,8 +55,6 @@ LEAST_SURE_PX = 0.5
 LEAST_SURE_AT_FIRST_PX = 5.0
 # What may have moved both edges is stated up to here (pixels): more is a strip as broad as the window that was fitted.
 LEAST_SURE_SHIFT_PX = 5.0
-# Corners are cut off both fingers alike: their sides at the measuring height lean alike to this (slope).
-CUT_ALIKE = 0.35
 IS_TIP = ~IS_ROW
 BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
 TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
@@ -100,13 +98,18 @@ def measure_gap(
     if min(len(p.x) for p in points) < FEWEST_LINES:
         return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     guesses = [first_guess(p, below_tip_px) for p in points]
-    fits = [fit_finger_end(p, *guess) for p, guess in zip(points, guesses, strict=True)]
+    fits = [fit_from_any_radius(p, *guess) for p, guess in zip(points, guesses, strict=True)]
     noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
     rough = roughness(points, (fits[0], fits[1]))
+    chains: list[MeasuringPoint] = []
+    if rough is not None:
+        # Corners that the three-sided shape does not know leave as much as roughness does.
+        chains = _polygonal(points, below_tip_px, noise_shared)
+        rough = None if chains else rough
     if rough is not None:
         bare, points = points, (with_roughness(points[0], rough), with_roughness(points[1], rough))
         fits = [
-            shared_along(p, fit_finger_end(p, *guess), guess[2], own, rough)
+            shared_along(p, fit_from_any_radius(p, *guess), guess[2], own, rough)
             for p, guess, own in zip(points, guesses, bare, strict=True)
         ]
         noise_shared = max(noise_shared, rough.shared_px)
@@ -125,26 +128,28 @@ def measure_gap(
         held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared), light_gap)
     if behind is not None:
         return replace(behind, held=held)
-    measured: list[MeasuringPoint] = []
-    cornered = 0
-    for p, end, found, does_hold in zip(points, (left, right), fitted, holds, strict=True):
-        own = None
-        if not all(holds):  # both in the same way: what a method does to a shape, it does to either
-            own = local_measuring_point(p, below_tip_px, noise_shared)
-        if own is None and does_hold:
-            if found.apex < p.x.min() - 1.0:
-                return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
-            covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
-            covariance[1, 1] += set_aside_variance(p, end, found.edge, found.tip + below_tip_px)
-            own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
-        if own is None:
-            own = cornered_measuring_point(p, below_tip_px, shared)
-            cornered += 1
-        if own is None:
-            return NoGap(Status.NO_FINGERS, BROKEN)
-        measured.append(own)
-    if cornered and abs(measured[0].slope - measured[1].slope) > CUT_ALIKE:
-        return NoGap(Status.NO_FINGERS, BROKEN)
+    aside = [
+        set_aside_variance(p, end, found.edge, found.tip + below_tip_px)
+        for p, end, found in zip(points, (left, right), fitted, strict=True)
+    ]
+    if not chains and (not all(holds) or any(aside)):
+        chains = _polygonal(points, below_tip_px, noise_shared)
+    if chains and all(holds):  # what knows its points better
+        variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]
+        chains = chains if sum(own.covariance[1, 1] for own in chains) < sum(variances) else []
+    measured = chains
+    if not measured:
+        for p, end, found, does_hold, beyond in zip(points, (left, right), fitted, holds, aside, strict=True):
+            own = None if all(holds) else local_measuring_point(p, below_tip_px, noise_shared)
+            if own is None and does_hold:
+                if found.apex < p.x.min() - 1.0:
+                    return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
+                covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
+                covariance[1, 1] += beyond
+                own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
+            if own is None:
+                return NoGap(Status.NO_FINGERS, BROKEN)
+            measured.append(own)
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, least_px**2 * SHARED_POINTS[coding])
@@ -164,6 +169,15 @@ def measure_gap(
     if isinstance(outcome, NoGap):
         return replace(outcome, held=held) if held is not None else outcome
     return replace(outcome, held=held, roughness_px=0.0 if rough is None else rough.deviation_px)
+
+
+def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> list[MeasuringPoint]:
+    """Both measuring points by straight sides with corners; None where either finger has no such shape.
+
+    Both fingers use the same method, so that its systematic errors are equal.
+    """
+    found = [polygonal_measuring_point(p, below_tip_px, shared) for p in points]
+    return [own for own in found if own is not None] if None not in found else []
 
 
 def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:

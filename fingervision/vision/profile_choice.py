@@ -9,6 +9,7 @@ motion blurs both flanks and no tip; glare and shadow surround the finger.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from fingervision.vision.beside_edge import without_additions
@@ -19,8 +20,9 @@ from fingervision.vision.first_guess import line
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.median import median
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
-from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
+from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
+from fingervision.vision.symmetric_spread import symmetric_squares
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -31,8 +33,10 @@ UNEXPLAINED = 1.2
 REACH_PX, BIN_PX, FEWEST_IN_BIN = 16, 0.5, 4
 # Rows are left out on purpose where their neighbours lie so many times as far apart as usual.
 LEFT_OUT = 4.0
-# A flank is straight where its rows lie this near to a line (pixels, standard deviation), over so many of them.
+# A flank is known where its rows lie this near to a line (pixels, standard deviation), over so many of them; an inner
+# one also where they lie so near to a curve. The degrees that are tried:
 STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
+STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
 # A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
 # step does with half of that, or with so many times what the best model leaves. A wall improves it by so much in
 # chi-square.
@@ -40,6 +44,9 @@ MODEL_LEAVES, MODEL_TIMES, STEP_TIMES, SIGNIFICANT = 4.0, 10.0, 3.0, 30.0
 # One model is clearly better than another that leaves so much more chi-square, in units of what its own bins leave
 # (odds of e^8 to one).
 CLEARLY = 16.0
+# The integral of what a Gaussian step leaves of a disc of defocus, squared, is at most 0.0017 contrast^2 blur (of a box
+# 0.0038): what leaves more than this is two steps, or a line between them, even where it is alike to both sides.
+DISC_LEAVES = 0.002
 # What stands beside an edge makes this share of the contrast: less is texture, more is no finger's edge.
 SHARES = (0.05, 0.85)
 # Levels within so many standard deviations of the end of the scale are cut off now and then.
@@ -97,7 +104,9 @@ def with_profile(
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
         return edges
     room = _room(edges)
-    inner = [_profile(upright, edges, light, k, slice(0, INNER), room) for k in range(2)]
+    # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
+    curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
+    inner = [_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
         return edges
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
@@ -108,6 +117,7 @@ def with_profile(
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
     fits = [[_best(STEP, profile, weight, blur[k])] for k, profile in enumerate(inner) if profile]
     bins = sum(profile.t.size for profile in inner if profile)
+    profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
     if sum(each[STEP].squares for each in fits) < 0.5 * MODEL_LEAVES * bins:
         # A step explains both, whatever the others would: only how wide it is is still to be asked.
         fits = [[each[STEP]] * 4 for each in fits]
@@ -123,19 +133,27 @@ def with_profile(
     shadow, wall, glare = ([each[kind] for each in fits] for kind in (SHADOW, WALL, GLARE))
     all_around = np.hypot(1.0, edges.lines.slope)
     margin = CLEARLY * np.maximum(left / bins, 1.0)
+    # Optics of any shape that spread light alike to both sides (a disc of defocus, a halo) are no shadow and no glare.
+    is_lopsided = not is_step and not _is_symmetric(profiles, [each[STEP] for each in fits])
     is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
-    if not is_step and is_shadow and _are_of_size(shadow, -1.0):
-        moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
-        return without_additions(upright, moved, light, SHADOW, shadow)
-    if not is_step and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
+    if is_lopsided and is_shadow and _are_of_size(shadow, -1.0):
+        return _without_shadow(upright, edges, light, shadow, [_best(FADING, *seen) for seen in profiles], bins)
+    if is_lopsided and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
         moved = _moved(edges, glare, U_GLARE, all_around, "glare")
         return without_additions(upright, moved, light, GLARE, glare)
     outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
+        if not is_wall and is_unlike_tip:
+            # Flanks that are broader than the tips: by a wall, or by motion, and nothing here tells which.
+            wall = [
+                _best(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
+                for seen, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
+            ]
+            is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and _are_of_size(wall, -1.0)
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
         return _unsure(edges, [abs(fit.position) for fit in chosen], "wall") if is_wall else edges
-    if not is_step and left[SHADOW] < enough:
+    if is_lopsided and left[SHADOW] < enough:
         # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
         beyond = np.array(
             [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
@@ -143,8 +161,7 @@ def with_profile(
         both = left[:3] + beyond.sum(axis=0)
         is_likelier = both[SHADOW] + margin[SHADOW] < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
         if is_likelier and _are_of_size(shadow, -1.0):
-            moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
-            return without_additions(upright, moved, light, SHADOW, shadow)
+            return _without_shadow(upright, edges, light, shadow, [_best(FADING, *seen) for seen in profiles], bins)
     widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
     is_one_sided = [
         each[STEP].blur ** 2 > width**2 + max(ONE_SIDED * width**2, ONE_SIDED_PX**2)
@@ -165,13 +182,37 @@ def with_profile(
     if any(widened):
         return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
-    if is_step or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
+    if not is_lopsided or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
         return edges
     # Glare on the finger, or a bevel around it: the outline is in between.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
     moved = _moved(edges, glare, U_GLARE, all_around, "glare")
     moved = without_additions(upright, moved, light, GLARE, glare)
     return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
+
+
+def _without_shadow(
+    upright: GreyImage, edges: EdgePoints, light: Floats, ramps: list[ProfileFit], fading: list[ProfileFit], bins: int
+) -> EdgePoints:
+    """Edges corrected for a soft shadow, whose light recovers between linearly and exponentially.
+
+    The edge lies between the positions of these two models, weighted by the squares that each leaves beyond chance. Its
+    displacement towards the model that leaves more is taken as its own standard uncertainty.
+    """
+    squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
+    if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
+        kind, fits, others = SHADOW, ramps, fading
+    else:
+        kind, fits, others = FADING, fading, ramps
+    beyond = [max(each - bins, np.sqrt(2.0 * bins)) for each in squares]
+    share = min(beyond) / sum(beyond) if _are_of_size(others, -1.0) else 0.0
+    towards = [share * (other.position - fit.position) for fit, other in zip(fits, others, strict=True)]
+    by_pixel = np.hypot(1.0, edges.lines.slope)
+    moved = without_additions(upright, _moved(edges, fits, U_SHADOW, by_pixel, "shadow"), light, kind, fits)
+    further = np.array(towards)[:, None] * np.hypot(1.0, moved.lines.slope)
+    u_px = [float(np.hypot(mark.shift_px, by)) for mark, by in zip(moved.marks, towards, strict=True)]
+    position = moved.position + moved.lines.outward * further
+    return replace(moved, position=position, marks=_stated(moved, u_px))
 
 
 def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
@@ -190,6 +231,18 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
     moved = replace(edges, position=edges.position + edges.lines.outward * moves[:, None] * by_pixel)
     u_px = [U_SHIFT * abs(move) for move in moves.tolist()]
     return replace(moved, marks=_stated(moved, u_px), beside="sharpening")
+
+
+def _is_symmetric(flanks: list[tuple[_Profile, float, float]], steps: list[ProfileFit]) -> bool:
+    """Whether the profiles of both flanks could come from optics that spread light symmetrically."""
+    squares = left = 0.0
+    for (profile, weight, blur), step in zip(flanks, steps, strict=True):
+        contrast = float(np.ptp(profile.light))
+        by_noise = weight * float(profile.count.mean()) * contrast**2 * step.blur
+        left += BIN_PX * max(step.squares - profile.t.size, 0.0) / by_noise / len(flanks)
+        squares += symmetric_squares(profile.t, profile.light, weight * profile.count, blur)
+    bins = sum(profile.t.size for profile, _, _ in flanks)
+    return squares < 0.5 * MODEL_LEAVES * bins and left < DISC_LEAVES
 
 
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
@@ -226,26 +279,40 @@ def _best(
     )
 
 
-def _profile(upright: GreyImage, edges: EdgePoints, light: Floats, k: int, part: slice, room: int) -> _Profile | None:
-    """Mean profile of the half of a flank farther from the tip; None where it is short or not straight."""
+def _profile(
+    upright: GreyImage,
+    edges: EdgePoints,
+    light: Floats,
+    k: int,
+    part: slice,
+    room: int,
+    curves: tuple[int, ...] = STRAIGHT_ONLY,
+) -> _Profile | None:
+    """Mean profile of the half of a flank farther from the tip; None where it is short or not smooth."""
     real = np.flatnonzero(edges.lines.weight[k, part] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS or room < REACH_PX // 2:
         return None
     fixed, found = edges.lines.fixed[k, part][rows], edges.position[k, part][rows]
     outward = int(edges.lines.outward[k, part][0])
-    keep = np.ones(rows.size, dtype=bool)
-    for _look in range(3):
-        at, slope = line(fixed[keep].astype(np.float64), found[keep])
-        away = found - at - slope * fixed
-        spread = 1.4826 * median(np.abs(away[keep]))
-        keep = np.abs(away) < 3.0 * spread + 1e-3
-        if np.count_nonzero(keep) < FEWEST_ROWS:
-            return None
-    if spread > STRAIGHT_PX:
+    for degree in curves:
+        keep = np.ones(rows.size, dtype=bool)
+        for _look in range(3):
+            if degree == 1:  # a hundred times faster
+                curve = Polynomial(line(fixed[keep].astype(np.float64), found[keep]))
+            else:
+                curve = Polynomial.fit(fixed[keep], found[keep], degree)
+            away = found - curve(fixed)
+            spread = 1.4826 * median(np.abs(away[keep]))
+            keep = np.abs(away) < 3.0 * spread + 1e-3
+            if np.count_nonzero(keep) < FEWEST_ROWS + degree - 1:
+                return None
+        if spread <= STRAIGHT_PX:
+            break
+    else:
         return None
     fixed = _rows_between(fixed[keep])
-    edge = at + slope * fixed
+    edge, slope = curve(fixed), curve.deriv()(fixed)[:, None]
     columns = np.rint(edge).astype(int)[:, None] + outward * np.arange(-REACH_PX, room + 1)
     is_in = (columns >= 0) & (columns < upright.shape[1])
     values = light[upright[np.broadcast_to(fixed[:, None], columns.shape)[is_in], columns[is_in]]]

@@ -13,6 +13,10 @@ static double beside(int64_t kind, double t, double blur, double breadth, double
         normal((t + breadth) / blur, &far_density);
         return far_density;
     }
+    if (kind == FADING) { /* falls from one at the edge as exp(-t / breadth) */
+        double ratio = blur / breadth;
+        return exp(0.5 * square(ratio) - t / breadth) * normal(t / blur - ratio, &far_density);
+    }
     return 0.0;
 }
 

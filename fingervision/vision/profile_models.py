@@ -15,10 +15,11 @@ from fingervision.domain.loops import loop
 Floats = NDArray[np.float64]
 
 # What the profile is made of beside the step.
-STEP, WALL, SHADOW, GLARE = range(4)
+# A shadow falls off along a straight line (SHADOW) or as an exponential (FADING): real penumbras lie between the two.
+STEP, WALL, SHADOW, GLARE, FADING = range(5)
 # Where the search for the breadth of each begins (pixels), and the limits within which it stays.
-STARTS_PX = ((0.0,), (1.5, 3.0, 5.0), (4.0, 8.0, 14.0), (1.0, 2.5, 4.5))
-LIMITS_PX = ((0.0, 0.0), (0.8, 10.0), (2.0, 24.0), (0.5, 8.0))
+STARTS_PX = ((0.0,), (1.5, 3.0, 5.0), (4.0, 8.0, 14.0), (1.0, 2.5, 4.5), (2.0, 4.0, 8.0))
+LIMITS_PX = ((0.0, 0.0), (0.8, 10.0), (2.0, 24.0), (0.5, 8.0), (1.0, 16.0))
 # Sharpening, and the tails of real optics, add an odd part: a step of this many times the blur less the step itself.
 TAIL_BLURS = 2.2
 # Blur of the optics, the pixel included, stays within these limits (pixels).
@@ -85,7 +86,7 @@ def fit_profile(
     Parameters
     ----------
     kind : int
-        STEP, WALL, SHADOW or GLARE.
+        STEP, WALL, SHADOW, GLARE or FADING.
     t : ndarray of float, shape (n,)
         Places, outwards from the single step's edge (pixels).
     value, weight : ndarray of float, shape (n,)

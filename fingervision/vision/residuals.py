@@ -34,6 +34,9 @@ MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
 # Where most of the points within so many pixels above or below the measuring point are rejected, they may be the
 # finger's own edge (a corner that is cut off, a bend) and not dust.
 BESIDE_PX = 4.0
+# Blur draws a sharp corner back from its vertex by 0.77 sigma, and 1.1 sigma at a turn of 120 degrees: a tip that lies
+# higher above every point than that and half a pixel is none.
+TIP_BEYOND_IN_BLURS, TIP_BEYOND_PX = 1.5, 0.5
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
 
@@ -78,6 +81,8 @@ def shape_holds(
         So many neighbouring points of a rough edge stray together, which is no matter of shape.
     """
     if np.count_nonzero(end.robust) < PARAMETERS or not is_on_outline(points, found.edge, found.tip + below_tip_px):
+        return False
+    if found.tip < points.y.min() - TIP_BEYOND_PX - TIP_BEYOND_IN_BLURS * float(points.blur.max()):
         return False
     if _rejected(points.x, points.y, end.robust, found.edge, found.tip, below_tip_px) > MOST_REJECTED:
         return False

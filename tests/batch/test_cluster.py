@@ -110,7 +110,7 @@ def test_workers_of_another_version_are_refused(
         check=False,
     )
     assert done.returncode == 1
-    assert "Every worker must run what runs here, but tcp://127.0.0.1:" in done.stderr
+    assert "Every worker must have the versions that are installed here, but tcp://127.0.0.1:" in done.stderr
     assert "source of fingervision" in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "out").exists()

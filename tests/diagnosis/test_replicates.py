@@ -67,6 +67,18 @@ def test_places_or_sides_that_drift_apart_are_no_scatter(drifting: str) -> None:
     assert found.sd_mm == pytest.approx(SCATTER_MM, rel=2 * KNOWN)
 
 
+def test_zeros_of_runs_are_no_scatter() -> None:
+    path, rows = cycles(0.5)
+    rng = np.random.default_rng(9)
+    half = path.size // 2
+    values = np.where(rows < half, 0.0, 0.012) + SCATTER_MM * rng.standard_normal(rows.size)
+    runs = (slice(0, int(np.sum(rows < half))), slice(int(np.sum(rows < half)), rows.size))
+    label = visits(path, (slice(0, half), slice(half, path.size)), rows)
+    found = pure_error(values, 1.0 * np.arange(rows.size), label, np.zeros(rows.size, dtype=bool), path[rows], runs)
+    assert found is not None
+    assert found.sd_mm == pytest.approx(SCATTER_MM, rel=KNOWN)
+
+
 def test_the_overshoot_tells_from_which_side_an_end_was_approached() -> None:
     path, rows = cycles(0.5)
     label = visits(path, (slice(0, path.size),), rows)

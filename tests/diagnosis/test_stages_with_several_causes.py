@@ -92,3 +92,14 @@ def test_a_step_held_at_its_bounds_is_better_than_one_clipped() -> None:
         assert cost <= of_clipped + 1e-12
         better += cost < of_clipped - 1e-6
     assert better > 10
+
+
+@pytest.mark.slow
+def test_a_map_that_was_read_from_one_side_is_no_friction(tmp_path: Path) -> None:
+    position, read, stands = driven_mm(0.024)
+    read &= np.diff(position, prepend=position[0] - 1.0) > 0.0
+    curve = 0.012 * np.sin(2.0 * np.pi * stands / 140.0 + 0.8)
+    gap = stands + 103.0 + curve + np.random.default_rng(4).normal(0.0, NOISE_MM, stands.size)
+    found = report_of(tmp_path, gap, position, read, TARGETS_MM + 103.0).report
+    assert all("position_error_map" in names for names in found.alternatives)
+    assert found.verdict is not Verdict.AGREES

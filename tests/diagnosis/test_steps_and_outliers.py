@@ -47,3 +47,38 @@ def test_gross_errors_at_any_time_are_set_aside_only_while_they_are_few(tmp_path
     gap[wrong] += rng.uniform(0.3, 1.0, int(wrong.sum())) * rng.choice([-1.0, 1.0], int(wrong.sum()))
     verdict = diagnosed(tmp_path, gap, ramp).report.verdict
     assert verdict is (Verdict.AGREES if share < 0.1 else Verdict.UNKNOWN)
+
+
+@pytest.mark.slow
+def test_a_square_wave_shows_dead_time_and_highest_speed(tmp_path: Path) -> None:
+    command = np.tile(np.repeat([0.0, 4.0], 40), 3)
+    fine_s = np.arange(command.size * 50) / (50 * RATE_HZ)
+    asked = command[np.clip(((fine_s - 0.12) * RATE_HZ).astype(int), 0, None)]
+    place = np.zeros_like(fine_s)
+    for k in range(1, place.size):
+        place[k] = place[k - 1] + np.clip(asked[k] - place[k - 1], -6.0 / (50 * RATE_HZ), 6.0 / (50 * RATE_HZ))
+    noise = np.random.default_rng(8).normal(0.0, NOISE_MM, command.size)
+    report = diagnosed(tmp_path, 1.0 + place[::50] + noise, command).report
+    assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    assert all("slew_limit" in names for names in report.alternatives)
+    found = {key: value.value for effect in report.effects for key, value in effect.parameters.items()}
+    assert found["speed_mm_s"] == pytest.approx(6.0, rel=0.03)
+    assert found["delay_s"] == pytest.approx(0.12, abs=0.01)
+
+
+@pytest.mark.slow
+def test_the_size_of_jumps_is_found_between_the_sizes_that_signatures_try(tmp_path: Path) -> None:
+    # Each jump comes at the sample that it is due at: the score has a basin of 0.6 %, and signatures are 2.3 % apart.
+    time = np.arange(500) / 10.0
+    ramp = 1.5 - 1.5 * np.cos(2.0 * np.pi * time / 20.0)
+    place, stands = np.empty_like(ramp), ramp[0]
+    for k, x in enumerate(ramp):
+        stands = x if abs(x - stands) > 0.06 else stands
+        place[k] = stands
+    noise = np.random.default_rng(9).normal(0.0, 0.003, ramp.size)
+    rows = [f"{t:.4f},{x:.6f},{gap:.6f}" for t, x, gap in zip(time, ramp, 2.0 + place + noise, strict=True)]
+    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
+    (tmp_path / "simulation.csv").write_text("input_mm,gap_mm\n-1,1\n4,6\n")
+    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv")).report
+    assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    assert report.effects[0].parameters["jump_mm"].value == pytest.approx(0.06, rel=0.01)

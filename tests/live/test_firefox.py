@@ -1,101 +1,70 @@
-"""The page in a second kind of browser: all three ways in, on every size of screen, in both schemes of colours."""
+"""The page in Firefox: the three ways in, on three screens and in both schemes, with a silent console."""
 
-import json
+import csv
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 
-from fingervision.rendering import Camera, render, two_fingers
-from tests.live.firefox import DARK, LIGHT, Firefox, firefox, needs_firefox
+from tests.live.firefox import Firefox, firefox, needs_firefox
 
-pytestmark = [needs_firefox, pytest.mark.slow]
-SIZES = ((390, 844), (1280, 720), (1920, 1080))
-# The page's own server, and what it holds itself.
-OWN = ("http://127.0.0.1:", "ws://127.0.0.1:", "blob:http://127.0.0.1:", "data:", "about:")
-PARTS = ("#picture", "#gap_mm", "#status", "#chart")
-
-
-RECIPE = """\
-schema = 1
-name = "there and back"
-
-[[step]]
-kind = "triangle"
-from_mm = 0.0
-to_mm = 0.3
-speed_mm_s = 0.5
-cycles = 1
-frames = "continuous"
-"""
+__all__ = ["firefox"]
+pytestmark = needs_firefox
+SCREENS = ((1280, 720), (1920, 1080), (390, 844))
+SCREENSHOTS = os.environ.get("FINGERVISION_SCREENSHOTS")
+# What the page shows has four decimals, the table seven.
+SHOWN_MM = 0.00005
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("firefox") / "opening"
-    folder.mkdir()
-    rng = np.random.default_rng(11)
-    for index in range(20):
-        picture = render(two_fingers(90.0 + index, radius_px=20.0), Camera(blur_px=0.9, noise_grey=2.0), rng)
-        cv2.imwrite(str(folder / f"{index:03d}.png"), picture)
-    return folder
+def on_every_screen(firefox: Firefox, address: str, name: str) -> None:
+    """Picture, value, status and chart fit the window, whose scheme is the user's."""
+    for width, height in SCREENS:
+        firefox.open(address, (width, height))
+        firefox.shown("Number(document.querySelector('#picture').dataset.shown) > 0")
+        firefox.shown("/\\d/.test(document.querySelector('#gap_mm').textContent)")
+        for part in ("#picture", "#gap_mm", "#status", "#chart"):
+            box = firefox.box(part)
+            assert 0 <= box["left"] <= box["right"] <= width + 0.5, (name, width, part, box)
+            assert 0 <= box["top"] <= box["bottom"] <= height + 0.5, (name, width, part, box)
+        assert firefox.evaluate("document.documentElement.scrollWidth") <= width
+        is_dark = firefox.evaluate("matchMedia('(prefers-color-scheme: dark)').matches")
+        ground = firefox.evaluate("getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
+        assert (sum(ground) < 3 * 128) is is_dark
+        if SCREENSHOTS:
+            firefox.screenshot(Path(SCREENSHOTS) / f"firefox_{name}_{width}_{'dark' if is_dark else 'light'}.png")
 
 
-@pytest.fixture(scope="module")
-def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("bed")
-    (folder / "recipe.toml").write_text(RECIPE)
-    words = [sys.executable, "-m", "fingervision", "bed", "run", "recipe.toml", "--out", "run", "--seed", "3"]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    subprocess.run(words, cwd=folder, check=True, capture_output=True, env=environment)
-    return folder / "run"
+@pytest.mark.slow
+@pytest.mark.long
+def test_live_a_run_folder_and_a_recording_in_firefox(firefox: Firefox, live: Callable[..., Any]) -> None:
+    view = live("simulated", "--port", "0")
+    on_every_screen(firefox, view.address, "live")
+    firefox.open(view.address)
+    firefox.shown("Number(document.querySelector('#picture').dataset.shown) > 5")
+    firefox.press("r")
+    firefox.shown("document.querySelector('#record').textContent.includes('Stop')")
+    before = int(firefox.evaluate("document.querySelector('#gap_mm').dataset.frame"))
+    firefox.shown(f"Number(document.querySelector('#gap_mm').dataset.frame) > {before + 20}")
+    firefox.press("r")
+    firefox.shown("[...document.querySelectorAll('#log li')].some(e => e.textContent.includes('Recorded'))")
+    (run,) = view.runs()
+    firefox.evaluate("[...document.querySelectorAll('#panels details')].forEach(e => e.open = true) || 0")
+    firefox.fill("#below_tip", "-1")
+    firefox.shown("[...document.querySelectorAll('#log li')].some(e => e.textContent.includes('-1'))")
+    assert view.stop() == 0
 
-
-def is_whole(browser: Firefox, width: int, height: int) -> None:
-    """Picture, value, status and chart lie in view, one beside or below the other."""
-    boxes = json.loads(
-        browser.value(
-            f"JSON.stringify({list(PARTS)}.map(part => {{ const box = document.querySelector(part)"
-            ".getBoundingClientRect(); return [box.left, box.top, box.right, box.bottom]; }))"
-        )
-    )
-    for part, (left, top, right, bottom) in zip(PARTS, boxes, strict=True):
-        assert 0 <= left < right <= width, (part, width, left, right)
-        assert 0 <= top < bottom <= height, (part, height, top, bottom)
-    assert browser.value("document.documentElement.scrollWidth") <= width
-
-
-@pytest.mark.parametrize(("name", "scheme"), [("light", LIGHT), ("dark", DARK)])
-def test_all_three_ways_in_are_whole_at_every_size(
-    live: Callable[..., Any], recording: Path, run_folder: Path, tmp_path: Path, name: str, scheme: str
-) -> None:
-    ways = {
-        "live": live("simulated", "--port", "0"),
-        "recording": live(recording, "--rate-hz", "25", "--px-per-mm", "34", "--port", "0"),
-        "run": live(run_folder, "--px-per-mm", "34", "--port", "0"),
-    }
-    pictures = Path(os.environ.get("FINGERVISION_SCREENSHOTS", tmp_path))
-    pictures.mkdir(parents=True, exist_ok=True)
-    with firefox(tmp_path / "profile", scheme) as browser:
-        for way, view in ways.items():
-            for width, height in SIZES:
-                browser.open(view.address, width, height)
-                browser.until("document.querySelector('#gap_mm').textContent.match(/[0-9]\\.[0-9]/) !== null")
-                browser.until("document.querySelector('#picture').width > 100")
-                is_whole(browser, width, height)
-                browser.picture(pictures / f"firefox_{way}_{width}_{name}.png")
-            is_dark = browser.value("matchMedia('(prefers-color-scheme: dark)').matches")
-            assert is_dark == (scheme == DARK)
-            if way == "live":
-                browser.press(" ")
-                browser.until("document.querySelector('#pause').textContent === 'Go on'")
-        assert browser.logged == []
-        assert browser.asked_for
-        foreign = [url for url in browser.asked_for if not url.startswith(OWN)]
-        assert foreign == []
+    with (run / "gaps.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    (video,) = (each for each in run.iterdir() if each.suffix in (".mp4", ".mkv"))
+    for name, source, options in (("run", run, ()), ("recording", video, ("--px-per-mm", "34"))):
+        shown = live(source, *options, "--port", "0")
+        on_every_screen(firefox, shown.address, name)
+        firefox.open(shown.address)
+        firefox.shown(f"document.querySelector('#place').textContent === 'frame 0 of {len(rows)}'")
+        firefox.press("\ue014")  # arrow to the right
+        firefox.shown("document.querySelector('#gap_mm').dataset.frame === '1'")
+        found = float(firefox.evaluate("document.querySelector('#gap_mm').textContent"))
+        assert found == pytest.approx(float(rows[1]["gap_mm"]), abs=SHOWN_MM)
+        assert shown.stop() == 0

@@ -5,10 +5,12 @@ import json
 import shutil
 import struct
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from threading import Event, Thread
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
 from fingervision.frames.source import Wish
+from fingervision.live import capture as capture_module
 from fingervision.live import page_socket, server
 from fingervision.live import recorder as recorder_module
 from fingervision.live.cadence import Cadence
@@ -29,6 +32,7 @@ from fingervision.live.frame_measurement import Seen
 from fingervision.live.free_space import minutes_left
 from fingervision.live.opening import opened
 from fingervision.live.outlet import PATIENCE_S, Outlet
+from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.preview import Known, message
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines
@@ -239,3 +243,52 @@ def test_the_room_left_is_that_of_the_disk_at_the_rate_so_far(tmp_path: Path) ->
     assert minutes_left(tmp_path, 30.0) == pytest.approx(free / 100_000 / 60.0, rel=0.05)
     assert minutes_left(tmp_path, 1.0) is None
     assert minutes_left(tmp_path / "missing", 30.0) is None
+
+
+def test_frames_that_nobody_measures_hold_up_no_capture_and_are_counted_and_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(capture_module, "FRAMES_WAITING", 3)
+    capture = opened("simulated", Wish())
+    capture.start()
+    capture.begin()
+    until_s = time.monotonic() + 30.0
+    while capture.overflowed < 4 and time.monotonic() < until_s:
+        time.sleep(0.02)
+    capture.stop()
+    lost = capture.overflowed
+    assert lost >= 4
+    said: list[tuple[str, str]] = []
+    OverflowReport(capture, lambda name, words: said.append((name, words))).say()
+    assert said == [("overflowed", f"{lost} frames came faster than they could be measured, and are lost.")]
+
+
+def test_a_disk_that_stands_still_holds_up_nobody_and_ends_the_recording_with_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "FRAMES_WAITING", 3)
+    goes_on = Event()
+    run = SimpleNamespace(path=tmp_path, is_there=True, event=lambda *_: goes_on.wait(), close=lambda _: None)
+    recorder = recorder_module.Recorder(run)  # type: ignore[arg-type]
+    thread = Thread(target=lambda: [recorder.add(("name", "words")) for _ in range(10)], daemon=True)
+    thread.start()
+    thread.join(5.0)
+    assert not thread.is_alive()
+    assert "is too slow for this camera" in recorder.failure
+    goes_on.set()
+    with pytest.raises(FingervisionError, match="too slow"):
+        recorder.stop()
+
+
+def test_a_fault_of_ours_in_measuring_is_seen_and_ends_the_view(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("a fault of ours")
+
+    monkeypatch.setattr(session, "_take", fail)
+    monkeypatch.setattr(threading, "excepthook", lambda _: None)
+    session.start()
+    assert session.ended.wait(30.0)
+    session.stop()
+    assert "start the live view again" in head_of(session)["state"]["trouble"]

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -21,9 +21,11 @@ from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.opening import opened as opened_source
+from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.storage.calibration_json import read_calibration
 from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.live.test_attacks import reply, socket_of
 
 __all__ = ["browser", "opened"]
 WRONG: list[dict[str, Any]] = [
@@ -96,6 +98,86 @@ def test_what_cannot_be_asked_here_ends_nothing(session: Session, request_: dict
     if session.recording is not None:
         session.stop_recording()
     assert session.choices == before
+
+
+TWENTY: list[Any] = [
+    None, True, "", " ", "1", "1,5", "ten", "<script>alert(1)</script>", "../../etc/passwd", "\0", "\u0661", "NaN",
+    [], [1.0], {}, {"value": 1}, float("nan"), float("inf"), -float("inf"), -1.0, 1e308, 10**400,
+]  # fmt: skip
+"""What may be typed, or sent by a page that was changed, where a positive number is asked for."""
+CALIBRATE = {"do": "calibrate", "kind": "bar", "box": [200, 100, 240, 280], "size_mm": 2.0, "u_size_mm": 0.001}
+FIELDS: list[tuple[dict[str, Any], str]] = [
+    ({"do": "scale"}, "px_per_mm"),
+    ({"do": "height"}, "below_tip_mm"),
+    (CALIBRATE, "size_mm"),
+    (CALIBRATE, "u_size_mm"),
+    (CALIBRATE, "box"),
+    (CALIBRATE, "kind"),
+    ({"do": "region"}, "box"),
+    ({"do": "tips"}, "tips"),
+    ({"do": "fingers"}, "fingers"),
+    ({"do": "load_settings"}, "path"),
+    ({"do": "height_at"}, "y"),
+    ({"do": "limits", "greatest": None}, "least"),
+    ({"do": "limits", "least": None}, "greatest"),
+    ({"do": "input"}, "input_mm"),
+    ({"do": "seek"}, "frame"),
+    ({"do": "play"}, "speed"),
+    ({"do": "bed_move", "speed_mm_s": 1.0}, "to_mm"),
+    ({"do": "bed_jog", "for_s": 0.1}, "speed_mm_s"),
+    ({"do": "bed_run"}, "recipe"),
+    ({"do": "gauge_add"}, "table"),
+    ({"do": "gauge_remove"}, "name"),
+    ({"do": "gauges_load"}, "path"),
+]
+
+
+@pytest.mark.parametrize(("request_", "field"), FIELDS, ids=[f"{each['do']} {field}" for each, field in FIELDS])
+def test_twenty_wrong_things_in_every_field_change_no_measurement(
+    session: Session, request_: dict[str, Any], field: str
+) -> None:
+    before = session.choices
+    for wrong in TWENTY:
+        with suppress(FingervisionError):
+            obey(session, {**request_, field: wrong})
+        found = session.choices
+        # Nothing but a finite, positive scale and height is ever in force.
+        assert found.scale == before.scale or isinstance(wrong, float), (field, wrong)
+        assert isinstance(found.scale, BareScale | Calibration)
+        assert 0.0 < found.scale.px_per_mm < 1e6, (field, wrong)
+        assert 0.0 < found.below_tip_mm < 1e6, (field, wrong)
+        assert np.isfinite(found.zero_mm), (field, wrong)
+
+
+def test_two_pages_that_calibrate_at_once_are_one_writer_and_one_who_is_told(session: Session) -> None:
+    ending = Event()
+    page = Page(session, bound("127.0.0.1", 0))
+    thread = Thread(target=page.serve, args=(ending,))
+    thread.start()
+    try:
+        with socket_of(page.address) as first, socket_of(page.address) as second:
+            pages, answers = {2.0: first, 3.0: second}, {}
+
+            def calibrate(size_mm: float) -> None:
+                answers[size_mm] = reply(pages[size_mm], {**CALIBRATE, "size_mm": size_mm})
+
+            both = [Thread(target=calibrate, args=(size_mm,)) for size_mm in pages]
+            for each in both:
+                each.start()
+            for each in both:
+                each.join()
+            (done,) = (size_mm for size_mm, answer in answers.items() if "refused" not in answer)
+            (told,) = (size_mm for size_mm, answer in answers.items() if "refused" in answer)
+            assert "Take over" in answers[told]["refused"]
+            assert session.choices.scale is not None
+            assert session.choices.scale.px_per_mm == pytest.approx(100.0 / done, rel=0.01)
+            assert "refused" not in reply(pages[told], {"do": "take_over"})
+            calibrate(told)
+            assert session.choices.scale.px_per_mm == pytest.approx(100.0 / told, rel=0.01)
+            assert len(list(session.out.glob("calibration_*.json"))) == 2
+    finally:
+        ending.set()
+        thread.join()
 
 
 def test_two_who_calibrate_in_the_same_second_keep_a_file_each(session: Session) -> None:

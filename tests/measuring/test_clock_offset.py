@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset, find_clock_offset
+from fingervision.measuring.clock.alignment import find_clock_offset
+from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.storage.summary_json import u_clock_beside
 
 SIGMAS = 3.5
@@ -108,6 +109,36 @@ def test_a_reversed_sign_is_named():
     refused = find_clock_offset(one.time_s, 12.0 - one.gap_mm, one.drive)
     assert isinstance(refused, NoClockOffset)
     assert "sign" in refused.words or "does not follow" in refused.words
+
+
+def test_a_log_of_set_points_is_refused():
+    at_s, at_mm = np.array(STROKES).T
+    one = drawn(3.0)
+    # The place that is gone to stands in every row until it is reached.
+    targets = at_mm[np.clip(np.searchsorted(at_s, one.drive.time_s, side="right"), 0, at_mm.size - 1)]
+    refused = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.drive.time_s, targets))
+    assert isinstance(refused, NoClockOffset)
+    assert "set-points" in refused.words
+
+
+def test_a_stage_that_jumps_within_a_row_is_not_taken_for_set_points_without_a_word():
+    jumps = [(0.0, 0.0)]
+    for k, place in enumerate((0.8, 0.1, 0.5, 0.9, 0.2, 0.6)):
+        jumps += [(1.3 * k + 1.0, jumps[-1][1]), (1.3 * k + 1.02, place)]
+    one = drawn(3.0, corners=[*jumps, (9.0, 0.6)])
+    clock = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.drive.time_s[::20], one.drive.input_mm[::20]))
+    assert isinstance(clock, ClockOffset)
+    assert abs(clock.offset_s - 3.0) < SIGMAS * clock.u_offset_s
+    assert any("set-points" in note for note in clock.notes)
+
+
+@pytest.mark.slow
+def test_a_coarse_encoder_is_said():
+    one = drawn(3.0, corners=[(3.0 * at_s, at_mm) for at_s, at_mm in STROKES])
+    rounded = np.round(one.drive.input_mm / 0.03) * 0.03
+    clock = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.drive.time_s, rounded))
+    notes = clock.notes if isinstance(clock, ClockOffset) else (clock.words,)
+    assert any("more than a frame" in note or "no better than" in note for note in notes)
 
 
 def test_wrong_gaps_here_and_there_do_not_move_it():

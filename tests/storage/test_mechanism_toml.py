@@ -180,7 +180,7 @@ wall_mm = [22, 0, 22, 100]
 """
 WRONG_CONTACTS = [
     ("wall_mm = [22, 0, 22, 100]", "", "against_box_mm, a face, and wall_mm"),
-    ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22, 0]", "two points, but they are one"),
+    ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22, 0]", "two different points"),
     ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22]", "list of 4 numbers"),
     ("wall_mm = [22, 0, 22, 100]", "wall = [22, 0, 22, 100]", "did you mean wall_mm?"),
     ("wall_mm = [22, 0, 22, 100]", "against_box_mm = [5, 1, 0, 1]", "both growing"),

@@ -67,7 +67,7 @@ def test_nobody_at_the_terminal_is_said() -> None:
 
 def test_what_a_hand_cannot_do_is_refused() -> None:
     actuator, screen = screw("0\n")
-    with pytest.raises(FingervisionError, match=r"^A hand screw must be moved to positions, but was to jog at 2 mm/s"):
+    with pytest.raises(FingervisionError, match=r"a jog at 2 mm/s"):
         actuator.jog(2.0)
     with pytest.raises(
         FingervisionError, match=r"^Step 3 must be kept by a motor controller, but a hand screw has none"

@@ -1,26 +1,25 @@
 """Candidate explanations: a hinge, link or pivot of the mechanism, and effects of stage or camera that look alike."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import effect_key
 from fingervision.domain.parameter import Parameter
+from fingervision.effects import catalogue
 from fingervision.models.drawn_mechanism import GAP
 from fingervision.models.place_answers import AS_DRAWN, PlaceChanges, attachments
 
 Array = NDArray[np.float64]
 Added = Callable[[float], Array]
 
-RATIO = Parameter("ratio", "", -0.9, 0.9, "relative error", typical=0.1)
-LENGTH_RATIO = Parameter("ratio", "", -0.1, 0.1, "relative error of the length", typical=0.01)
-PLAY = Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02)
-LEVER = Parameter("ratio", "", -0.3, 0.3, "relative error of the opening", typical=0.01)
-SHARE = Parameter("share", "", -0.5, 0.5, "of the opening that the right finger has more than half", typical=0.01)
+PAIRS = (DrawnPart.LINKS_ALIKE, DrawnPart.LINKS_OPPOSITE)
+"""Parts of a drawing that are two links at once."""
 _LEAST_SCALE = 0.05
 """Relative change of the opening by a relative change of a link: with less a link is no lever of it."""
 _MIRRORED = 1e-3
@@ -43,8 +42,8 @@ class Candidate:
         A size at which a signature is told.
     added : callable
         Size to what it adds to every channel, shape (n, channels).
-    part : str
-        What differs there: `hinge`, `link`, `pair` of links, or `pivot`.
+    part : DrawnPart
+        What of the drawing differs there.
     detail : str
         Which end of a link was moved, in words.
     changes : callable
@@ -56,7 +55,7 @@ class Candidate:
     parameter: Parameter
     reference: float
     added: Added
-    part: str = ""
+    part: DrawnPart
     detail: str = ""
     changes: Callable[[float], PlaceChanges] = lambda size: AS_DRAWN
 
@@ -78,9 +77,20 @@ def candidates_of(prediction: BodyPrediction) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
+def _forms(*parts: DrawnPart) -> list[tuple[str, DrawingForm]]:
+    """Names and forms of the effects that change one of these parts of a drawing, in the catalogue's order."""
+    forms = [(name, effect.in_drawing) for name, effect in catalogue().items()]
+    return [(name, form) for name, form in forms if form is not None and form.part in parts]
+
+
+def _candidate(name: str, form: DrawingForm, place: str, added: Added) -> Candidate:
+    return Candidate(name, place, form.parameter, form.reference, added, form.part)
+
+
 def _hinges(prediction: BodyPrediction) -> list[Candidate]:
     return [
-        Candidate("hinge_stiffness_error", flexure.name, RATIO, 0.05, _stiffer(prediction, number), "hinge")
+        _candidate(name, form, flexure.name, _stiffer(prediction, number))
+        for name, form in _forms(DrawnPart.HINGE)
         for number, flexure in enumerate(prediction.answers.mechanism.flexures)
     ]
 
@@ -94,7 +104,7 @@ def _links(prediction: BodyPrediction) -> list[Candidate]:
 
     In a body held by many flexures, each is joined to the nearest others (a minimum spanning tree).
     """
-    mechanism, found = prediction.answers.mechanism, []
+    mechanism, found = prediction.answers.mechanism, list[Candidate]()
     numbers = {flexure.name: place for place, flexure in enumerate(mechanism.flexures)}
     bodies = prediction.answers.numbered_bodies()
     for number, points in enumerate(attachments(prediction.answers)):
@@ -104,7 +114,7 @@ def _links(prediction: BodyPrediction) -> list[Candidate]:
                 if end in numbers:
                     way = np.subtract(points[end], points[start])
                     place = f"{body}, {' to '.join(sorted((one, other)))}"
-                    found.append(_link(prediction, place, f"{end} sits off", _moved(numbers[end], way)))
+                    found += _link(prediction, place, f"{end} sits off", _moved(numbers[end], way))
         # A probe hangs on the nearest flexure of its body.
         for probe, at in mechanism.probes.items():
             own = [name for name in points if name in numbers]
@@ -112,13 +122,18 @@ def _links(prediction: BodyPrediction) -> list[Candidate]:
                 start = min(own, key=lambda name: hypot(*np.subtract(at, points[name])))
                 way = np.subtract(at, points[start])
                 place = f"{body}, {start} to {probe}"
-                found.append(_link(prediction, place, f"{probe} sits off", _farther(probe, way)))
+                found += _link(prediction, place, f"{probe} sits off", _farther(probe, way))
     return found
 
 
-def _link(prediction: BodyPrediction, place: str, detail: str, changes: Callable[[float], PlaceChanges]) -> Candidate:
-    return Candidate("link_length_error", place, LENGTH_RATIO, 0.003, _changed(prediction, changes), "link", detail,
-                     changes)  # fmt: skip
+def _link(
+    prediction: BodyPrediction, place: str, detail: str, changes: Callable[[float], PlaceChanges]
+) -> list[Candidate]:
+    added = _changed(prediction, changes)
+    return [
+        replace(_candidate(name, form, place, added), detail=detail, changes=changes)
+        for name, form in _forms(DrawnPart.LINK)
+    ]
 
 
 def _moved(flexure: int, way: Array) -> Callable[[float], PlaceChanges]:
@@ -150,7 +165,8 @@ def _tree(points: object) -> list[tuple[str, str]]:
 
 def _pivots(prediction: BodyPrediction) -> list[Candidate]:
     return [
-        Candidate("hinge_play", flexure.name, PLAY, 0.01, _slipping(prediction, number), "pivot")
+        _candidate(name, form, flexure.name, _slipping(prediction, number))
+        for name, form in _forms(DrawnPart.PIVOT)
         for number, flexure in enumerate(prediction.answers.mechanism.flexures)
     ]
 
@@ -163,17 +179,18 @@ def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Can
     """A link together with its mirror image: equal changes alter the lever ratio, opposite ones the symmetry."""
     found = []
     mirrored = mirror_of(prediction)
-    by_key = {(each.place, each.detail): each for each in singles if each.name == "link_length_error"}
+    by_key = {(each.place, each.detail): each for each in singles if each.part is DrawnPart.LINK}
     for (place, detail), one in by_key.items():
         twin = (mirrored(place), mirrored(detail))
         if twin in by_key and (place, detail) < twin:
             other = by_key[twin]
             both = f"{place} and its mirror image"
-            for name, sign, parameter in (("lever_ratio_error", 1.0, LEVER), ("assembly_asymmetry", -1.0, SHARE)):
+            for name, form in _forms(*PAIRS):
+                sign = 1.0 if form.part is DrawnPart.LINKS_ALIKE else -1.0
                 scale = _by_length(prediction, one, other, sign)
                 if abs(scale) > _LEAST_SCALE:
-                    found.append(Candidate(name, both, parameter, scale * one.reference,
-                                           _together(one, other, sign, scale), "pair", detail))  # fmt: skip
+                    pair = _candidate(name, form, both, _together(one, other, sign, scale))
+                    found.append(replace(pair, reference=scale * one.reference, detail=detail))
     return found
 
 
@@ -238,9 +255,8 @@ def mirrored_channels(prediction: BodyPrediction) -> dict[str, tuple[str, float]
 def _without_place(prediction: BodyPrediction) -> list[Candidate]:
     """Errors of the recorded input and of the picture's scale."""
     is_mm = np.array([name.endswith("_mm") for name in prediction.channels])
-    return [
-        Candidate("input_scale", "", Parameter("ratio", "", -0.3, 0.3, "relative error", typical=0.01), 0.01,
-                  lambda ratio: ratio * prediction.drawn),
-        Candidate("scale_error", "", Parameter("ratio", "", -0.2, 0.2, "relative error", typical=0.01), 0.01,
-                  lambda ratio: ratio * prediction.drawn * is_mm),
-    ]  # fmt: skip
+    added: dict[DrawnPart, Added] = {
+        DrawnPart.INPUT: lambda ratio: ratio * prediction.drawn,
+        DrawnPart.PICTURE: lambda ratio: ratio * prediction.drawn * is_mm,
+    }
+    return [_candidate(name, form, "", added[form.part]) for name, form in _forms(*added)]

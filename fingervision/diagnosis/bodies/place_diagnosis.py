@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Explain = Callable[[MeasuredTable, CorrectedModel], "Diagnosis"]
 
-ONLY_SLOPES = ("input_scale", "input_offset")
-"""Effects of the drive that look like one of the mechanism over any input: poses are to decide on them."""
-
 
 def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[MeasuredTable, CorrectedModel]:
     """Subtract from a table the effects of a corrected model that have a place; unchanged where there are none.
@@ -136,13 +133,13 @@ def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: Plac
 
 
 def _driven_input(done: "Diagnosis") -> Array:
-    """Input that the mechanism receives: the recorded input after the drive effects found, except its scale error."""
+    """Input that the mechanism receives: the recorded input after the drive effects that poses do not decide on."""
     chain = done.data.chain
     history = chain.history if chain.path is None else chain.path.history
     input_mm = history.input_mm
     values = {**chain.fixed, **{e.name: {n: p.value for n, p in e.parameters.items()} for e in done.report.effects}}
     for name, effect in chain.effects.items():
-        if name in values and isinstance(effect, DriveEffect) and name not in ONLY_SLOPES and not effect.curve:
+        if name in values and isinstance(effect, DriveEffect) and not effect.curve and effect.in_drawing is None:
             input_mm = effect.act(input_mm, history, values[name])
     return np.asarray(input_mm if chain.path is None else input_mm[chain.path.rows])
 

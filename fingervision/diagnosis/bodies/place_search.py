@@ -10,7 +10,8 @@ from scipy.stats import chi2
 
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction
 from fingervision.diagnosis.bodies.channel_noise import ChannelNoise, channel_noise
-from fingervision.diagnosis.bodies.place_candidates import Candidate, candidates_of, mirror_of, mirrored_channels
+from fingervision.diagnosis.bodies.place_candidates import PAIRS, Candidate, candidates_of, mirror_of, mirrored_channels
+from fingervision.domain.drawing_form import DrawnPart
 
 Array = NDArray[np.float64]
 
@@ -169,7 +170,7 @@ class PlaceSearch:
             columns.append(turned)
             spread.append(np.inf)
         mirrored = mirror_of(prediction)
-        hinges = {c.place: c.added(c.reference) / c.reference for c in self.candidates if c.part == "hinge"}
+        hinges = {c.place: c.added(c.reference) / c.reference for c in self.candidates if c.part is DrawnPart.HINGE}
         for hinge, own in hinges.items():
             twin = mirrored(hinge)
             if twin != hinge and twin in hinges:
@@ -212,7 +213,7 @@ class PlaceSearch:
     def fit(self, candidate: Candidate) -> Fitted:
         """Fit a candidate's size to the residual, using its signature at the reference size."""
         left = self._left
-        if candidate.name == "hinge_play":
+        if candidate.part is DrawnPart.PIVOT:
             return self._fit_play(candidate)
         unit = self.signature(candidate, candidate.reference) / candidate.reference
         return self._fitted(candidate, unit, left)
@@ -251,7 +252,7 @@ class PlaceSearch:
 
     def refined(self, fitted: Fitted) -> Fitted:
         """Refit with the signature at the fitted size, until the size no longer changes."""
-        if fitted.candidate.name == "hinge_play":
+        if fitted.candidate.part is DrawnPart.PIVOT:
             return fitted
         for _ in range(STEPS):
             if fitted.size == 0.0:
@@ -301,7 +302,7 @@ class PlaceSearch:
         best = max(looked, key=lambda f: f.gain)
         smallest = _smallest(looked, limit)
         claims = best.gain > limit
-        singles = [f for f in looked if f.candidate.part != "pair"]
+        singles = [f for f in looked if f.candidate.part not in PAIRS]
         # Two links that are off together must gain more than chance over every single place.
         one = max(singles, key=lambda f: f.gain)
         best = one if best.gain - one.gain < NOT_REFUTED else best

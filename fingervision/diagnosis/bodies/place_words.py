@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
+from fingervision.diagnosis.bodies.place_candidates import PAIRS
 from fingervision.diagnosis.bodies.place_search import Fitted
+from fingervision.domain.drawing_form import DrawnPart
 from fingervision.domain.report import Place
 from fingervision.models.place_answers import PlaceAnswers
 
@@ -22,16 +24,16 @@ def fitted_words(fitted: Fitted) -> str:
     """Sentence on what differs where: `right hinge 2: 14 +- 3 % too soft`."""
     candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
-    if candidate.parameter.name == "play_mm":
+    if candidate.part is DrawnPart.PIVOT:
         return f"{where}: {1e3 * size:.3g} +- {1e3 * u:.2g} um of play"
     share = f"{100.0 * abs(size):.3g} +- {100.0 * u:.2g} %"
-    if candidate.part == "hinge":
+    if candidate.part is DrawnPart.HINGE:
         return f"{where}: {share} too {'stiff' if size > 0.0 else 'soft'}"
-    if candidate.part == "link":
+    if candidate.part is DrawnPart.LINK:
         return f"{where}: {share} too {'long' if size > 0.0 else 'short'}, {candidate.detail}"
-    if candidate.part == "pair":
-        way = "alike" if candidate.name == "lever_ratio_error" else "oppositely"
-        what = "the opening is" if candidate.name == "lever_ratio_error" else "the right finger's share is"
+    if candidate.part in PAIRS:
+        alike = candidate.part is DrawnPart.LINKS_ALIKE
+        way, what = ("alike", "the opening is") if alike else ("oppositely", "the right finger's share is")
         return f"{where}, off {way}: {what} {share} too {'large' if size > 0.0 else 'small'}, {candidate.detail}"
     return f"{candidate.name}: {100.0 * size:+.3g} +- {100.0 * u:.2g} %"
 

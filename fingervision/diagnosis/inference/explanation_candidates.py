@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.diagnosis.input.input_uncertainty import below_the_input
 from fingervision.domain.effect import Array
+from fingervision.domain.parameter import Parameter
 
 Progress = Callable[[float], None]
 SCANNED = 6
@@ -23,6 +24,10 @@ ALIKE = 12.0
 """Squared whitened distance within which two predictions are one, as in the ambiguity set."""
 STEPS_HIDDEN = 1.0
 """Steps of the encoder within which an effect is not told from its roundings."""
+FINEST, COARSEST = 0.003, 0.02
+"""Relative distance of the sizes of a jump that are tried alone: two thousand at most, and no fewer than signatures."""
+FINE_VALUES = 4_000_000
+"""Values that such predictions may have in all: 32 MB."""
 SWAPS_REFITTED = 24
 """Partners refitted beside the halves of the best pair: each half has at most 26."""
 
@@ -38,10 +43,27 @@ def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list
         if not mine.size:
             continue
         mine = mine[np.argsort(-gain[mine])]
-        tries = [fit(problem, (name,), {name: atoms.begin(k, coefficient[k])}, iterations=5) for k in mine[:4]]
+        begins = [atoms.begin(k, coefficient[k]) for k in mine[:4]]
+        listed = [parameter for _, parameter in problem.parameters((name,)) if parameter.run is None]
+        if len(listed) == 1 and listed[0].rugged and listed[0].logarithmic and 2.0 * gain[mine[0]] > np.max(gain):
+            between = [{listed[0].name: value} for value in _finely(problem, listed[0]).tolist()]
+            begins.append(scan(problem, nothing, name, between)[0])
+        tries = [fit(problem, (name,), {name: begin}, iterations=5) for begin in begins]
         best = min(tries, key=lambda explanation: explanation.score)
         found.append(fit(problem, (name,), best.values, iterations=iterations))
     return sorted(found, key=lambda explanation: explanation.score)
+
+
+def _finely(problem: Problem, parameter: Parameter) -> Array:
+    """Sizes of a jump so near to each other that a stroke's last jump moves by one sample; shape (k,)."""
+    history = problem.chain.history
+    steps = np.concatenate([np.diff(history.input_mm[run]) for run in history.runs])
+    moving = np.abs(steps[np.abs(steps) > 0.0])
+    # A stroke is at most the range, and a jump comes at a sample.
+    apart = float(np.clip(np.median(moving) / max(history.input_span_mm, 1e-300), FINEST, COARSEST))
+    begins = parameter.starting_values()
+    count = int(float(np.log(begins[-1] / begins[0])) / apart) + 1
+    return np.geomspace(begins[0], begins[-1], max(1, min(count, FINE_VALUES // problem.measured.size)))
 
 
 def extended(

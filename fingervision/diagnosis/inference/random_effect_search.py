@@ -1,4 +1,4 @@
-"""Search beside random effects: gains that differ from run to run, and a map of position errors."""
+"""Search with random effects added: gains that differ from run to run, and a map of position errors."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,6 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
@@ -21,6 +22,8 @@ from fingervision.diagnosis.noise.whitening import RunOffsets
 
 BESIDE = 3
 """Likeliest single effects beside which gains of runs and maps are tried: a hundredth of a search each."""
+ROUNDS = 2
+"""Times that effects and a random effect are fitted in turn: the second moves either by little."""
 
 Effected = TypeVar("Effected", bound=RunGains | PositionMap)
 
@@ -28,14 +31,16 @@ Effected = TypeVar("Effected", bound=RunGains | PositionMap)
 def beside_gains(state: Searched, look: Look) -> Searched:
     """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one.
 
-    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name.
+    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name. If
+    further effects are not far more probable than such gains, the gains are kept: naming an effect claims more than
+    stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
         return state
     explained = found.unknown is None and standing_of(state.data, found).is_little
     if explained:
-        likelier = _likelier(found, likeliest_gains) if len(found.best.names) > 1 else None
+        likelier = _likelier(found, likeliest_gains, -LEAST_GAIN) if len(found.best.names) > 1 else None
         if likelier is None:
             return state
         known, gains = likelier
@@ -54,7 +59,9 @@ def beside_gains(state: Searched, look: Look) -> Searched:
             beside = apart
     if not _does_more(beside):
         return state
-    return beside if _gained(state, beside, gains) > LEAST_GAIN else state
+    fewer = len(beside.found.best.names) < len(found.best.names)
+    least = -LEAST_GAIN if explained and fewer else LEAST_GAIN
+    return beside if _gained(state, beside, gains) > least else state
 
 
 def beside_map(state: Searched, look: Look) -> Searched:
@@ -71,7 +78,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
         return replace(state, data=replace(state.data, excluded=excluded))
     known: Explanation | None = found.best
     if not asked and found.unknown is None:
-        likelier = _likelier(found, likeliest_map)
+        likelier = _likelier(found, likeliest_map, LEAST_GAIN)
         if likelier is None:
             return state
         known, first = likelier
@@ -102,25 +109,58 @@ def beside_map(state: Searched, look: Look) -> Searched:
         second = first
     else:
         beside = look.again(replace(beside.data, position_map=second), beside.found.best)
-    return beside if asked or _gained(state, beside, second) > LEAST_GAIN else state
+    if asked:
+        return beside
+    # Beside effects that explain the data, a map that takes none of their places is what their forms leave over.
+    stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
+    worse = found.unknown is None and beside.found.unknown is not None
+    return beside if not (stays or worse) and _gained(state, beside, second) > LEAST_GAIN else state
 
 
 def _likelier(
-    found: Findings, estimated: Callable[[Problem, Explanation], tuple[Effected, float]]
+    found: Findings, estimated: Callable[[Problem, Explanation], tuple[Effected, float]], least: float
 ) -> tuple[Explanation | None, Effected] | None:
-    """Find a random effect beside fewer effects that is far likelier than the answer, with these; None without one.
+    """Find a random effect, added to few effects, that gains `least` over the answer; return it with these, or None.
 
-    Two or three effects bend to much: to a map that was read from one side, or to runs of different gain.
+    Two or three effects can imitate much: a map that was measured from one side only, or runs of different gain.
     """
-    rows = max(2, int(found.problem.measured.size - found.problem.whitener.aside.sum()))
-    fewer = [e for e in (found.nothing, *found.singles[:BESIDE]) if len(e.names) < len(found.best.names)]
-    tried = [(one, *estimated(found.problem, one)) for one in fewer]
-    if not tried:
-        return None
-    known, effect, gain = min(tried, key=lambda one: one[0].bic(rows) - one[2])
-    if known.bic(rows) - gain > found.best.bic(rows) - LEAST_GAIN:
+    problem = found.problem
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    singles = different(problem, list(found.singles), BESIDE)
+    tried = []
+    begins = (found.nothing, _line(problem), *singles, *([found.best] if least > 0.0 else []))
+    for begin in {e.names: e for e in begins if len(e.names) <= len(found.best.names)}.values():
+        known, (effect, _) = begin, estimated(problem, begin)
+        for _ in range(ROUNDS):
+            # What the effects stood in for is the random effect's now.
+            known = _refitted(_beside(problem, effect), known)
+            effect, _ = estimated(problem, _left(problem, known))
+        known = _refitted(_beside(problem, effect), known)
+        tried.append((known.bic(rows) + effect.price, known, effect))
+    cost, known, effect = min(tried, key=lambda one: one[0])
+    if cost > found.best.bic(rows) - least:
         return None
     return (known if known.names else None), effect
+
+
+def _line(problem: Problem) -> Explanation:
+    """Fit a straight line over the input, as an offset and a ratio where both can be named.
+
+    With a map there is no such line.
+    """
+    names = tuple(name for name in ("rest_gap_error", "lever_ratio_error") if name in problem.effects)
+    return fit(problem, names, {name: {} for name in names}, iterations=5) if names else problem.nothing()
+
+
+def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
+    """Add the columns of a random effect to those that are refitted for every explanation."""
+    drawn = problem.whitener.drawing
+    columns = effect.columns_mm if drawn is None else np.hstack([effect.columns_mm, drawn])
+    return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=columns)))
+
+
+def _refitted(problem: Problem, one: Explanation) -> Explanation:
+    return fit(problem, one.names, one.values, iterations=10) if one.names else problem.nothing()
 
 
 def _does_more(beside: Searched) -> bool:

@@ -18,8 +18,9 @@ TREND_DEGREE = 3
 """Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
 cycles."""
 APART = 0.25
-"""Share of the scatter's power that may be left once places or sides drift apart, for that to be believed: nine
-coefficients are many for a few dozen repeats, and without them the noise is too large by a factor of 2 at most."""
+"""Share of the scatter's power that may be left once places or sides drift apart, or runs have zeros of their own, for
+that to be believed: these are many coefficients for a few dozen repeats, and without them the noise is too large by a
+factor of 2 at most."""
 OFF_GRID = 0.02
 """Steps by which a difference may miss a multiple of the smallest one: the last digits that are written are rounded."""
 BY_ACCIDENT = 1e-3
@@ -154,7 +155,7 @@ def pure_error(
 
 
 def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
-    """Take each run's own zero out, as the visits that runs share tell it; also how many zeros were estimated."""
+    """Subtract each run's own zero where it is most of the scatter; return also how many zeros were estimated."""
     if len(runs) < 2 or not groups:
         return values, 0
     number = np.zeros(values.size, dtype=np.intp)
@@ -165,6 +166,9 @@ def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tu
     rest = np.concatenate([values[group] - values[group].mean() for group in groups])
     design = np.concatenate([own[group] - own[group].mean(axis=0) for group in groups])
     zeros, _, rank, _ = np.linalg.lstsq(design, rest, rcond=1e-9)
+    left, degrees = rest - design @ zeros, sum(group.size - 1 for group in groups)
+    if rank >= degrees or float(left @ left) / (degrees - rank) >= APART * float(rest @ rest) / degrees:
+        return values, 0
     out = values.copy()
     out[rows] -= own[rows] @ zeros
     return out, int(rank)

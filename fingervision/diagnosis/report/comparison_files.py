@@ -92,7 +92,7 @@ def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, 
         ("Gap against input", "".join(html for name, html in drawn.items() if name.startswith("gap"))
          + f'<p class="hint">{HINT}</p>'),
         ("Difference", "".join(html for name, html in drawn.items() if name.startswith("residual"))),
-        ("How much", table(["model", "disagreement, RMS", "random noise", "places beyond the noise"], rows)),
+        ("How much", table(["model", "disagreement, RMS", "random noise, at most", "places beyond the noise"], rows)),
         ("At the turning points", frames),
         ("Where they disagree", places),
         ("Notes", bullets([*first.data.notes, *first.data.refitted()])),

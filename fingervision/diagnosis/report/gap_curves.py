@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
 from fingervision.domain.effect import Array, Flags
 
-COVERAGE_FACTOR = 1.96
-"""Standard uncertainties in half a 95 % interval."""
 STANDS = 1e-4
 """Share of the range within which the stage stands; its direction is then that of the move before."""
 
@@ -22,8 +21,8 @@ class GapCurves:
     ----------
     input_mm, gap_mm : ndarray of float, shape (n,)
         Recorded input and measured gap.
-    interval_mm : ndarray of float, shape (n,)
-        Half of the 95 % interval of each gap, random part.
+    expanded_mm : ndarray of float, shape (n,)
+        Expanded uncertainty of each gap (k = 2), random part.
     opens : ndarray of bool, shape (n,)
         Rows to which the input rose.
     time_s : ndarray of float, shape (n,), or None
@@ -36,7 +35,7 @@ class GapCurves:
 
     input_mm: Array
     gap_mm: Array
-    interval_mm: Array
+    expanded_mm: Array
     opens: Flags
     time_s: Array | None
     runs: tuple[slice, ...]
@@ -61,7 +60,7 @@ def gap_curves(data: Observations, noise_mm: float, predictions: Mapping[str, Ar
     return GapCurves(
         input_mm=history.input_mm,
         gap_mm=np.asarray(table.gap_mm, dtype=np.float64),
-        interval_mm=COVERAGE_FACTOR * u_mm,
+        expanded_mm=COVERAGE_FACTOR * u_mm,
         opens=_opens(history.input_mm, history.runs),
         time_s=history.clock_s if history.time_s is not None and history.shared_clock else None,
         runs=history.runs,

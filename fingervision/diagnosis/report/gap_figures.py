@@ -56,9 +56,9 @@ def gap_over_time(curves: GapCurves, title: str) -> Figure | None:
 def _readings(axes: Axes, x: Array, curves: GapCurves, which: Flags, marker: str, face: str, label: str) -> None:
     gap_mm = curves.gap_mm[which]
     if curves.gap_mm.size <= FEW_ROWS:
-        bars = f"{label}, with 95 % interval"
+        bars = f"{label}, with U (k = 2)"
         axes.errorbar(
-            x, gap_mm, curves.interval_mm[which], fmt=marker, color=MEASURED, mfc=face, ms=5, lw=0.8, label=bars
+            x, gap_mm, curves.expanded_mm[which], fmt=marker, color=MEASURED, mfc=face, ms=5, lw=0.8, label=bars
         )
     else:
         axes.plot(x, gap_mm, marker, color=MEASURED, mfc=face, ms=2.5, mew=0.5, ls="none", label=label)

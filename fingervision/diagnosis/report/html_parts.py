@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from fingervision.diagnosis.report.chart_data import Chart, charts_json
-from fingervision.diagnosis.report.gap_curves import COVERAGE_FACTOR
+from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
 from fingervision.domain.parameter import Estimate
 from fingervision.storage.provenance import Provenance
 
@@ -35,14 +35,18 @@ def number(value: float | None, unit: str = "mm", digits: int = 4) -> str:
     return f'<data value="{value!r}">{value:.{digits}g}</data> {escape(unit)}'.rstrip()
 
 
-def interval(e: Estimate) -> list[str]:
-    """Value and 95 % interval, to a tenth of the standard uncertainty."""
+def named(name: str) -> str:
+    """Write a name as a program knows it, which a narrow screen may break at its underscores."""
+    return escape(name).replace("_", "_<wbr>")
+
+
+def with_uncertainty(e: Estimate) -> list[str]:
+    """Value and expanded uncertainty, to a tenth of the standard uncertainty."""
     if e.u is None:
         return [number(e.value, e.unit, 5), "at a bound"]
     places = max(0, 1 - math.floor(math.log10(e.u))) if e.u > 0.0 else 6
-    low, high = e.value - COVERAGE_FACTOR * e.u, e.value + COVERAGE_FACTOR * e.u
     value = f'<data value="{e.value!r}">{e.value:.{places}f}</data> {escape(e.unit)}'
-    return [value, f"{low:.{places}f} to {high:.{places}f} {escape(e.unit)}"]
+    return [value, f"{COVERAGE_FACTOR * e.u:.{places}f} {escape(e.unit)}".rstrip()]
 
 
 def chart(found: Chart, words: str) -> str:

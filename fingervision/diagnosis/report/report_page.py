@@ -15,11 +15,12 @@ from fingervision.diagnosis.report.html_parts import (
     HINT,
     bullets,
     chart,
-    interval,
+    named,
     number,
     page,
     provenance_html,
     table,
+    with_uncertainty,
 )
 from fingervision.diagnosis.report.mechanism_sketch import sketch_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_html
@@ -70,7 +71,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
         figure = png_bytes(residual_figure(before, after if report.effects else None, history))
         residuals += _picture(figure, "Measured minus predicted of each finger and channel, over input and time")
     parameters = [
-        [escape(effect.name), escape(effect.display_name(name)), *interval(e)]
+        [named(effect.name), escape(effect.display_name(name)), *with_uncertainty(e)]
         for effect in report.effects
         for name, e in effect.parameters.items()
     ]
@@ -81,7 +82,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
         ("At the turning points", frames),
         ("How much", _how_much(report)),
         ("What was named", _mechanisms(report)),
-        ("Parameters, with 95 % intervals", table(["effect", "parameter", "value", "interval"], parameters)),
+        ("Parameters", table(["effect", "parameter", "value", "U (k = 2)"], parameters)),
         ("What cannot be told apart", _apart(report.alternatives)),
         ("The next run", f"<p>{escape(_next_words(report))}</p>"),
         ("Runners-up", _runners_up(report)),
@@ -170,7 +171,7 @@ def _runners_up(report: DiagnosisReport) -> str:
 
 def _detection_limits(report: DiagnosisReport) -> str:
     rows = [
-        [escape(name), escape(f"{entry['parameter']}"), number(float(np.float64(entry["size"])), f"{entry['unit']}", 3)]  # type: ignore[arg-type]
+        [named(name), named(f"{entry['parameter']}"), number(float(np.float64(entry["size"])), f"{entry['unit']}", 3)]  # type: ignore[arg-type]
         for name, entry in report.smallest_seen.items()
     ]
     return table(["effect", "parameter", "size"], rows)

@@ -93,13 +93,19 @@ def _axes(history: History, aside: Flags) -> list[Axis]:
     return axes
 
 
+def _rounded(value: float, axis: Axis) -> float:
+    """Give a place on an axis to a ten-thousandth of its range: what smoothing leaves of a zero is no place."""
+    decimals = 4 - int(np.floor(np.log10(float(np.ptp(axis.values)))))
+    return round(value, decimals) + 0.0
+
+
 def _words(place: Place, axis: Axis, everywhere: bool, runs: str) -> str:
     if everywhere:
         span = "everywhere"
     elif place.start == place.end:
-        span = f"at {place.start:.3g} {axis.unit}"
+        span = f"at {_rounded(place.start, axis):.3g} {axis.unit}"
     else:
-        span = f"between {place.start:.3g} and {place.end:.3g} {axis.unit}"
+        span = f"between {_rounded(place.start, axis):.3g} and {_rounded(place.end, axis):.3g} {axis.unit}"
     what = ("larger", "smaller") if place.channel in ("gap", "force") else ("farther right", "farther left")
     return (
         f"over the {axis.name}, {span}, the {place.channel} is {abs(place.size):.3g} {place.unit} "

@@ -17,7 +17,7 @@ function make() {
     legend: { show: false },
     cursor: { drag: { x: true, y: false, dist: 4 } },
     scales: { x: { time: false } },
-    axes: [{ ...axis, label: "time (s)", size: 26 }, { ...axis, label: "gap (mm)", size: 52 }],
+    axes: [{ ...axis, label: "time (s)", size: 30 }, { ...axis, label: "gap (mm)", size: 52 }],
     series: [
       { label: "time (s)", value: cell(3) },
       { label: "gap (mm)", stroke: accent, width: 1.5, points: { show: false } },

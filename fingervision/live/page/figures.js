@@ -1,6 +1,8 @@
 // The value with its uncertainty, its status, and the facts of the source.
 import { at, listen, page, say } from "/page/bus.js";
 
+const LONGEST_SOURCE = 40; // letters: on a phone a longer name takes more than a line
+
 function stale(words) {
   at("gap_mm").textContent = "–";
   at("uncertainty").textContent = "\u00a0";
@@ -36,7 +38,11 @@ listen("now", (now) => {
 });
 
 listen("state", (state) => {
-  say("source", state.source);
+  // Of a long path its end tells most; the whole is what the pointer shows.
+  const parts = state.source.split(/[/\\]/);
+  const is_long = state.source.length > LONGEST_SOURCE && parts.length > 2 && !state.source.includes("://");
+  say("source", is_long ? `…/${parts.slice(-2).join("/")}` : state.source);
+  at("source").title = state.source;
   say("rate", state.rate_hz === null ? "–" : state.rate_hz.toFixed(2));
   say("jitter", state.jitter_ms === null ? "–" : state.jitter_ms.toFixed(2));
   for (const id of ["dropped", "duplicates", "damaged"]) say(id, String(state[id]));

@@ -10,10 +10,12 @@ function connect() {
   socket = new WebSocket(`${scheme}://${location.host}/socket?token=${encodeURIComponent(token)}${known}`);
   socket.binaryType = "arraybuffer";
   socket.onopen = () => { fresh = true; say("connection", "connected", ""); };
-  socket.onclose = () => {
+  socket.onclose = (event) => {
     if (!goneAt) goneAt = performance.now();
-    say("connection", "The live view does not answer: trying again.", "bad");
-    tell("gone", "The live view is not running, or out of reach. This page goes on by itself when it is back.");
+    // A server that refuses says why: too many pages, or too many messages.
+    say("connection", event.reason || "The live view does not answer: trying again.", "bad");
+    tell("gone", event.reason ||
+      "The live view is not running, or out of reach. This page goes on by itself when it is back.");
     setTimeout(connect, AGAIN_AFTER_MS);
   };
   socket.onmessage = (event) => {

@@ -7,7 +7,8 @@ from typing import Any
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
-from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset, find_clock_offset
+from fingervision.measuring.clock.alignment import find_clock_offset
+from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.drive_at import DriveState, drive_at
 from fingervision.measuring.series import GapSeries
 from fingervision.storage.gaps_csv import with_drive

@@ -1,14 +1,11 @@
 """Joint fit of offset and rate of two clocks, play, initial state and scale, by variable projection."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
-from fingervision.effects.play_operator import play
-from fingervision.measuring.clock.log_path import LogPath
+from fingervision.measuring.clock.motion_model import CREEP_S, Alignment, Motion
 
 OFFSET_PRIOR_S, PLAY_PRIOR_MM = 1e3, 1e3
 """Standard deviations, so large that they say nothing: where nothing moves the normal matrix stays regular."""
@@ -20,9 +17,9 @@ BEND_PRIOR = 0.1
 """Standard deviation of the change of slope of gap against input at a knot, over the slope: large deflection of a
 flexure gripper bends it by a few per cent in all; more would let any smooth one-way motion be shifted at will.
 Where the data know better, as where the fingers meet, they outweigh it."""
-MOST_KNOTS, FRAMES_A_KNOT = 11, 20
-"""Knots of gap against input at most, and frames that each must rest on: the kink of a contact spoils a twelfth of the
-range, which the gate for wrong frames then leaves out."""
+CREEP_PRIOR = 0.02
+"""Standard deviation of a creep's share of the motion at each time constant: metals creep by 0.1 % of a strain, printed
+polymers by one to five per cent in a decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
 STEPS = 12
 """Gauss-Newton steps at most; from the correlation's peak three to five suffice."""
 CLUSTERS = 24
@@ -32,135 +29,6 @@ SETTLED = 1e-3
 """Step, in standard uncertainties, below which a search has settled."""
 OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
 """Steps of the derivatives: small beside a frame, a clock's rate, the state's range and an encoder's step (mm)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Alignment:
-    """Offset and rate of the two records, with the play between input and gap.
-
-    Parameters
-    ----------
-    offset_s : float
-        Recording's time minus log's time at `Motion.middle_s`.
-    rate : float
-        Growth of that offset over the recording's time.
-    play_mm : float
-        Full width of the play.
-    start : float
-        State of the play at the log's first sample, in half widths.
-    """
-
-    offset_s: float
-    rate: float
-    play_mm: float
-    start: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Noise:
-    """Noise of the gap from frame to frame.
-
-    Parameters
-    ----------
-    terms : ndarray of float, shape (p,)
-        Of an autoregression; empty for white noise.
-    weights : ndarray of float, shape (n - p,)
-        Of the whitened rows: below 1 where the input is known badly; empty where all weigh the same.
-    starts : ndarray of int, shape (g,)
-        First whitened row of each stretch in which the input is off by one and the same error; empty where none is.
-    unit : ndarray of float, shape (n - p,)
-        That error's course in the whitened rows, of length 1 within each stretch.
-    shrink : ndarray of float, shape (g,)
-        Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
-    """
-
-    terms: Array
-    weights: Array
-    starts: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
-    unit: Array = field(default_factory=lambda: np.empty(0))
-    shrink: Array = field(default_factory=lambda: np.empty(0))
-
-
-WHITE = Noise(np.empty(0), np.empty(0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """The frames that lie within the log, and the log.
-
-    Parameters
-    ----------
-    time_s, gap_mm : ndarray of float, shape (n,)
-        Frames.
-    path : LogPath
-        Log.
-    middle_s : float
-        Recording's time at which the offset is stated.
-    noise : Noise
-        From frame to frame.
-    """
-
-    time_s: Array
-    gap_mm: Array
-    path: LogPath
-    middle_s: float
-    noise: Noise
-
-    @property
-    def drive(self) -> DriveHistory:
-        """The log, finely interpolated."""
-        return self.path.drive
-
-    def log_time_s(self, at: Alignment) -> Array:
-        """Times of the frames on the log's clock; shape (n,)."""
-        return np.asarray(self.time_s - at.offset_s - at.rate * (self.time_s - self.middle_s))
-
-    def input_at(self, at: Alignment) -> Array:
-        """Input after the play at the frames; exact for a log that is linear between its samples.
-
-        Between two samples the input is monotone, so that the play is computed by clipping its state at the earlier
-        one.
-        """
-        log_s = self.log_time_s(at)
-        inputs = np.interp(log_s, self.drive.time_s, self.drive.input_mm)
-        if at.play_mm == 0.0:
-            return np.asarray(inputs)
-        states = play(self.drive.input_mm, at.play_mm, at.start)
-        before = np.clip(np.searchsorted(self.drive.time_s, log_s, side="right") - 1, 0, states.size - 1)
-        half = 0.5 * at.play_mm
-        return np.asarray(np.clip(states[before], inputs - half, inputs + half))
-
-    def design(self, inputs: Array) -> Array:
-        """Columns 1, z and max(0, z - z_k) at knots z_k of the input z over the log's range; shape (n, 2 + knots).
-
-        Gap against input is a line that may bend at every knot: this represents a gripper's curve, and the kink where
-        the fingers meet.
-        """
-        low, high = float(self.drive.input_mm.min()), float(self.drive.input_mm.max())
-        z = (2.0 * inputs - (low + high)) / max(high - low, 1e-12)
-        count = min(MOST_KNOTS, self.time_s.size // FRAMES_A_KNOT)
-        knots = np.linspace(-1.0, 1.0, count + 2)[1:-1]
-        return np.concatenate([np.stack([np.ones_like(z), z], axis=1), np.maximum(z[:, None] - knots, 0.0)], axis=1)
-
-    def whitened(self, columns: Array) -> Array:
-        """Whiten columns: remove the autoregression along time, and the error common to a stretch of the log.
-
-        The first frames, which have no past, are left out. The common error's variance is removed by the symmetric root
-        of the inverse covariance, a rank-one change of the unit matrix.
-        """
-        noise = self.noise
-        terms = noise.terms
-        out = columns[terms.size :].copy()
-        for k, share in enumerate(terms, start=1):
-            out -= share * columns[terms.size - k : columns.shape[0] - k]
-        table = out if out.ndim == 2 else out[:, None]
-        if noise.weights.size:
-            table *= noise.weights[:, None]
-        if noise.starts.size:
-            counts = np.diff(np.append(noise.starts, table.shape[0]))
-            along = np.add.reduceat(table * noise.unit[:, None], noise.starts, axis=0) * noise.shrink[:, None]
-            table -= noise.unit[:, None] * np.repeat(along, counts, axis=0)
-        return np.asarray(table if out.ndim == 2 else table[:, 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,6 +110,11 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
     return Fit(at, squares, solved.degrees, normal, solved.residual_mm, float(solved.weights[1]))
 
 
+def squares_at(motion: Motion, at: Alignment) -> float:
+    """Sum of squares that scale, bend and creep leave at an alignment, in mm^2."""
+    return _solve(motion, at).squares
+
+
 def inflation(motion: Motion, at: Alignment) -> Array:
     """Ratio of the variance of offset, rate and play to its value for independent residuals.
 
@@ -262,6 +135,20 @@ def inflation(motion: Motion, at: Alignment) -> Array:
     ratio = np.diag(bread @ meat @ bread) / np.maximum(np.diag(bread), 1e-300)
     kept = ratio[[0, 1, 3]] if free_play else np.array([ratio[0], ratio[1], max(ratio[0], ratio[1])])
     return np.maximum(kept, 1.0)
+
+
+def shift_by_turns(motion: Motion, found: Fit) -> Array:
+    """Change of offset, rate and play (s, 1, mm) if all reversals of the log went further by their uncertainty.
+
+    Shape (3,).
+
+    At constant speed of the stage, only the duration of the gap's stop at a reversal shows the play.
+    """
+    path = motion.path
+    drive = replace(path.drive, input_mm=path.turned_mm)
+    pushed = replace(motion, path=replace(path, drive=drive))
+    at = fit(pushed, found.at, free_play=True).at
+    return np.array([at.offset_s - found.at.offset_s, at.rate - found.at.rate, at.play_mm - found.at.play_mm])
 
 
 def _prior(size: int) -> Array:
@@ -287,15 +174,18 @@ class _Solved:
 
 def _solve(motion: Motion, at: Alignment) -> _Solved:
     """Solve for scale and bends, with a prior that keeps the bends small compared with the scale."""
-    design = motion.design(motion.input_at(at))
+    design = motion.design(at)
     white_design, white_gap = motion.whitened(design), motion.whitened(motion.gap_mm)
     straight = np.linalg.lstsq(white_design[:, :2], white_gap, rcond=None)[0]
     left = white_gap - white_design[:, :2] @ straight
     spread = float(np.sqrt(left @ left / max(left.size - 2, 1)))
     # A row more for each bend: it is zero with a standard deviation of a share of the straight part.
     bends = design.shape[1] - 2
-    hold = spread / (BEND_PRIOR * max(abs(float(straight[1])), 1e-12))
-    rows = np.hstack([np.zeros((bends, 2)), hold * np.eye(bends)])
+    priors = np.full(bends, BEND_PRIOR)
+    if motion.creeps:
+        priors[-len(CREEP_S) :] = CREEP_PRIOR
+    hold = spread / (priors * max(abs(float(straight[1])), 1e-12))
+    rows = np.hstack([np.zeros((bends, 2)), np.diag(hold)])
     whole, aim = np.vstack([white_design, rows]), np.concatenate([white_gap, np.zeros(bends)])
     basis, triangle = np.linalg.qr(whole)
     if np.min(np.abs(np.diag(triangle))) < 1e-12 * np.max(np.abs(np.diag(triangle))):
@@ -317,7 +207,7 @@ def _jacobian(motion: Motion, at: Alignment, solved: _Solved, *, free_play: bool
         *((("play_mm", PLAY_STEP),) if free_play else ()),
     ):
         ends = [
-            motion.design(motion.input_at(replace(at, **{name: getattr(at, name) + by}))) @ solved.weights
+            motion.design(replace(at, **{name: getattr(at, name) + by})) @ solved.weights
             for by in ((0.0, step) if name in ("start", "play_mm") else (-0.5 * step, 0.5 * step))
         ]
         columns.append(np.concatenate([motion.whitened((ends[1] - ends[0]) / step), np.zeros(solved.weights.size - 2)]))

@@ -9,6 +9,7 @@ from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
+from fingervision.measuring.clock.log_turns import turned
 from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
@@ -29,6 +30,8 @@ LONG_ROWS = 4 * CORNER_ROWS
 """Rows of a stretch whose ends may be left out of the look at its rounding errors."""
 AVERAGED = 0.5
 """Leverage below which a row is the mean of several, and shares its error with its neighbours."""
+TURN_SIGMAS, LEAST_TURN = 6.0, 0.01
+"""Standard deviations of a row, and share of the log's range, by which a motion must come back for it to be a turn."""
 STANDS = 0.1
 """Step over its neighbour's below which the stage stands: noise of a log is seldom more."""
 
@@ -64,11 +67,20 @@ class LogPath:
         Standard uncertainty at each of them of what lies between rows.
     shared : SharedErrors
         What neighbours are off by alike.
+    turned_mm : ndarray of float, shape (n,)
+        Input with all turns pushed out by their uncertainty.
+    rows : DriveHistory
+        The log as it is.
+    step_mm : float
+        Its encoder's step; 0 where none is seen.
     """
 
     drive: DriveHistory
     u_mm: Array
     shared: SharedErrors
+    turned_mm: Array
+    rows: DriveHistory
+    step_mm: float
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
@@ -99,7 +111,8 @@ class LogPath:
         of_runs = tuple(names[run.start] for run, piece in zip(runs, pieces, strict=True) for _ in piece[0])
         time_s, input_mm, errors = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
         drive = DriveHistory(time_s, input_mm, None if log.run is None else of_runs)
-        return cls(drive, errors, shared)
+        least_mm = max(2.0 * step_mm, TURN_SIGMAS * sigma_mm, LEAST_TURN * float(np.ptp(input_mm)))
+        return cls(drive, errors, shared, turned(input_mm, errors, least_mm), log, step_mm)
 
 
 def _shared_errors(

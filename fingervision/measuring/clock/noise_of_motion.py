@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from fingervision.domain.effect import Array
 from fingervision.effects.play_operator import play
-from fingervision.measuring.clock.joint_fit import Fit, Motion, Noise
+from fingervision.measuring.clock.joint_fit import Fit
+from fingervision.measuring.clock.motion_model import Motion, Noise
 
 MOST_ORDER = 4
 """Order at most: an autoregression with white noise beside it is told well enough by four terms."""

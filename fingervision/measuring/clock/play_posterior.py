@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.domain.effect import Array
-from fingervision.measuring.clock.joint_fit import Alignment, Fit, Motion, fit
+from fingervision.measuring.clock.joint_fit import Fit, fit, squares_at
+from fingervision.measuring.clock.motion_model import Alignment, Motion
 
 PLAY_PRIOR_MM = 0.1
 """Scale of the half-Cauchy prior of the play: that of worn or geared stages; ten times as much stays possible."""
@@ -15,6 +16,9 @@ MOST_OF_STROKE = 0.9
 """Largest play over the stroke: of a wider one nearly nothing moves."""
 FIRST_PLAYS = (0.0, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Plays that are tried first, over the largest: a factor of two apart, each within the reach of the next."""
+BESIDE_S, BESIDE_STEP_S = 2.0, 0.1
+"""Offsets that are looked at beside a correlation's peak: halts of a staircase are seldom longer than 2 s, and moves that
+take less than 0.1 s have a narrow peak of their own."""
 OUT_OF_REACH = 14.0
 """Twice the logarithm of the likelihood ratio at which a play no longer counts: a weight of one in a thousand."""
 NODES = 15
@@ -57,6 +61,21 @@ def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIR
     begun = [start] if start.play_mm > 0.0 else []
     free = [fit(motion, at, free_play=True) for at in (*begun, *(one.at for one in held[:2]))]
     return min((*held, *free), key=lambda one: one.squares)
+
+
+def beside(motion: Motion, found: Fit, plays: tuple[float, ...]) -> Fit:
+    """Look for a lower place at offsets nearby, and follow it: a fit only finds the valley in which it begins.
+
+    The correlation knows no play, and one as wide as a step of a staircase puts its peak a whole halt beside the truth.
+    """
+    longest_mm = _longest_mm(motion)
+    tried = [
+        replace(found.at, offset_s=found.at.offset_s + by_s, play_mm=share * longest_mm)
+        for by_s in np.arange(-BESIDE_S, BESIDE_S + 0.5 * BESIDE_STEP_S, BESIDE_STEP_S)
+        for share in plays
+    ]
+    lowest = min(tried, key=lambda at: squares_at(motion, at))
+    return min(found, fit(motion, lowest, free_play=True), key=lambda one: one.squares)
 
 
 def posterior(motion: Motion, best: Fit) -> Posterior:

@@ -155,8 +155,8 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
     for r0, r1, c0, c1 in sheet.merged():
         if r1 > first and any(c0 - 1 <= k <= c1 - 1 for k in places) and (r1 > r0 or c1 > c0):
             raise DataError(
-                f"Sheet '{title}' of {path} must have a cell a value, but rows {r0} to {r1}, columns {c0} to {c1} are "
-                "merged into one: take the merging apart, so that each row says its own."
+                f"Sheet '{title}' of {path} must have one cell per value, but rows {r0} to {r1}, columns {c0} to {c1} "
+                "are merged into one: unmerge them, so that each row has its own value."
             )
     body, lines, blank, headers = [], [], 0, []
     for at in range(first, len(rows)):

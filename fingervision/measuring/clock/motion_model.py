@@ -1,0 +1,170 @@
+"""Model of the gap from a stage's log: play, another clock, a line with bends, creep and noise."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.effect import Array
+from fingervision.effects.play_operator import play
+from fingervision.measuring.clock.log_path import LogPath
+
+CREEP_S = (0.5, 5.0)
+"""Time constants of a creep, a decade apart: what is faster than the first looks like a delay, and is part of it; what
+is slower than the second hardly follows the motion."""
+CREEP_STEP = 0.1
+"""Step of the grid on which creep is computed, over the shortest time constant: off by 1e-3 of the lag."""
+MOST_KNOTS, FRAMES_A_KNOT = 11, 20
+"""Knots of gap against input at most, and frames that each must rest on: the kink of a contact spoils a twelfth of the
+range, which the gate for wrong frames then leaves out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """Where one record lies on the other, with the play between them.
+
+    Parameters
+    ----------
+    offset_s : float
+        Recording's time minus log's time at `Motion.middle_s`.
+    rate : float
+        Growth of that offset over the recording's time.
+    play_mm : float
+        Full width of the play.
+    start : float
+        State of the play at the log's first sample, in half widths.
+    """
+
+    offset_s: float
+    rate: float
+    play_mm: float
+    start: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Noise:
+    """Noise of the gap from frame to frame.
+
+    Parameters
+    ----------
+    terms : ndarray of float, shape (p,)
+        Of an autoregression; empty for white noise.
+    weights : ndarray of float, shape (n - p,)
+        Of the whitened rows: below 1 where the input is known badly; empty where all weigh the same.
+    starts : ndarray of int, shape (g,)
+        First whitened row of each stretch in which the input is off by one and the same error; empty where none is.
+    unit : ndarray of float, shape (n - p,)
+        That error's course in the whitened rows, of length 1 within each stretch.
+    shrink : ndarray of float, shape (g,)
+        Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
+    """
+
+    terms: Array
+    weights: Array
+    starts: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    unit: Array = field(default_factory=lambda: np.empty(0))
+    shrink: Array = field(default_factory=lambda: np.empty(0))
+
+
+WHITE = Noise(np.empty(0), np.empty(0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Frames that lie within the log, and the log.
+
+    Parameters
+    ----------
+    time_s, gap_mm : ndarray of float, shape (n,)
+        Frames.
+    path : LogPath
+        Log.
+    middle_s : float
+        Recording's time at which the offset is stated.
+    noise : Noise
+        From frame to frame.
+    creeps : bool
+        Whether the gap may creep after the input.
+    """
+
+    time_s: Array
+    gap_mm: Array
+    path: LogPath
+    middle_s: float
+    noise: Noise
+    creeps: bool = False
+
+    @property
+    def drive(self) -> DriveHistory:
+        """The log, finely interpolated."""
+        return self.path.drive
+
+    def log_time_s(self, at: Alignment) -> Array:
+        """Times of the frames on the log's clock; shape (n,)."""
+        return np.asarray(self.time_s - at.offset_s - at.rate * (self.time_s - self.middle_s))
+
+    def _behind_play(self, at: Alignment) -> tuple[Array, Array]:
+        """Input after the play at the frames, and at the log's points.
+
+        Exact for a log that is linear between its points.
+
+        Between two samples the input is monotone, so that the play operator is one clip of its state at the earlier.
+        """
+        log_s = self.log_time_s(at)
+        inputs = np.interp(log_s, self.drive.time_s, self.drive.input_mm)
+        if at.play_mm == 0.0:
+            return np.asarray(inputs), self.drive.input_mm
+        states = play(self.drive.input_mm, at.play_mm, at.start)
+        before = np.clip(np.searchsorted(self.drive.time_s, log_s, side="right") - 1, 0, states.size - 1)
+        half = 0.5 * at.play_mm
+        return np.asarray(np.clip(states[before], inputs - half, inputs + half)), states
+
+    def design(self, at: Alignment) -> Array:
+        """Columns of the gap: 1, z, max(0, z - z_k) and creep, with z the input after the play over the log's range.
+
+        Gap against input is a line that may bend at every knot: a gripper's curve, and the kink where fingers meet. The
+        column of a creep is its lag behind the input, one for each time constant. The result has shape (n, 2 + knots [+
+        2]).
+        """
+        low, high = float(self.drive.input_mm.min()), float(self.drive.input_mm.max())
+        half = 0.5 * max(high - low, 1e-12)
+        inputs, states = self._behind_play(at)
+        z = (inputs - 0.5 * (low + high)) / half
+        count = min(MOST_KNOTS, self.time_s.size // FRAMES_A_KNOT)
+        knots = np.linspace(-1.0, 1.0, count + 2)[1:-1]
+        lags = [(self._lagging(at, states, tau_s) - inputs) / half for tau_s in CREEP_S] if self.creeps else []
+        return np.column_stack([np.ones_like(z), z, np.maximum(z[:, None] - knots, 0.0), *lags])
+
+    def _lagging(self, at: Alignment, states: Array, tau_s: float) -> Array:
+        """Exponential mean of the past of `states` with a given time constant, at the frames; shape (n,)."""
+        times_s = self.drive.time_s
+        step_s = CREEP_STEP * min(CREEP_S)
+        grid_s = times_s[0] + step_s * np.arange(int((times_s[-1] - times_s[0]) / step_s) + 2)
+        past = np.interp(grid_s, times_s, states)
+        share = 1.0 - float(np.exp(-step_s / tau_s))
+        # From one grid point to the next a straight line: its mean value's lag is half a step shorter.
+        middle = np.append(past[:1], 0.5 * (past[1:] + past[:-1]))
+        mean = lfilter([share], [1.0, share - 1.0], middle - past[0]) + past[0]
+        return np.asarray(np.interp(self.log_time_s(at), grid_s, mean))
+
+    def whitened(self, columns: Array) -> Array:
+        """Take the autoregression out along time, and the error that a stretch shares.
+
+        The first frames, which have no past, are left out. The shared error's variance is taken out by the symmetric
+        root of the inverse covariance, a matrix of rank one beside the unit matrix.
+        """
+        noise = self.noise
+        terms = noise.terms
+        out = columns[terms.size :].copy()
+        for k, share in enumerate(terms, start=1):
+            out -= share * columns[terms.size - k : columns.shape[0] - k]
+        table = out if out.ndim == 2 else out[:, None]
+        if noise.weights.size:
+            table *= noise.weights[:, None]
+        if noise.starts.size:
+            counts = np.diff(np.append(noise.starts, table.shape[0]))
+            along = np.add.reduceat(table * noise.unit[:, None], noise.starts, axis=0) * noise.shrink[:, None]
+            table -= noise.unit[:, None] * np.repeat(along, counts, axis=0)
+        return np.asarray(table if out.ndim == 2 else table[:, 0])

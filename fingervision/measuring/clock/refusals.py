@@ -1,0 +1,83 @@
+"""Reasons to refuse a log: nothing moves, the gap follows something else, or the motion repeats."""
+
+import numpy as np
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.effect import Array
+from fingervision.measuring.clock.clock_offset import NoClockOffset
+from fingervision.measuring.clock.joint_fit import Fit
+from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
+
+FEWEST_FRAMES, FEWEST_ROWS = 12, 3
+"""Frames with a gap and rows of the log below which there is nothing to fit: the fit has eight free numbers."""
+LEAST_GAIN = 40.0
+"""Gain in chi-square of the motion over a gap that stands: by chance 20 come once in 10^4 recordings (four parameters),
+as much again for the offsets among which was chosen."""
+LEAST_SHARE = 0.5
+"""Share of the gap's variance that the log must explain for it to be this recording's log."""
+
+
+def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffset | None:
+    """Refuse records that are too short, and a drive or a gap that does not move."""
+    if time_s.size < FEWEST_FRAMES or float(np.ptp(time_s)) == 0.0:
+        return NoClockOffset(f"only {time_s.size} frames have a time and a gap, and {FEWEST_FRAMES} are needed.")
+    if drive.time_s.size < FEWEST_ROWS or float(np.ptp(drive.input_mm)) == 0.0:
+        return NoClockOffset("the drive does not move: log a run that does.")
+    if float(np.ptp(gap_mm)) == 0.0:
+        return NoClockOffset("the gap does not move: record a run that does.")
+    return None
+
+
+def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
+    """Refuse a log of target positions instead of actual ones."""
+    share = gap_arrives(motion, found)
+    if share is None or share >= ARRIVED:
+        return None
+    return NoClockOffset(
+        f"the drive's rows jump from one place to the next, and the gap makes a share of {max(share, 0.0):.2f} of "
+        "these jumps in their time: the rows are set-points, and when the stage arrived does not stand in them. "
+        "Log the stage's positions, or state --drive-offset-s."
+    )
+
+
+def unlike(motion: Motion, found: Fit) -> NoClockOffset | None:
+    """Refuse a log that the gap does not follow."""
+    still = motion.whitened(motion.gap_mm - motion.gap_mm.mean())
+    still = still - still.mean()
+    gain = found.degrees * float(np.log(max(float(still @ still), 1e-30) / max(found.squares, 1e-30)))
+    share = explained(motion, found)
+    if gain < LEAST_GAIN:
+        moved_um, noise_um = 1e3 * float(np.ptp(motion.gap_mm)), 1e3 * float(np.std(found.residual_mm))
+        return NoClockOffset(
+            f"there is too little motion to find it: the gap changes by {moved_um:.3g} µm in all, of which the drive "
+            f"explains a share of {max(share, 0.0):.2f} and {noise_um:.3g} µm RMS are noise. Record a run that moves."
+        )
+    if found.scale < 0.0:
+        return NoClockOffset(
+            "the gap follows the drive best with its sign reversed, closing as the input grows, and a motion that "
+            "repeats can look so half a period off: check the drive's sign (positive opens)."
+        )
+    if share < LEAST_SHARE:
+        return NoClockOffset(
+            f"the gap does not follow the drive at any offset: at the best, {found.at.offset_s:.3f} s, it explains a "
+            f"share of {max(share, 0.0):.2f} of the gap's variance. Is this the log of this recording?"
+        )
+    return None
+
+
+def explained(motion: Motion, found: Fit) -> float:
+    """Share of the gap's variance that a fit explains."""
+    return 1.0 - float(np.var(found.residual_mm) / np.var(motion.gap_mm))
+
+
+def ambiguous(offsets_s: list[float]) -> NoClockOffset:
+    """Name the offsets among which a periodic motion does not decide."""
+    nearest = np.unique(np.round(offsets_s, 4))
+    said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
+    apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""
+    return NoClockOffset(
+        f"the motion repeats and fits at {nearest.size} offsets{apart} equally well ({said} s): give --drive-offset-s, "
+        "or record a run that starts, stops or turns once where it does not repeat.",
+        tuple(float(one) for one in nearest),
+    )

@@ -1,0 +1,58 @@
+"""Check whether a log contains target positions of the stage, instead of its actual positions."""
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+from fingervision.measuring.clock.joint_fit import Fit
+from fingervision.measuring.clock.motion_model import Motion
+
+STANDS = 0.1
+"""Change of a neighbouring interval over a jump's, below which the log stands on either side of it."""
+JUMPING = 0.7
+"""Share of a log's way that lies in such jumps, from which on it may be one of set-points: a stage that is read out
+fast enough is seen under way, and one that is read out slowly jumps as well."""
+FEWEST_JUMPS = 3
+"""Jumps from which on a gap that takes longer is no accident."""
+FRAMES_MORE = 1.0
+"""Frames on either side of a jump at which the gap has left and has arrived, if it jumps as the log does."""
+ARRIVED = 0.85
+"""Share of the jumps' expected height that the gap must make within that time: noise over three jumps and an alignment
+that is a fifth of a frame off take less than a tenth of it."""
+
+
+def gap_arrives(motion: Motion, found: Fit) -> float | None:
+    """Fraction of the log's jumps that the gap makes as fast as the log does; None where the log has no jumps.
+
+    Parameters
+    ----------
+    motion : Motion
+        Frames and log.
+    found : Fit
+        Its best alignment; the gap that it expects is compared with the one that was seen.
+    """
+    rows = motion.path.rows
+    steps = np.abs(np.diff(rows.input_mm))
+    before, after = np.insert(steps[:-1], 0, 0.0), np.append(steps[1:], 0.0)
+    least = STANDS * float(np.ptp(rows.input_mm))
+    jumps = np.flatnonzero((steps > least) & (np.maximum(before, after) < STANDS * steps))
+    if jumps.size < FEWEST_JUMPS or steps[jumps].sum() < JUMPING * steps.sum():
+        return None
+    frame_s = float(np.median(np.diff(motion.time_s)))
+    expected_mm = motion.gap_mm - found.residual_mm
+    offset_s = motion.time_s - motion.log_time_s(found.at)
+
+    def at(log_s: Array, signal: Array) -> Array:
+        return np.asarray(np.interp(log_s + float(np.median(offset_s)), motion.time_s, signal))
+
+    # The fit puts a slow motion's middle at the jump: both ends lie half a window away from that.
+    half_s = 0.5 * np.diff(rows.time_s)[jumps] + FRAMES_MORE * frame_s
+    middle_s = 0.5 * (rows.time_s[jumps] + rows.time_s[jumps + 1])
+    inside = (at(middle_s - half_s, motion.time_s) > motion.time_s[0]) & (
+        at(middle_s + half_s, motion.time_s) < motion.time_s[-1]
+    )
+    if np.count_nonzero(inside) < FEWEST_JUMPS:
+        return None
+    first_s, last_s = (middle_s - half_s)[inside], (middle_s + half_s)[inside]
+    foreseen = at(last_s, expected_mm) - at(first_s, expected_mm)
+    seen = at(last_s, motion.gap_mm) - at(first_s, motion.gap_mm)
+    return float(foreseen @ seen / max(float(foreseen @ foreseen), 1e-30))

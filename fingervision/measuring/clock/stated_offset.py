@@ -1,0 +1,112 @@
+"""Conversion of a fit to the log's clock, with its uncertainty; refused where the motion leaves it undetermined."""
+
+import numpy as np
+
+from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
+from fingervision.measuring.clock.correlation import LARGEST_RATE
+from fingervision.measuring.clock.joint_fit import Fit, inflation, shift_by_turns
+from fingervision.measuring.clock.log_path import FINER, LogPath
+from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.play_posterior import Posterior
+from fingervision.measuring.clock.refusals import explained
+from fingervision.measuring.clock.set_points import gap_arrives
+
+FOLLOWED = 0.95
+"""Share below which something else moves the gap as well, and is said."""
+SYSTEMATIC = 0.004
+"""Share of the time between two frames and two rows that is known no better: what a curve between two rows is off at a
+turn, found by `python -m tests.benchmarks.clock` as the scatter that many frames do not average out."""
+MOST_PLAY_SHARE = 0.5
+"""Of the stroke: where more is lost in play, an error of the log's turns shifts the whole motion, and the fit of
+`python -m tests.benchmarks.clock --seed 404` was off by a frame."""
+SURE_RATE, ORDINARY_RATE = 3.0, 1e-4
+"""Standard uncertainties, and relative rate, from which on a clock is said to run fast or slow: crystals differ by up
+to 100 parts in a million, and compressed pictures bend a motion by as much."""
+
+COARSE = 2.0
+"""Frames that an encoder's step takes, from which on an offset off by a frame is less than half a step off."""
+
+
+def crossed_in_s(path: LogPath) -> float:
+    """Time that the moving stage takes from one line of the encoder to the next (s); 0 without lines."""
+    steps_mm, steps_s = np.abs(np.diff(path.drive.input_mm)), np.diff(path.drive.time_s)
+    moving = steps_mm > 0.1 * float(steps_mm.max())
+    return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
+
+
+def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOffset | NoClockOffset:
+    """Put the fit into the terms of the log's clock, at the log's first row."""
+    first_s = float(motion.drive.time_s[0])
+    more = np.sqrt(inflation(motion, best.at))
+    offset_s, rate, covariance = at.offset_s, at.rate, at.covariance * np.outer(more[:2], more[:2])
+    shift = shift_by_turns(motion, best)
+    covariance = covariance + np.outer(shift[:2], shift[:2])
+    # Recording's time at which the log begins; there the offset is middle's plus the rate times the way to it.
+    begins_s = (first_s + offset_s - rate * motion.middle_s) / (1.0 - rate)
+    away_s = np.append(motion.time_s, begins_s) - motion.middle_s
+    variance = covariance[0, 0] + 2.0 * away_s * covariance[0, 1] + away_s**2 * covariance[1, 1]
+    row_s = float(np.median(np.diff(motion.path.drive.time_s))) * FINER
+    variance += (SYSTEMATIC * np.hypot(frame_s, row_s)) ** 2
+    # The frames see at what time within its interval the stage jumped, and the log does not. A programme that drives
+    # and logs by one cycle jumps at the same place in each, so that many jumps do not average.
+    jumps = gap_arrives(motion, best) is not None
+    variance += row_s**2 / 12.0 if jumps else 0.0
+    u_time_s = float(np.sqrt(np.mean(variance[:-1])))
+    u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
+    if not np.isfinite(u_time_s) or u_time_s > 0.1 * float(np.ptp(motion.time_s)):
+        return NoClockOffset(
+            f"the motion leaves it open by +-{2.0 * u_time_s:.3g} s (k = 2): a move at one speed, or one that is "
+            "over between two frames, looks the same at every offset near. Record a run that starts, stops or turns."
+        )
+    stroke_mm = float(np.ptp(motion.drive.input_mm))
+    if at.play_mm > MOST_PLAY_SHARE * stroke_mm:
+        return NoClockOffset(
+            f"a play of {1e3 * at.play_mm:.3g} µm takes up most of the stroke of {1e3 * stroke_mm:.3g} µm, and what is "
+            "left of the motion does not tell the offset. Record a run with a longer stroke."
+        )
+    if abs(rate) > LARGEST_RATE:
+        return NoClockOffset(
+            f"at the best offset, {offset_s:.3f} s, the clocks would differ by {1e2 * abs(rate):.2f} %, and clocks "
+            "differ by 0.1 % at the most: is this the log of this recording, and are its times in seconds?"
+        )
+    notes = []
+    share = explained(motion, best)
+    if jumps:
+        notes.append(
+            "The drive's rows jump from one place to the next: if they are set-points, and no positions, the time that "
+            "the stage takes to follow is part of the offset."
+        )
+    if abs(rate) > max(SURE_RATE * u_rate, ORDINARY_RATE):
+        runs = "fast" if rate > 0.0 else "slow"
+        notes.append(
+            f"The recording's clock runs {runs} against the drive's by {1e2 * abs(rate):.3f} % "
+            f"(U = {2e2 * u_rate:.3f} %, k = 2): allowed for."
+        )
+    crossing_s = crossed_in_s(motion.path)
+    if crossing_s > COARSE * frame_s:
+        notes.append(
+            f"The drive's encoder has steps of {1e3 * motion.path.step_mm:.3g} µm, and the stage takes "
+            f"{crossing_s:.2g} s from one to the next: where it stood and turned within a step decides on the offset, "
+            "which may be off by more than a frame."
+        )
+    if u_time_s > 0.5 * frame_s:
+        notes.append(
+            f"The clock offset is known to no better than U = {2.0 * u_time_s:.3g} s (k = 2), more than one frame of "
+            f"{frame_s:.3g} s: there is little motion that starts, stops or turns."
+        )
+    if share < FOLLOWED:
+        notes.append(
+            f"The drive explains a share of {share:.2f} of the gap's variance: the gap moves by something else as well."
+        )
+    return ClockOffset(
+        offset_s=begins_s - first_s,
+        u_offset_s=u_offset_s,
+        rate=rate / (1.0 - rate),
+        u_rate=u_rate,
+        reference_s=first_s,
+        u_time_s=u_time_s,
+        play_mm=at.play_mm,
+        u_play_mm=float(np.hypot(at.u_play_mm * more[2], shift[2])),
+        explained_share=share,
+        notes=tuple(notes),
+    )

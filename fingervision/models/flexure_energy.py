@@ -1,0 +1,34 @@
+"""How far notches work as they are meant to: bent at their necks, neither sheared nor stretched."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.flexure_span import FlexureSpan
+
+Array = NDArray[np.float64]
+
+
+def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plate_mm: float) -> tuple[float, float]:
+    """Strain energy of a flexure outside its intended deformation, and its total strain energy (N mm).
+
+    Parameters
+    ----------
+    span : FlexureSpan
+        The flexure.
+    end_loads : ndarray of float, shape (segments, 3)
+        Tension in N and moments in N mm at both ends of every segment, as `CorotationalFrame.end_loads` has them.
+    compliances : ndarray of float, shape (segments, 3, 3)
+        Of the segments at their ends.
+    plate_mm : float
+        Thickness of the plate.
+    """
+    stations = span.stations_mm(plate_mm)
+    tension, first, second = end_loads.T
+    shear = -(first + second) / np.diff(stations)
+    loads = np.column_stack([tension, shear, second])
+    whole = 0.5 * float(np.einsum("mi,mij,mj->", loads, compliances, loads))
+    if not span.flexure.is_notch:  # as a beam in every direction
+        return 0.0, whole
+    at_neck = float(np.interp(0.0, stations, np.append(-first, second[-1])))
+    bent = 0.5 * at_neck**2 * float(np.sum(compliances[:, 2, 2]))
+    return max(whole - bent, 0.0), whole

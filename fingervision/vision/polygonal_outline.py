@@ -1,0 +1,224 @@
+"""Step 6 for fingers with chamfered corners: the end of a finger as a chain of straight sides and corners.
+
+The outline's points are divided into straight runs. Blur rounds the half-level at a corner: points near it determine
+only its radius, and a side is fitted to points farther away. Tip and inner edge are those of the polygon of these
+sides, with corners rounded as their half-level shows.
+"""
+
+from math import atan2, cos, hypot, pi, sin, sqrt, tan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.vision.corner_blur import corner_half_level
+from fingervision.vision.measuring_point import MeasuringPoint
+from fingervision.vision.outline_points import OutlinePoints
+from fingervision.vision.polygon import Corner, Polygon, Side
+from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE, TIP_SIDE
+from fingervision.vision.residuals import is_on_outline
+from fingervision.vision.straight_runs import straight_runs
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+
+# Sides are looked for down to so much below the measuring height (pixels).
+BELOW_PX = 40.0
+# A top is what lies within so many pixels of the outermost point; this share of it, in the middle, is straight to this
+# mean square (in units of the points' own uncertainties; a curve of 150 px radius leaves more).
+TOP_PX, MIDDLE_SHARE, TOP_STRAIGHTEST = 2.0, 0.6, 4.0
+# A finger's end has two flanks, a top and at most two cut corners on either side; a curve would need more.
+FEWEST_SIDES, MOST_SIDES = 3, 7
+# Blur bends a right corner's half-level by more than 0.01 sigma over so many sigma along its sides, and one that turns
+# by a quarter of that over half a sigma less: what it bends goes with the turn, and falls off as a normal tail does.
+BENT_IN_BLURS, LESS_IN_BLURS = 2.4, 0.5
+# Sides, the corners' radii from them, and the sides without the corners: so many times.
+PASSES = 3
+# A corner rounder than this (pixels) is no corner: the three-sided shape with its fillets is for such fingers. What is
+# rounded may be a short cut as well, which differs from a fillet by this share of the radius (standard uncertainty).
+ROUNDEST_PX, U_FILLET = 15.0, 0.3
+# Points farther from a vertex (pixels) are none of its corner.
+FARTHEST_PX = 15.0
+# What the fit of a straight step makes of a corner's half-level: so many sigma (standard uncertainty).
+U_HALF_LEVEL_IN_BLURS = 0.05
+# Corners between straight sides are sharp, give or take so much of a radius (standard deviation, pixels), where their
+# half-level says no better.
+USUAL_PX = 3.0
+# A line of pixels that runs along a side (sine of the angle between them) within so many sigma of it sees that side
+# more than the edge that it was laid across.
+GRAZING, GRAZING_IN_BLURS = 0.64, 2.0
+# Radii that are tried (pixels).
+RADII_STEP_PX = 0.125
+RADII_PX = np.arange(0.0, 20.0, RADII_STEP_PX)
+# A side needs so many points beside its corners, and its mean square (in units of the points' own) is below this.
+FEWEST_POINTS, STRAIGHTEST = 4, 3.0
+# A top that leans by less than so many standard uncertainties, with ends that differ by less than so much, is level.
+LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
+# A side that leans more crosses no height well (across over along).
+FLATTEST = 3.0
+
+
+class _Fitted(NamedTuple):
+    """A side with its standard uncertainties (pixels across it, radians), and its mean squared residual."""
+
+    side: Side
+    u_offset: float
+    u_angle: float
+    square: float
+
+
+def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:
+    """Tip and edge of a finger with straight sides and (nearly) sharp corners; None for another shape.
+
+    Parameters
+    ----------
+    points : OutlinePoints
+        Sub-pixel outline.
+    below_tip_px : float
+        Height of measuring below the tip.
+    shared : float
+        Neighbouring points that share their errors.
+    """
+    if not _has_straight_top(points):
+        return None
+    chain = _chain(points, float(points.y.min()) + below_tip_px + BELOW_PX)
+    x, y, u = points.x[chain], points.y[chain], points.u[chain]
+    is_row, blur = points.is_row[chain], float(np.median(points.blur))
+    runs = straight_runs(x, y, u)
+    if not FEWEST_SIDES <= len(runs) <= MOST_SIDES:
+        return None
+    found = _fitted(x, y, np.where(is_row, u, -u), runs, blur)
+    if found is None:
+        return None
+    fits, radii, u_radii = found
+    sides = [fit.side for fit in fits]
+    polygon = Polygon(sides, radii, _level(fits))
+    read = polygon.read_off(below_tip_px)
+    if read is None or abs(read.slope) > FLATTEST or not is_on_outline(points, read.edge, read.tip + below_tip_px):
+        return None
+    if any(fits[k].square > STRAIGHTEST * shared for k in read.on):
+        return None
+    changes: list[Polygon] = []
+    for k, fit in enumerate(fits):
+        scale = sqrt(shared * max(fit.square, 1.0)) if fit.square < np.inf else 1.0
+        others = (fit.side.shifted(scale * fit.u_offset), fit.side.turned(scale * fit.u_angle))
+        changes.extend(polygon._replace(sides=[*sides[:k], moved, *sides[k + 1 :]]) for moved in others)
+    for k, u_radius in enumerate(u_radii):
+        changes.append(polygon._replace(radii=[*radii[:k], radii[k] + u_radius, *radii[k + 1 :]]))
+    covariance = np.zeros((2, 2))
+    for changed in changes:
+        other = changed.read_off(below_tip_px)
+        if other is None:
+            return None
+        change = np.array((other.tip - read.tip, other.edge - read.edge))
+        covariance += np.outer(change, change)
+    return MeasuringPoint(read.tip, read.apex, read.edge, read.slope, covariance)
+
+
+def _has_straight_top(points: OutlinePoints) -> bool:
+    """Whether the middle of what is highest is straight, at a glance: drops are not looked at further."""
+    is_top = ~points.is_row & (points.y < points.y.min() + TOP_PX)
+    x, y, u = points.x[is_top], points.y[is_top], points.u[is_top]
+    if x.size < 2 * FEWEST_POINTS:
+        return True
+    near = np.abs(x - np.median(x)) <= 0.5 * MIDDLE_SHARE * np.ptp(x)
+    x, y, u = x[near], y[near], u[near]
+    x = x - x.mean()
+    away = y - y.mean() - x * (x @ y) / max(float(x @ x), 1e-12)
+    return bool(np.mean((away / u) ** 2) < TOP_STRAIGHTEST)
+
+
+def _chain(points: OutlinePoints, lowest: float) -> Ints:
+    """Indices of the points in order: up the outer flank, across the top, down the inner flank."""
+    parts = []
+    for side, key in ((OUTER_SIDE, -points.y), (TIP_SIDE, points.x), (INNER_SIDE, points.y)):
+        these = np.flatnonzero((points.side == side) & (points.y < lowest))
+        parts.append(these[np.argsort(key[these], kind="stable")])
+    return np.concatenate(parts)
+
+
+def _line(x: Floats, y: Floats, u: Floats) -> _Fitted:
+    """Weighted total least squares; `u` is positive along x, negative along y."""
+    start = np.full(x.size, atan2(float(y[-1] - y[0]), float(x[-1] - x[0])))
+    for _look in range(2):
+        across = np.where(u > 0, np.abs(np.sin(start)), np.abs(np.cos(start)))
+        w = (np.abs(u) * np.maximum(across, 0.1)) ** -2.0
+        total = float(w.sum())
+        cx, cy = float(w @ x) / total, float(w @ y) / total
+        dx, dy = x - cx, y - cy
+        xx, xy, yy = float(w @ dx**2), float(w @ (dx * dy)), float(w @ dy**2)
+        angle = 0.5 * atan2(2.0 * xy, xx - yy)
+        if cos(angle) * (x[-1] - x[0]) + sin(angle) * (y[-1] - y[0]) < 0.0:
+            angle = atan2(-sin(angle), -cos(angle))
+        start = np.full(x.size, angle)
+    along = dx * cos(angle) + dy * sin(angle)
+    away = dy * cos(angle) - dx * sin(angle)
+    square = float(w @ away**2) / max(x.size - 2, 1)
+    return _Fitted(Side(cx, cy, angle), total**-0.5, max(float(w @ along**2), 1e-12) ** -0.5, square)
+
+
+def _fitted(
+    x: Floats, y: Floats, u: Floats, runs: list[Ints], blur: float
+) -> tuple[list[_Fitted], list[float], list[float]] | None:
+    """Sides, the radii of their corners, and the radii's uncertainties; None where the sides are not convex."""
+    fits = [_line(x[run], y[run], u[run]) for run in runs]
+    radii = u_radii = [0.0] * (len(runs) - 1)
+    for _pass in range(PASSES):
+        corners = Polygon([fit.side for fit in fits], radii, None).corners()
+        if corners is None:
+            return None
+        known = [_radius(x, y, u, corner, blur) for corner in corners]
+        radii, u_radii = [r for r, _ in known], [ur for _, ur in known]
+        if max(radii) > ROUNDEST_PX:
+            return None
+        fits = []
+        for k, run in enumerate(runs):
+            keep = np.ones(run.size, dtype=bool)
+            for j in (k - 1, k):
+                if 0 <= j < len(corners):
+                    (vx, vy), _, turn = corners[j]
+                    bent = radii[j] * tan(0.5 * turn) + _bent_in_blurs(turn) * blur
+                    keep &= np.hypot(x[run] - vx, y[run] - vy) > bent
+            if np.count_nonzero(keep) < FEWEST_POINTS:  # too short to be told from its corners: nothing is read off it
+                fits.append(_line(x[run], y[run], u[run])._replace(square=np.inf))
+            else:
+                fits.append(_line(x[run[keep]], y[run[keep]], u[run[keep]]))
+    return fits, radii, u_radii
+
+
+def _radius(x: Floats, y: Floats, u: Floats, corner: Corner, blur: float) -> tuple[float, float]:
+    """Most probable radius of a corner from the points of its half-level, and its standard uncertainty."""
+    (vx, vy), (nx, ny), turn = corner
+    dx, dy = x - vx, y - vy
+    near = np.hypot(dx, dy) < FARTHEST_PX
+    for side in (-0.5 * turn, 0.5 * turn):
+        # The bisector points into the finger; a side's direction is a quarter of a turn and half the corner's off it.
+        sx, sy = ny * cos(side) + nx * sin(side), -nx * cos(side) + ny * sin(side)
+        runs_along = np.where(u > 0.0, abs(sy), abs(sx)) < GRAZING
+        near &= ~(runs_along & (np.abs(dx * sy - dy * sx) < GRAZING_IN_BLURS * blur))
+    dx, dy = dx[near], dy[near]
+    deep = corner_half_level(dy * nx - dx * ny, RADII_PX[:, None], turn, blur)
+    square = (((dx * nx + dy * ny) - deep) / np.hypot(u[near], U_HALF_LEVEL_IN_BLURS * blur)) ** 2
+    exponent = 0.5 * square.sum(axis=1) + 0.5 * (RADII_PX / USUAL_PX) ** 2
+    likely = np.exp(exponent.min() - exponent)
+    radius = float(RADII_PX[int(exponent.argmin())])
+    spread = sqrt(float(likely @ (RADII_PX - radius) ** 2) / float(likely.sum()) + RADII_STEP_PX**2)
+    return radius, hypot(spread, U_FILLET * radius)
+
+
+def _bent_in_blurs(turn: float) -> float:
+    """Length along its sides over which a corner's blur matters, in units of sigma."""
+    return BENT_IN_BLURS - LESS_IN_BLURS * max(0.0, 1.0 - 2.0 * turn / pi) / 0.75
+
+
+def _level(fits: list[_Fitted]) -> int | None:
+    """Index of a level top side, if there is one: otherwise noise would choose the higher of its ends."""
+    for k in range(1, len(fits) - 1):
+        u_angle = fits[k].u_angle * sqrt(max(fits[k].square, 1.0))  # infinite: a top too short to lean
+        corners = Polygon([fit.side for fit in fits[k - 1 : k + 2]], [0.0, 0.0], None).corners()
+        if corners is None:
+            continue
+        rise = abs(corners[1][0][1] - corners[0][0][1])
+        if abs(fits[k].side.angle) < LEVEL_IN_SIGMAS * u_angle and rise < LEVEL_LIMIT_PX:
+            return k
+    return None

@@ -1,0 +1,100 @@
+"""Division of a chain of points into straight runs: the best piecewise line with a penalty for every run.
+
+Dynamic programming over all divisions of the chain (Bellman & Roth, JASA 64, 1969, doi:10.1080/01621459.1969.10501038),
+with total least squares as the cost of a run, computed from the chain's cumulative moments. Points may be left out, for
+a penalty each.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+
+# A run has so many points at least; the noise is that of as many points about lines of their own.
+FEWEST_POINTS = 5
+# A further run must explain this much chi-square more: odds of e^12 to one, less what its three parameters take up.
+PRICE_OF_RUN = 27.0
+# A point that is left out costs so much: beyond 2.5 standard deviations it is better left out.
+PRICE_OF_POINT = 6.0
+# Median over mean of chi-square with three degrees of freedom, of the windows that the noise is taken from.
+MEDIAN_OF_CHI_SQUARE = 0.79
+
+
+class _Moments(NamedTuple):
+    """Cumulative sums of weights, positions and their products, shape (n + 1, 6), and the positions' origin."""
+
+    sums: Floats
+
+    def squares(self, first: Ints, last: Ints) -> Floats:
+        """Smallest sum of squared distances from a straight line, for the points first to last (exclusive)."""
+        w, x, y, xx, xy, yy = (self.sums[last] - self.sums[first]).T
+        weight = np.maximum(w, 1e-300)
+        xx, xy, yy = xx - x * x / weight, xy - x * y / weight, yy - y * y / weight
+        return np.asarray(np.maximum(0.5 * (xx + yy - np.hypot(xx - yy, 2.0 * xy)), 0.0))
+
+
+def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
+    """Divide a chain of points into straight runs.
+
+    Parameters
+    ----------
+    x, y : ndarray of float, shape (n,)
+        Places in the chain's own order (pixels).
+    u : ndarray of float, shape (n,)
+        Standard uncertainty of each across its run, in any unit that all share.
+
+    Returns
+    -------
+    list of ndarray of int
+        Numbers of each run's points, in order; points that belong to no run are left out.
+    """
+    n = x.size
+    if n < FEWEST_POINTS:
+        return []
+    w, x0, y0 = u**-2.0, x - x.mean(), y - y.mean()
+    terms = np.column_stack((w, w * x0, w * y0, w * x0 * x0, w * x0 * y0, w * y0 * y0))
+    moments = _Moments(np.vstack((np.zeros(6), np.cumsum(terms, axis=0))))
+    starts = np.arange(n - FEWEST_POINTS + 1)
+    chi_square = moments.squares(starts, starts + FEWEST_POINTS) / (FEWEST_POINTS - 2)
+    noise = max(float(np.median(chi_square)) / MEDIAN_OF_CHI_SQUARE, 1e-12)
+    # The cheapest way to explain the first k points: all told, and what its last run is (None: a point left out).
+    cost, last_run = np.zeros(n + 1), [-1] * (n + 1)
+    for k in range(1, n + 1):
+        cost[k] = cost[k - 1] + PRICE_OF_POINT
+        if k < FEWEST_POINTS:
+            continue
+        first = np.arange(k - FEWEST_POINTS + 1)
+        by_run = cost[first] + moments.squares(first, np.full(first.size, k)) / noise + PRICE_OF_RUN
+        best = int(by_run.argmin())
+        if by_run[best] < cost[k]:
+            cost[k], last_run[k] = by_run[best], best
+    runs, k = [], n
+    while k > 0:
+        if last_run[k] < 0:
+            k -= 1
+        else:
+            runs.append(np.arange(last_run[k], k))
+            k = last_run[k]
+    return _joined(runs[::-1], terms, noise)
+
+
+def _joined(runs: list[Ints], terms: Floats, noise: float) -> list[Ints]:
+    """Join runs on one straight line: the points left out between them were dust."""
+    joined: list[Ints] = []
+    for run in runs:
+        if joined:
+            both = np.concatenate((joined[-1], run))
+            apart = _squares(terms[joined[-1]]) + _squares(terms[run])
+            if _squares(terms[both]) - apart < PRICE_OF_RUN * noise:
+                joined[-1] = both
+                continue
+        joined.append(run)
+    return joined
+
+
+def _squares(terms: Floats) -> float:
+    moments = _Moments(np.vstack((np.zeros(6), terms.sum(axis=0))))
+    return float(moments.squares(np.array([0]), np.array([1]))[0])
