@@ -251,7 +251,7 @@ class GapDevice:
         return {f"{self.name}_flight": self.describe()}
 
     def collect(self) -> Iterator[dict[str, Any]]:
-        """Return every frame of the flight."""
+        """Yield every frame of the flight."""
         for exposed_s, data in self._flown:
             at_s = self._unix_s + exposed_s
             yield {"time": at_s, "data": data, "timestamps": dict.fromkeys(data, at_s)}

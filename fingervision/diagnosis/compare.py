@@ -38,8 +38,8 @@ class Comparison:
     places : tuple of Place
         Largest first.
     rms_mm, noise_mm : float
-        Disagreement of one gap reading, and its noise at most: what the disagreement does within seconds counts as noise
-        here, so that a model that is farther off states more of it.
+        Disagreement of one gap reading, and an upper bound of its noise: what the disagreement does within seconds
+        counts as noise here, so that a model that is farther off states more of it.
     """
 
     data: Observations

@@ -1,4 +1,4 @@
-"""How an effect acts in a mechanism that is given by its drawing, where the poses of its bodies show the place."""
+"""How an effect acts in a mechanism given by its drawing, where poses of the bodies show which part differs."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,7 +7,7 @@ from fingervision.domain.parameter import Parameter
 
 
 class DrawnPart(StrEnum):
-    """What of a drawing an effect changes; a diagnosis tries every such part of the drawing."""
+    """Part of a drawing that an effect changes; a diagnosis tries every such part of the drawing."""
 
     HINGE = "hinge"
     """The bending stiffness of one hinge."""
@@ -29,7 +29,7 @@ class DrawnPart(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DrawingForm:
-    """One effect beside a drawing: what it changes there, and by how much.
+    """Action of one effect on a drawing: what it changes there, and by how much.
 
     Parameters
     ----------

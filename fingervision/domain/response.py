@@ -44,7 +44,7 @@ class Response:
         return Response(self.left_mm + more.left_mm, self.right_mm + more.right_mm, force_n)
 
     def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
-        """Both points moved together, to the right where `by_mm` is positive."""
+        """Move both points by `by_mm`, to the right where it is positive."""
         return Response(self.left_mm + by_mm, self.right_mm + by_mm, self.force_n)
 
     def at(self, rows: NDArray[np.intp]) -> "Response":

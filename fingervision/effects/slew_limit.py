@@ -38,10 +38,9 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
-    """Speeds over `WINDOW` samples that go one way: neighbouring samples differ by whole steps of an encoder.
+    """Mean speeds over `WINDOW` samples of one direction; over fewer, the steps of the encoder would dominate.
 
-    `jumps` marks the moves, shape (n - 1,), that are a command's jump and no motion: stretches that hold one are left
-    out.
+    `jumps` marks moves, shape (n - 1,), that are a command's jump instead of a motion; stretches with one are excluded.
     """
     if input_mm.size <= WINDOW:
         return np.zeros(0)

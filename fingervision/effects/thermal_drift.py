@@ -17,7 +17,7 @@ def act(response: Response, history: History, values: Values) -> Response:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Leave out what is over before the second reading: it is an offset by another name."""
+    """Exclude time constants so short that the drift is over before the second reading: it would be an offset."""
     amplitude, tau = EFFECT.parameters
     if history.sample_time_s >= tau.upper:
         return f"readings are {history.sample_time_s:.3g} s apart, and a warming would be over between two of them"

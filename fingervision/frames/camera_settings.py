@@ -3,14 +3,14 @@
 The properties have another meaning in each of OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
 cap_avfoundation_mac.mm of OpenCV 4 and 5):
 
-* V4L2 reads -1 for what a camera does not have. Its exposure counts units of 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE); its
-  automatic exposure is a menu in which 1 is manual and 3 is the usual automatic mode. If the environment asks for
+* V4L2 returns -1 for a property that a camera lacks. Its exposure counts units of 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE);
+  its automatic exposure is a menu in which 1 is manual and 3 is the usual automatic mode. If the environment asks for
   normalised values, the menu returns 0.25 and 0.75 and every other property a fraction of an unknown range; mode 0
   switches that off.
 * Media Foundation's exposure is the logarithm to base 2 of seconds. Setting an automatic mode also sets its value (the
   focus would run to 0), and reading the mode back gives no information. Setting a value makes it manual, so that
   writing back the value just read holds it.
-* AVFoundation has size and rate alone.
+* AVFoundation supports size and frame rate only.
 """
 
 from collections.abc import Callable, Iterator, Mapping

@@ -84,7 +84,7 @@ class DamageTrail:
         heapq.heappush(self._entered, (tick, self._last))
 
     def leaves(self, picture: av.VideoFrame) -> Iterator[Picture]:
-        """Return the picture that came out, after the lost ones that should have come before it."""
+        """Yield the picture that came out, after the lost ones that should have come before it."""
         tick = picture.pts
         if tick in self._given_up:
             return  # behind damage pictures may leave too late; its place is taken
@@ -109,7 +109,7 @@ class DamageTrail:
         yield tick, self._words(number) if self._hangs_on_damage(number) else picture
 
     def rest(self) -> Iterator[Picture]:
-        """Return the damaged frames that were still awaited when the recording ended."""
+        """Yield the damaged frames that were still awaited when the recording ended."""
         while self._entered:
             tick, number = heapq.heappop(self._entered)
             if self._broken:

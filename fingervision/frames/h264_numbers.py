@@ -134,7 +134,7 @@ def _bits(unit: bytes) -> BitReader:
 
 
 def _sequence(bits: BitReader) -> tuple[int, _Sequence]:
-    """Read sequence parameters (7.3.2.1.1) as far as the first that is needed here goes."""
+    """Read the sequence parameters (7.3.2.1.1) up to the last one that is needed here."""
     profile = bits.take(8)
     bits.take(16)
     name = bits.golomb()

@@ -6,8 +6,8 @@ to an older one, and a moving finger is shown in an old position. Four signs are
 
 * AV1 numbers the pictures in the order in which they are shown. An omitted number means a missing picture; consecutive
   numbers prove that none is missing, whatever the times are.
-* MPEG-4 part 2 turns a bit with every P picture, a count modulo two. One missing picture is visible in it; if the bit
-  fits, an odd number of missing times was never coded.
+* MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing picture is visible in it;
+  if the bit fits, an odd number of missing times was never coded.
 * In MPEG-4 part 2 a B picture lies between two others in time. A B picture presented after all pictures received so far
   depends on a missing one.
 * Times. In a file with equidistant times (coded at a rate, instead of as a camera delivered the frames), a hole of

@@ -1,5 +1,6 @@
 """Keys that several kinds of gauges share, each with its limits and the reason for them."""
 
+from dataclasses import dataclass
 from math import radians
 
 from fingervision.storage.toml_section import Section
@@ -38,3 +39,31 @@ def polarity(section: Section) -> int:
     """Read `polarity`: +1 rising (lighter along the direction), -1 falling, 0 any."""
     word = section.word("polarity", "any", of=POLARITIES)
     return {"any": 0, "rising": 1, "falling": -1}[word]
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeKeys:
+    """Settings of a gauge that follows one straight edge.
+
+    Parameters
+    ----------
+    middle_px : (float, float)
+        Its centre in the first frame.
+    direction_rad : float
+        Its direction, from the x axis clockwise on the screen: across the edge, or along it, as the kind says.
+    length_px, reach_px : float
+        How much of the edge is used, and how far it may move from frame to frame.
+    polarity : int
+        +1 rising, -1 falling, 0 any.
+    """
+
+    middle_px: tuple[float, float]
+    direction_rad: float
+    length_px: float
+    reach_px: float
+    polarity: int
+
+
+def edge_keys(section: Section, direction: str) -> tuple[tuple[float, float], float, float, float, int]:
+    """Read the values of `EdgeKeys`, in its order; `direction` is the key of the direction."""
+    return middle(section), angle(section, direction), length(section), reach(section), polarity(section)

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+from fingervision.domain.frame import LostFrame
+from fingervision.domain.status import Status
 from fingervision.gauges.quantities import Quantity
 from fingervision.gauges.status import GaugeStatus
 
@@ -42,3 +44,19 @@ class Reading:
     marks: tuple[Mark, ...] = ()
     zone: Mark | None = field(default=None)
     words: str = ""
+
+
+def unread(frame: object, status: Status, gauges: int) -> list[Reading]:
+    """Readings of all gauges in a frame whose picture is lost, or not believed: no number, with the frame's reason.
+
+    Parameters
+    ----------
+    frame : Frame or LostFrame
+        What came; a lost frame states its reason in words.
+    status : Status
+        Of the frame.
+    gauges : int
+        How many gauges there are.
+    """
+    words = frame.words if isinstance(frame, LostFrame) else ""
+    return [Reading(GaugeStatus(status.value), words=words)] * gauges

@@ -17,7 +17,7 @@ from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.quantities import Cell
-from fingervision.gauges.reading import Reading
+from fingervision.gauges.reading import Reading, unread
 from fingervision.gauges.status import GaugeStatus
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gauges_csv import GaugeRow, GaugeRows, GaugesCsv
@@ -116,7 +116,7 @@ class GaugeRecording:
         lost = outcome if isinstance(outcome, LostFrame) else frame
         readings: Sequence[Reading]
         if isinstance(lost, LostFrame):
-            readings = [Reading(GaugeStatus(lost.status.value), words=lost.words)] * len(self._gauges)
+            readings = unread(lost, lost.status, len(self._gauges))
         else:
             readings = measured_together(self._followers, picture_of(lost, self._settings))
         self._newest = readings

@@ -2,21 +2,23 @@
 
 from enum import StrEnum
 
+from fingervision.domain.status import Status
+
 
 class GaugeStatus(StrEnum):
     """The status of one gauge in one frame; statuses that gaps.csv has mean the same here."""
 
-    OK = "ok"
-    DAMAGED = "damaged"
-    DUPLICATE = "duplicate"
-    SATURATED = "saturated"
-    LOW_CONTRAST = "low_contrast"
-    NO_FINGERS = "no_fingers"
-    ONE_FINGER = "one_finger"
-    TIP_OUT_OF_VIEW = "tip_out_of_view"
-    BLURRED = "blurred"
-    TOUCHING = "touching"
-    GRIPPING = "gripping"
+    OK = Status.OK.value
+    DAMAGED = Status.DAMAGED.value
+    DUPLICATE = Status.DUPLICATE.value
+    SATURATED = Status.SATURATED.value
+    LOW_CONTRAST = Status.LOW_CONTRAST.value
+    NO_FINGERS = Status.NO_FINGERS.value
+    ONE_FINGER = Status.ONE_FINGER.value
+    TIP_OUT_OF_VIEW = Status.TIP_OUT_OF_VIEW.value
+    BLURRED = Status.BLURRED.value
+    TOUCHING = Status.TOUCHING.value
+    GRIPPING = Status.GRIPPING.value
     OUT_OF_VIEW = "out_of_view"
     NO_EDGE = "no_edge"
     NOT_FOUND = "not_found"

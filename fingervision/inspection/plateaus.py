@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.inspection.sample import Look, Sample
+from fingervision.inspection.look import Look
+from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]

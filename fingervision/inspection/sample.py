@@ -17,19 +17,15 @@ from fingervision.frames.source import Description
 from fingervision.inspection.blocks import BLOCKY, blockiness
 from fingervision.inspection.finding import GOOD_PX
 from fingervision.inspection.ground_shift import GroundShift, GroundTracker
-from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE, edge_noise_px
+from fingervision.inspection.look import Look
+from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE
 from fingervision.inspection.response_evidence import ResponseEvidence, response_evidence
 from fingervision.measuring.scale import Scale
 from fingervision.vision.binarise import binarise
 from fingervision.vision.denoise import denoise
-from fingervision.vision.edge_filters import PIXEL_VARIANCE
-from fingervision.vision.edges import EdgePoints
-from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import SMEARED
-from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.pipeline import Settings, look_closely, measure_frame
-from fingervision.vision.profile_choice import WIDER
-from fingervision.vision.residuals import SHARED_POINTS
 
 Floats = NDArray[np.float64]
 
@@ -44,87 +40,8 @@ SEEING_NOISE = 2.0 * GOOD_NOISE
 STEP_OF_NOISE, LOST_NOISE = 0.954, 5.0 * GOOD_NOISE
 # The steepest of the pixels lie on edges; outlines are lost above this spread (twice what is good).
 STEEPEST, LOST_BLUR_PX = 0.995, 2.0 * GOOD_BLUR_PX
-# What a camera's own noise is taken to be where a codec has removed it (levels of 255).
-CAMERA_NOISE = 2.0
 # Fingers and gap fill a picture that they take so much of: the rest is room to move in.
 FILLED = 0.6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Look:
-    """One frame that was inspected in detail.
-
-    Parameters
-    ----------
-    frame : Frame
-        The picture.
-    upright : ndarray or None
-        Its grey levels, seen with the tips up; None where no fingers were found.
-    outcome : GapMeasurement
-        What it measured.
-    fingers : CoarseFingers
-        Where the fingers are.
-    edges : EdgePoints
-        Their outlines.
-    top_level : int
-        Full scale of the picture.
-    """
-
-    frame: Frame
-    upright: GreyImage
-    outcome: GapMeasurement
-    fingers: CoarseFingers
-    edges: EdgePoints
-    top_level: int
-
-    @property
-    def contrast(self) -> float:
-        """Difference of light between background and the weaker finger (light, on the levels' own scale)."""
-        return min(abs(self.outcome.left.contrast), abs(self.outcome.right.contrast))
-
-    @property
-    def focus_blur_px(self) -> float:
-        """Blur of the optics including the pixel: that of flanks or tips, whichever is less (pixels)."""
-        return float(np.sqrt(self.edges.blur_px.min(axis=1).max() ** 2 + PIXEL_VARIANCE))
-
-    @property
-    def widened_px2(self) -> Floats:
-        """Variance that motion has added to the blur of each finger's flanks, compared with the tips; shape (2,)."""
-        flanks, tips = (self.edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
-        return np.asarray(np.where(flanks > (1.0 + WIDER) * tips, flanks - tips, 0.0))
-
-    @property
-    def flank_blur_px(self) -> float:
-        """Blur of the flanks including the pixel (pixels)."""
-        return float(np.sqrt(self.edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
-
-    @property
-    def u_camera_px(self) -> float:
-        """Random uncertainty of the gap from the camera's noise alone, without shared errors of a codec (pixels)."""
-        alone = max(self.outcome.u_gap_px**2 - self.outcome.u_coding_px**2, 0.0)
-        shared = 1.0 if self.frame.quantiser is not None else SHARED_POINTS[self.frame.coding]
-        return float(np.sqrt(alone / shared))
-
-    @property
-    def noise(self) -> float:
-        """Ratio of noise to contrast, from the flat parts beside the edges where they are in view.
-
-        A codec removes the noise from flat parts; then the noise of a typical camera is assumed, unless the edges show
-        less.
-        """
-        flat = self.edges.noise_flat
-        if self.frame.lossy or not flat:
-            flat = min(self.edges.noise, max(flat, CAMERA_NOISE * self.top_level / 255.0))
-        return flat / max(self.contrast, 1e-9)
-
-    def u_with(self, noise: float | None = None, blur_px: float | None = None) -> float:
-        """Random uncertainty of the gap for another ratio of noise to contrast, or another blur of the flanks (pixels).
-
-        The Cramer-Rao bound gives the ratio to the uncertainty that is stated for this frame.
-        """
-        now = edge_noise_px(self.noise, self.flank_blur_px)
-        then = edge_noise_px(self.noise if noise is None else noise, self.flank_blur_px if blur_px is None else blur_px)
-        return self.u_camera_px * then / now if now > 0.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

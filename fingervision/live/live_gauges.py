@@ -11,8 +11,7 @@ from fingervision.domain.status import Status
 from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.gauges.reading import Reading
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import unread
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.gauge_following import NO_SCALE, told
 from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
@@ -105,9 +104,9 @@ class LiveGauges:
         }
         status = row.status if row is not None else None
         if isinstance(item, LostFrame):
-            readings = [Reading(GaugeStatus(item.status.value), words=item.words)] * len(gauges)
+            readings = unread(item, item.status, len(gauges))
         elif status in (Status.DAMAGED, Status.DUPLICATE):
-            readings = [Reading(GaugeStatus(status.value))] * len(gauges)
+            readings = unread(item, status, len(gauges))
         else:
             settings, _ = task.settings_for(())
             followers = [self._followers[gauge.name][1] for gauge in gauges]

@@ -128,7 +128,7 @@ def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
 
 
 def _pieces(series: GapSeries) -> list[slice]:
-    """Yield stretches of frames without a hole, because no line is drawn across missing frames."""
+    """Stretches of frames without a hole, because no line is drawn across missing frames."""
     frames, _ = series.frame_numbers()
     if not frames.size:
         return []

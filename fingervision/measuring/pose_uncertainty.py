@@ -43,7 +43,7 @@ class SharedErrors:
     size_error: float = 0.0
 
     def at(self, size_px: tuple[int, int]) -> tuple[float, float]:
-        """Standard uncertainties of where edges are seen (px) and of sizes (relative), in a picture's middle."""
+        """Standard uncertainties of edges' positions (px) and of sizes (relative), in the centre of a picture."""
         if self.plane is None:
             return 0.0, self.size_error
         return self.plane.u_edge_px(self.u_response_px), self._relative((0.5 * size_px[0], 0.5 * size_px[1]))

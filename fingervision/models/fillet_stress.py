@@ -1,9 +1,10 @@
-"""Stress concentration of a straight neck's rounded corners, between deep shoulders.
+"""Stress concentration at the rounded corners of a straight neck between deep shoulders.
 
-Own plane elements (`tests/benchmarks/models_fillet_table.py`), because the usual charts (Pilkey, Peterson's Stress
-Concentration Factors, charts 3.1 and 3.7) end at shoulders of three heights. Between the table's nodes the factors'
-excess over 1 is interpolated over the logarithms of radius over thickness and of depth over radius; beyond its ends it
-goes on as a power of the radius, since a sharp corner has no limit, and stays as it is with the depth.
+The values come from plane finite elements (`tests/benchmarks/models_fillet_table.py`), because the usual charts
+(Pilkey, Peterson's Stress Concentration Factors, charts 3.1 and 3.7) end at shoulders of three heights. Between the
+table's nodes, the excess of the factors over 1 is interpolated over the logarithms of radius / thickness and depth /
+radius. Beyond its ends it is extrapolated as a power of the radius, because the stress at a sharp corner has no limit,
+and held constant over the depth.
 """
 
 import numpy as np
@@ -29,7 +30,7 @@ _FACTORS = (
 
 
 def fillet_factors(thickness_mm: float, fillet_mm: float, depth_mm: float) -> tuple[float, float]:
-    """Largest stress over the straight neck's nominal one, in tension and in bending.
+    """Ratio of the largest stress to the nominal stress of the straight neck, in tension and in bending.
 
     Parameters
     ----------

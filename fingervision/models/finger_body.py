@@ -1,10 +1,10 @@
 """The gripper's finger, from both hinges to the tip, as one elastic body condensed from plane finite elements.
 
-Bars that bend up to where their axes meet are no match for the joint of root, cross bar, shuttle and finger, which
-are as wide as they are long: the force on a gripped part is then up to a third too low. The body is cut from the
-drawing at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380) to the cuts, the
-tip's inner face, and mean motions of a few patches between them, by which its mass moves. The other nodes of the bars
-follow it, for pictures and poses.
+Bars that bend up to where their axes meet do not represent the joint of root, cross bar, shuttle and finger, which are
+as wide as they are long: the force on a gripped part would be up to a third too low. The body is cut from the drawing
+at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380) to the cuts, the tip's
+inner face, and mean motions of a few patches in between, which carry its mass. The other nodes of the bars follow its
+motion, for pictures and poses.
 """
 
 from dataclasses import dataclass, replace

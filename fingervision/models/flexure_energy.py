@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plate_mm: float) -> tuple[float, float]:
-    """Strain energy of a flexure that is not in its working direction, and all of it, in N mm.
+    """Strain energy of a flexure outside its intended deformation, and its total strain energy (N mm).
 
     Parameters
     ----------

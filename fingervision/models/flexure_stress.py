@@ -57,7 +57,7 @@ def nominal_stress_mpa(
 
 
 def _factors(span: FlexureSpan, plate_mm: float) -> tuple[float, float]:
-    """Stress concentration in tension and in bending: of a notch, of a straight neck's fillets, none of a leaf."""
+    """Stress concentration in tension and in bending: of a notch, of a straight neck's fillets; 1 for a leaf."""
     flexure = span.flexure
     if flexure.is_notch:
         return notch_factors(span.notch(plate_mm))

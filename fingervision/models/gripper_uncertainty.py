@@ -33,7 +33,7 @@ def gripper_uncertainty(
 
     The figures of changed drawings come from the lumped model (out of the plane from the stiffness matrix), with small
     displacements, with contact where the physics includes it; a bar model gives their ratio to the drawing's own
-    (`changed_drawings`). Finite elements of every changed drawing would take minutes, and an uncertainty needs two
+    (`changed_drawings`). Finite elements for every changed drawing would take minutes, and an uncertainty needs two
     digits only. The same uncertainty is stated for the figures of the other kinds of model.
 
     Parameters

@@ -40,7 +40,7 @@ def joined_frame_of(gripper: Gripper, skeleton: Skeleton) -> JoinedFrame:
 def half_frame(
     gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame | None = None
 ) -> DrivenBody:
-    """Support and drive the right half's frame.
+    """Support and drive the frame of the right half.
 
     The clamp is fixed, the drive point moves by the input along the axis, and can neither move across it nor rotate.
 

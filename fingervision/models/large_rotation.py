@@ -1,9 +1,9 @@
-"""Equilibrium in the deformed shape: Newton's method on the total Lagrangian equations, with contact where asked.
+"""Equilibrium in the deformed shape: Newton's method on the total Lagrangian equations, with contact if requested.
 
-A tangent serves for many steps, along the path too, while the residual falls well by it. Where fingers may touch,
-every step is a linear complementarity problem (Signorini) of the tangent's own compliance, so that touching and lifting
-points are found with the displacements (Newton's method for generalised equations: Josephy, Mathematics Research Center
-report 1965, University of Wisconsin, 1979).
+One tangent matrix is used for many steps, along the path too, as long as the residual falls well. If the fingers may
+touch, every step is a linear complementarity problem (Signorini) with the tangent's compliance, so that touching and
+separating points are found together with the displacements (Newton's method for generalised equations: Josephy,
+Mathematics Research Center report 1965, University of Wisconsin, 1979).
 """
 
 from math import log
@@ -31,7 +31,7 @@ _CURVE = 3
 
 
 class _Tangent:
-    """The latest tangent of a body, factorised, with what a force on each point of the face does by it."""
+    """The latest tangent matrix of a body, factorised, with the displacements by a unit force on each face point."""
 
     def __init__(self, body: DrivenBody, *, contact: bool) -> None:
         self.body, self.contact = body, contact
@@ -40,7 +40,7 @@ class _Tangent:
         self.compliance = np.zeros((0, 0))
 
     def renew(self, moved: Array) -> SuperLU:
-        """Take the tangent at some displacements."""
+        """Compute the tangent at given displacements."""
         free = self.body.free
         solver = factorised(self.body.tangent(moved)[0][free][:, free])
         self._solver = solver
@@ -54,7 +54,7 @@ class _Tangent:
         return solver
 
     def step(self, moved: Array, internal_n: Array) -> tuple[Array, Array]:
-        """Displacements of all unknowns and contact forces that balance the internal forces, by this tangent."""
+        """Displacements of all unknowns, and contact forces, that balance the internal forces by this tangent."""
         body, step = self.body, np.zeros_like(moved)
         solver = self._solver or self.renew(moved)
         step[body.free] = solver.solve(-internal_n[body.free])
@@ -74,7 +74,7 @@ def large_equilibrium(
 ) -> Equilibrium:
     """Find the equilibrium at one input.
 
-    With contact, gap >= 0, force >= 0, and one of them zero at every point of the fingers' faces.
+    With contact, gap >= 0, force >= 0, and one of them is zero at every point of the fingers' faces.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def large_equilibrium(
 
 
 def _next(tangent: _Tangent, input_mm: float, path: list[Equilibrium]) -> Equilibrium:
-    """Find the equilibrium that follows a path of them."""
+    """Find the next equilibrium of a path."""
     body = tangent.body
     moved = _predicted(body, input_mm, path)
     pressed = path[-1].contact_n if tangent.contact else np.zeros(body.face.size)
@@ -124,7 +124,7 @@ def _next(tangent: _Tangent, input_mm: float, path: list[Equilibrium]) -> Equili
 
 
 def _is_slow(body: DrivenBody, residual: float, before: float, wanted: float, since: int) -> bool:
-    """Whether a new tangent is less work than the steps that this one still needs."""
+    """Whether computing a new tangent takes less work than the further steps with the present one."""
     if body.nodal_force is None:  # forces come with the tangent
         return True
     if not residual < before:
@@ -135,7 +135,7 @@ def _is_slow(body: DrivenBody, residual: float, before: float, wanted: float, si
 
 
 def _predicted(body: DrivenBody, input_mm: float, path: list[Equilibrium]) -> Array:
-    """Extrapolate the path; by the small displacements where it has but one equilibrium."""
+    """Extrapolate the path; with only one equilibrium, by the small displacements."""
     last = path[-1]
     if len(path) == 1:
         return last.displacement_mm + (input_mm - last.input_mm) * body.unit_displacement_mm

@@ -181,12 +181,12 @@ class MechanismChain:
 
     @property
     def force_error(self) -> float:
-        """Relative model error of the force: of bodies that do not yield, by the lumped model, whose bodies do."""
+        """Relative error of the force from treating bodies as rigid, by comparison with the lumped model."""
         return self._errors[0]
 
     @property
     def stress_error(self) -> float:
-        """Relative model error of the stress in the flexures, likewise."""
+        """Relative error of the stress in the flexures, estimated in the same way."""
         return self._errors[1]
 
     @cached_property

@@ -168,7 +168,7 @@ class MechanismFrame:
 
     @cached_property
     def _errors(self) -> tuple[float, float]:
-        """Relative model errors of force and stress: those of bent flexures, and more by what is not bent."""
+        """Relative errors of force and stress: those of bent flexures, larger where flexures are not bent."""
         loads, plate_mm = self._end_loads(self.driven.unit_displacement, large=False), self.mechanism.plate_mm
         misused, every, stress = 0.0, 0.0, 0.0
         for span, own in zip(self.spans, self.segments, strict=True):
@@ -182,18 +182,19 @@ class MechanismFrame:
 
     @property
     def force_error(self) -> float:
-        """Relative model error of the force: of the hinge tables, the width effect, and what is not bent."""
+        """Relative error of the force, from the hinge tables, the width effect, and energy outside bending."""
         return self._errors[0]
 
     @property
     def stress_error(self) -> float:
-        """Relative model error of the stress in the flexures."""
+        """Relative error of the stress in the flexures."""
         return self._errors[1]
 
     def _end_loads(self, moved: Array, *, large: bool) -> Array:
         """Loads at the ends of all segments.
 
-        Small displacements leave the axes of every segment where they are: loads are those of a tiny share of them.
+        For small displacements the axes of the segments do not turn: the loads are computed for a tiny fraction and
+        scaled.
         """
         share = 1.0 if large else _TINY * self._size_mm / max(float(np.abs(moved).max()), _TINY)
         return np.asarray(self.frame.end_loads(share * moved) / share)

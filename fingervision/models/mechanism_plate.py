@@ -143,7 +143,7 @@ class MechanismPlate:
 
     @property
     def stress_error(self) -> float:
-        """Relative model error of the stress in the flexures: of the mesh."""
+        """Relative error of the stress in the flexures, from the mesh."""
         return _STRESS_ERROR
 
     def touch_input_mm(self) -> dict[str, float]:

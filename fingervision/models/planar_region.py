@@ -129,7 +129,7 @@ class PlanarRegion:
 
 @lru_cache(maxsize=_MOST_KEPT)
 def _loops_of(steps: tuple[tuple[bool, Shape], ...], marks_mm: tuple[Point, ...]) -> tuple[Loop, ...]:
-    """Outline of a body; kept, because every kind of model of a drawing asks for it."""
+    """Outline of a body; cached, because every kind of model of a drawing uses it."""
     return PlanarRegion(steps, marks_mm)._traced()  # noqa: SLF001 (its own class)
 
 

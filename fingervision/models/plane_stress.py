@@ -155,7 +155,7 @@ class PlaneStressPlate:
         return self._assembled(elements, at_rest=not displacement_mm.any()), self._collected(deformation, stress)
 
     def nodal_force_n(self, displacement_mm: Array) -> Array:
-        """Nodal forces of the deformed plate alone, a tenth of the work."""
+        """Nodal forces of the deformed plate without the tangent stiffness, at a tenth of the cost."""
         return self._collected(*self._deformed(displacement_mm))
 
     def _deformed(self, displacement_mm: Array) -> tuple[Array, Array]:
@@ -171,7 +171,7 @@ class PlaneStressPlate:
         return gradient + np.eye(2), np.asarray(strain @ self._law[:, 0])
 
     def _collected(self, deformation: Array, stress: Array) -> Array:
-        """Nodal forces: slopes times the first Piola-Kirchhoff stress."""
+        """Nodal forces: derivatives of the shape functions times the first Piola-Kirchhoff stress."""
         slopes, weights = self._slopes
         triangles, points = weights.shape
         sx, sy, txy = (stress[..., k, None] * weights[..., None] for k in range(3))
@@ -183,7 +183,7 @@ class PlaneStressPlate:
         )
 
     def _assembled(self, elements: Array, *, at_rest: bool) -> csr_matrix:
-        """Sum of the triangles' matrices; their places among the entries are worked out where they are used again."""
+        """Sum of the triangles' matrices; the positions of their entries are computed once."""
         shape = (self.unknowns, self.unknowns)
         if at_rest:
             unknowns = self.unknowns_of_triangles
@@ -194,7 +194,7 @@ class PlaneStressPlate:
 
     @cached_property
     def _pattern(self) -> tuple[Indices, Indices, Indices]:
-        """Place of every triangle's entries in the matrix, and the matrix's columns and row starts."""
+        """Position of every triangle's entries in the matrix, and the matrix's columns and row starts."""
         unknowns = self.unknowns_of_triangles
         key = np.repeat(unknowns, 12, axis=1).ravel() * self.unknowns + np.tile(unknowns, (1, 12)).ravel()
         kept, place = np.unique(key, return_inverse=True)

@@ -6,8 +6,8 @@ Corrections of the published equations, each with its reason:
 * (10) gives 135.15 degrees and (13) 135 degrees for what one drawing must state once; the angles come from the drawing.
 * (12) uses T_12, which is never defined; it must carry the compliance from O1 to O2, as T_O2 does.
 * (14) has C_2A on both sides; the right-hand one must be C_12.
-* (15), K = 2 C^-1, holds for the entry along the drive only while the shuttle is kept from moving sideways and turning,
-  which the other half does: 2 (C^-1)_yy, and not 2 / C_yy of a shuttle that is free.
+* (15), K = 2 C^-1, holds for the entry along the drive only while the shuttle is kept from moving sideways and
+  rotating, which the other half does: 2 (C^-1)_yy, instead of 2 / C_yy of a free shuttle.
 
 The links are elastic too, as Timoshenko bars; `rigid_links` gives the published model with elastic hinges only, which
 has 0.9 % more slope and some 10 % more force for the published gripper.

@@ -58,7 +58,7 @@ class TableModel:
 
     @cached_property
     def _symmetric(self) -> bool:
-        """Whether the fingers are mirror images, as they are where the table knows the gap alone."""
+        """Whether the fingers are mirror images, which is assumed where the table has the gap only."""
         return bool(np.array_equal(self.left_mm, -self.right_mm))
 
     @cached_property

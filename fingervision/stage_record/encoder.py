@@ -49,9 +49,9 @@ FEWEST_SINGLE = 3
 def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]:
     """Estimate the standard uncertainty of one recorded input, and the encoder's step, from the record itself.
 
-    High-order differences of a smooth motion vanish, so that what they leave is noise. A straight motion vanishes at a
-    lower order than an oscillation, so the smallest estimate over the orders is used. Their median is robust against
-    reversals.
+    High-order differences of a smooth motion vanish, so that what they leave is noise. For a straight motion a low
+    order is sufficient, for an oscillation a higher one is needed; the smallest estimate over the orders is used. Their
+    median is robust against reversals.
 
     Returns
     -------

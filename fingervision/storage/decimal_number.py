@@ -1,4 +1,7 @@
-"""A number as tables have it: decimal, in ASCII; Python's own reading takes 1_0 for 10, and digits of other scripts."""
+"""Numbers in tables: decimal, in ASCII.
+
+Python's own conversion would also accept 1_0 as 10, and digits of other scripts.
+"""
 
 from collections.abc import Iterable
 
@@ -26,6 +29,6 @@ def decimal_number(cell: str) -> float:
 
 
 def are_decimal(cells: Iterable[str]) -> bool:
-    """Whether Python's reading of these cells, where it succeeds, is a table's."""
+    """Whether the cells, if Python can convert them, are decimal numbers as in tables."""
     joined = "".join(cells)
     return "_" not in joined and joined.isascii()

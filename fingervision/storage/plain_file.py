@@ -28,5 +28,5 @@ def plain(path: Path) -> Path:
 
 
 def why(error: Exception) -> str:
-    """Words of an error for a sentence that names the file itself: without the system's number and path."""
+    """Reason of a system error, without its number and path, for a sentence that names the file itself."""
     return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)

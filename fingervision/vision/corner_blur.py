@@ -1,4 +1,4 @@
-"""The half-level of a blurred corner: how far inside its vertex it runs."""
+"""The half-level contour of a blurred corner: its distance from the vertex."""
 
 from functools import lru_cache
 from math import cos, erf, exp, pi, sin, sqrt, tan
@@ -20,9 +20,9 @@ FALL = 0.4
 
 
 def corner_half_level(beside: Floats, radius: Floats, turn: float, blur: float) -> Floats:
-    """Depth of the half-level of a rounded, blurred corner, from the vertex of its sides along its bisector.
+    """Distance of the half-level of a rounded, blurred corner from the vertex of its sides, along its bisector.
 
-    What the fillet and the blur do to the depth are joined in square: right for a sharp corner, and at the middle of a
+    The effects of fillet and blur are added in quadrature, which is right for a sharp corner and at the middle of a
     fillet.
 
     Parameters
@@ -44,11 +44,11 @@ def corner_half_level(beside: Floats, radius: Floats, turn: float, blur: float) 
 
 
 def corner_retreat(turn: float) -> float:
-    """Distance of the half-level from the vertex of a blurred sharp corner, along its bisector, in sigma.
+    """Distance of the half-level from the vertex of a blurred sharp corner, along its bisector, in units of sigma.
 
-    A point of depth a (in sigma) inside both sides of a wedge whose sides turn by theta sees the share
-    Phi(a) - 2 T(a, tan(theta / 2)) of it, T being Owen's function (Ann. Math. Stat. 27, 1956,
-    doi:10.1214/aoms/1177728074); the half-level is where this is one half.
+    At a depth a (in sigma) inside both sides of a wedge whose sides turn by theta, the blurred coverage is Phi(a) - 2
+    T(a, tan(theta / 2)), with T Owen's function (Ann. Math. Stat. 27, 1956, doi:10.1214/aoms/1177728074); the
+    half-level is where it equals one half.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def _retreat(steps: int) -> float:
 
 
 def _share(depth: float, turn: float) -> float:
-    """Share of a wedge that a point at a depth inside both of its sides sees."""
+    """Blurred coverage of a wedge at a point of equal depth inside both of its sides."""
     width = 0.5 * turn / MIDPOINTS
     owen = sum(exp(-0.5 * (depth / cos((k + 0.5) * width)) ** 2) for k in range(MIDPOINTS)) * width / (2.0 * pi)
     return 0.5 * (1.0 + erf(depth / sqrt(2.0))) - 2.0 * owen

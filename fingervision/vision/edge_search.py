@@ -149,7 +149,7 @@ def profile(
 
 
 def candidates(found: Profile) -> list[StepCandidate]:
-    """Steps in a profile, in order of position."""
+    """Candidate edges in a profile, in order of position."""
     level = found.level
     if level.size < 5:
         return []

@@ -91,9 +91,9 @@ def fit_finger_end(points: OutlinePoints, start: Floats, origin: Floats, u_prior
 
 
 def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_prior: Floats) -> FingerEnd:
-    """The same fit, begun again with other radii where it sets points aside: a wrong fillet makes dust of its corner.
+    """Repeat the fit from other radii where it rejects points, because a wrong fillet makes its corner look like dust.
 
-    The first guess of a radius takes the corner for a right one, which that of a tapered finger is not.
+    The initial estimate of a radius assumes a right-angled corner, which a tapered finger does not have.
     """
     best = fit_finger_end(points, start, origin, u_prior)
     if np.count_nonzero(best.robust <= 0.0) < FEWEST_ASIDE or best.misfit > NO_SHAPE:

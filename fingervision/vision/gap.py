@@ -172,9 +172,9 @@ def measure_gap(
 
 
 def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> list[MeasuringPoint]:
-    """Both measuring points as those of straight sides with corners; none where either finger has none.
+    """Both measuring points by straight sides with corners; None where either finger has no such shape.
 
-    Both in the same way: what a method does to a shape, it does to either.
+    Both fingers use the same method, so that its systematic errors are equal.
     """
     found = [polygonal_measuring_point(p, below_tip_px, shared) for p in points]
     return [own for own in found if own is not None] if None not in found else []

@@ -1,11 +1,11 @@
-"""Edges of one side of a body that are blurred otherwise than its others: a shadow, or glare, lies along them.
+"""Sides of a body whose edges have another blur than its other sides: a shadow, or glare, lies along them.
 
-A narrow shadow along an edge is a second step of the same profile. With a share q of the contrast, w beyond the edge,
-it moves the one blurred step that is fitted by q w, and adds q (1 - q) w^2 to the square of its blur (mean and variance
-of a mixture of two steps). Optics and defocus blur all sides alike; motion blurs opposite sides alike, moving neither.
-What is left, a difference D of one side alone, tells that its edges may lie off by sqrt(|D| q / (1 - q)): sqrt(|D|)
-where the shadow is half as dark as the body, twice that at four fifths. The side's whole offset is then uncertain by
-sqrt(|D|).
+A narrow shadow along an edge is a second step in the same profile. With a fraction q of the contrast, at a distance w
+beyond the edge, it displaces the single fitted step by q w, and adds q (1 - q) w^2 to the square of its blur (mean and
+variance of a mixture of two steps). Optics and defocus blur all sides equally; motion blurs opposite sides equally, and
+displaces neither. A remaining difference D of one side's squared blur means that its edges may be displaced by sqrt(|D|
+q / (1 - q)): sqrt(|D|) if the shadow is half as dark as the body, twice that at four fifths. The offset of this side
+therefore has the standard uncertainty sqrt(|D|).
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ OPTICS = 0.05
 
 
 def sides_of(middles: Array, normals: Array) -> NDArray[np.intp]:
-    """Number the straight stretch that every chunk belongs to, shape (m,); chunks come in order along the outline.
+    """Number of the straight stretch to which each chunk belongs, shape (m,); chunks are in order along the outline.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def sides_of(middles: Array, normals: Array) -> NDArray[np.intp]:
 
 
 def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: Array) -> Array:
-    """What the blur of each side leaves open of where its edges are, one standard uncertainty a column, shape (m, k).
+    """Uncertainty of the edges' positions from each side's blur: one standard uncertainty per column, shape (m, k).
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
 
 
 def _excess(mean: Array, variance: Array, normal: Array) -> Array:
-    """How far each side's square of the blur lies off where a shadow beside it is why, 0 where nothing says so, (k,).
+    """Excess of each side's squared blur that a shadow would explain; 0 where nothing suggests one, (k,).
 
     Parameters
     ----------

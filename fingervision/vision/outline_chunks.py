@@ -1,4 +1,4 @@
-"""The edge in every stretch of a body's outline: where it is seen against where it is drawn, how blurred, how surely.
+"""Edge in every stretch of a body's outline: its measured offset from the drawing, its blur, and its uncertainty.
 
 The straight stretches of an outline are divided into chunks about a millimetre long. In each chunk one blurred step is
 fitted to all pixels near the edge, I = a + b Phi(-(s - d) / sigma_e), with s the pixel's distance along the outward

@@ -1,4 +1,4 @@
-"""A finger's end as a convex chain of straight sides whose corners are rounded: where its tip and inner edge lie."""
+"""A finger's end as a convex chain of straight sides with rounded corners: position of its tip and inner edge."""
 
 from math import cos, pi, sin, sqrt, tan
 from typing import NamedTuple
@@ -10,9 +10,9 @@ OVERLAP_PX = 0.5
 
 
 class Side(NamedTuple):
-    """A straight side: a point on it and the direction in which the chain follows it (radians, x towards y).
+    """A straight side: a point on it, and the direction in which the chain follows it (radians, x towards y).
 
-    x runs inwards across the finger and y to its root; the chain runs up the outer flank and down the inner one.
+    x runs inwards across the finger, y towards its root; the chain runs up the outer flank and down the inner one.
     """
 
     x: float
@@ -20,16 +20,16 @@ class Side(NamedTuple):
     angle: float
 
     def shifted(self, px: float) -> "Side":
-        """The same side, moved outwards by so much."""
+        """Return the side displaced outwards by a distance."""
         return Side(self.x + px * sin(self.angle), self.y - px * cos(self.angle), self.angle)
 
     def turned(self, radians: float) -> "Side":
-        """The same side, turned about its point."""
+        """Return the side rotated about its point."""
         return Side(self.x, self.y, self.angle + radians)
 
 
 class ReadOff(NamedTuple):
-    """Tip and inner edge, the change of the edge per pixel to the root, and the sides that carry them."""
+    """Tip and inner edge, the change of the edge per pixel towards the root, and the sides that determine them."""
 
     tip: float
     apex: float
@@ -39,7 +39,7 @@ class ReadOff(NamedTuple):
 
 
 class Corner(NamedTuple):
-    """Vertex of two sides, the direction from it into the finger, and by how much the chain turns there (radians)."""
+    """Vertex of two sides, the direction from it into the finger, and the angle between the sides (radians)."""
 
     vertex: tuple[float, float]
     inwards: tuple[float, float]
@@ -47,7 +47,7 @@ class Corner(NamedTuple):
 
 
 class Polygon(NamedTuple):
-    """Sides from the outer to the inner flank, a radius for the corner after each, and which side is a level top."""
+    """Sides from the outer to the inner flank, the radius of the corner after each, and which side is a level top."""
 
     sides: list[Side]
     radii: list[float]
@@ -68,7 +68,7 @@ class Polygon(NamedTuple):
         return found
 
     def read_off(self, below_tip_px: float) -> ReadOff | None:
-        """Tip, and inner edge so far below it; None where the chain has none."""
+        """Tip, and inner edge at the measuring height below it; None where the chain has none."""
         corners = self.corners()
         if corners is None:
             return None
@@ -83,7 +83,7 @@ class Polygon(NamedTuple):
         return None if edge is None else ReadOff(height, apex, edge[0], edge[1], frozenset((*top, *edge[2])))
 
     def _tip(self, ends: "_Ends") -> tuple[float, float, tuple[int, ...], int] | None:
-        """Height, place across, the sides that carry it, and the side from which on the inner edge may be."""
+        """Height, position across, the sides that form the tip, and the side from which the inner edge is searched."""
         if self.level is not None:
             (x0, y0), (x1, y1) = ends.first[self.level], ends.last[self.level]
             return 0.5 * (y0 + y1), 0.5 * (x0 + x1), (self.level,), self.level
@@ -94,7 +94,7 @@ class Polygon(NamedTuple):
         return None
 
     def _edge(self, ends: "_Ends", height: float, first: int) -> tuple[float, float, tuple[int, ...]] | None:
-        """Where the inner side crosses a height, its slope there, and the sides that carry it."""
+        """Position and slope of the inner side at a height, and the sides that determine it."""
         for k in range(first, len(self.sides)):
             side, (_, y0), (_, y1) = self.sides[k], ends.first[k], ends.last[k]
             rise = sin(side.angle)
@@ -110,7 +110,7 @@ class Polygon(NamedTuple):
 
 
 class _Ends(NamedTuple):
-    """Where every side begins and ends between its corners' fillets, and the fillets' centres."""
+    """Ends of every side between the fillets of its corners, and the fillets' centres."""
 
     first: list[tuple[float, float]]
     last: list[tuple[float, float]]
@@ -118,7 +118,7 @@ class _Ends(NamedTuple):
 
     @classmethod
     def of(cls, sides: list[Side], corners: list[Corner], radii: list[float]) -> "_Ends | None":
-        """From sides, corners and radii; None where two fillets overlap."""
+        """Make a polygon from sides, corners and radii; None where two fillets overlap."""
         first, last, centres = [], [], []
         for k, side in enumerate(sides):
             c, s = cos(side.angle), sin(side.angle)

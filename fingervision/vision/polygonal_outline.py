@@ -1,8 +1,8 @@
-"""Step 6 for fingers with cut corners: the end of a finger as a chain of straight sides with corners between them.
+"""Step 6 for fingers with chamfered corners: the end of a finger as a chain of straight sides and corners.
 
-The outline's points are parted into straight runs. Blur bends the half-level at a corner, so points near one speak of
-its radius only, and a side is fitted to what lies farther away. The tip and the inner edge are read off the polygon of
-these sides, its corners rounded by as much as their half-level shows.
+The outline's points are divided into straight runs. Blur rounds the half-level at a corner: points near it determine
+only its radius, and a side is fitted to points farther away. Tip and inner edge are those of the polygon of these
+sides, with corners rounded as their half-level shows.
 """
 
 from math import atan2, cos, hypot, pi, sin, sqrt, tan
@@ -59,7 +59,7 @@ FLATTEST = 3.0
 
 
 class _Fitted(NamedTuple):
-    """A side with its standard uncertainties (pixels across it, radians), and the mean square of its residuals."""
+    """A side with its standard uncertainties (pixels across it, radians), and its mean squared residual."""
 
     side: Side
     u_offset: float
@@ -68,7 +68,7 @@ class _Fitted(NamedTuple):
 
 
 def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:
-    """Tip and edge of a finger with straight sides and sharp or nearly sharp corners; None where it has none.
+    """Tip and edge of a finger with straight sides and (nearly) sharp corners; None for another shape.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def _has_straight_top(points: OutlinePoints) -> bool:
 
 
 def _chain(points: OutlinePoints, lowest: float) -> Ints:
-    """Numbers of the points in order: up the outer flank, across the top, down the inner flank."""
+    """Indices of the points in order: up the outer flank, across the top, down the inner flank."""
     parts = []
     for side, key in ((OUTER_SIDE, -points.y), (TIP_SIDE, points.x), (INNER_SIDE, points.y)):
         these = np.flatnonzero((points.side == side) & (points.y < lowest))
@@ -160,7 +160,7 @@ def _line(x: Floats, y: Floats, u: Floats) -> _Fitted:
 def _fitted(
     x: Floats, y: Floats, u: Floats, runs: list[Ints], blur: float
 ) -> tuple[list[_Fitted], list[float], list[float]] | None:
-    """Sides, the radii of the corners between them, and the radii's uncertainties; None where they are not convex."""
+    """Sides, the radii of their corners, and the radii's uncertainties; None where the sides are not convex."""
     fits = [_line(x[run], y[run], u[run]) for run in runs]
     radii = u_radii = [0.0] * (len(runs) - 1)
     for _pass in range(PASSES):
@@ -187,7 +187,7 @@ def _fitted(
 
 
 def _radius(x: Floats, y: Floats, u: Floats, corner: Corner, blur: float) -> tuple[float, float]:
-    """Likeliest radius of a corner by the points of its half-level, and its standard uncertainty."""
+    """Most probable radius of a corner from the points of its half-level, and its standard uncertainty."""
     (vx, vy), (nx, ny), turn = corner
     dx, dy = x - vx, y - vy
     near = np.hypot(dx, dy) < FARTHEST_PX
@@ -207,12 +207,12 @@ def _radius(x: Floats, y: Floats, u: Floats, corner: Corner, blur: float) -> tup
 
 
 def _bent_in_blurs(turn: float) -> float:
-    """How far along its sides a corner's blur is felt, in sigma."""
+    """Length along its sides over which a corner's blur matters, in units of sigma."""
     return BENT_IN_BLURS - LESS_IN_BLURS * max(0.0, 1.0 - 2.0 * turn / pi) / 0.75
 
 
 def _level(fits: list[_Fitted]) -> int | None:
-    """Which side is a level top, where one is: noise alone would choose the higher of its ends."""
+    """Index of a level top side, if there is one: otherwise noise would choose the higher of its ends."""
     for k in range(1, len(fits) - 1):
         u_angle = fits[k].u_angle * sqrt(max(fits[k].square, 1.0))  # infinite: a top too short to lean
         corners = Polygon([fit.side for fit in fits[k - 1 : k + 2]], [0.0, 0.0], None).corners()

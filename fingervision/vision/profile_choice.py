@@ -194,10 +194,10 @@ def with_profile(
 def _without_shadow(
     upright: GreyImage, edges: EdgePoints, light: Floats, ramps: list[ProfileFit], fading: list[ProfileFit], bins: int
 ) -> EdgePoints:
-    """Edges without a soft shadow, whose light comes back between a straight line and an exponential.
+    """Edges corrected for a soft shadow, whose light recovers between linearly and exponentially.
 
-    The edge lies between the places that the two models give, in proportion to the squares that they leave beyond
-    chance; what is moved towards the model that leaves more is its own standard uncertainty.
+    The edge lies between the positions of these two models, weighted by the squares that each leaves beyond chance. Its
+    displacement towards the model that leaves more is taken as its own standard uncertainty.
     """
     squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
     if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
@@ -234,7 +234,7 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
 
 
 def _is_symmetric(flanks: list[tuple[_Profile, float, float]], steps: list[ProfileFit]) -> bool:
-    """Whether the profiles of both flanks are those of optics that spread light alike to both sides."""
+    """Whether the profiles of both flanks could come from optics that spread light symmetrically."""
     squares = left = 0.0
     for (profile, weight, blur), step in zip(flanks, steps, strict=True):
         contrast = float(np.ptp(profile.light))

@@ -2,8 +2,8 @@
 
 Weighted least squares over the offsets of all chunks of the outline (`outline_chunks`) gives one rigid motion; Tukey's
 weights suppress chunks whose edge is covered. Scatter of the chunks beyond their own noise widens the covariance. Edge
-bias, size, and the offset of every side that a shadow may lie along (`one_sided_blur`) are unknowns beside the motion,
-each with its standard uncertainty as prior.
+bias, size, and the offset of every side that may have a shadow (`one_sided_blur`) are fitted with the motion, each with
+its standard uncertainty as prior.
 """
 
 from collections.abc import Sequence
@@ -181,8 +181,8 @@ def _rigid(
 ) -> tuple[Array, Array, Array, Array, tuple[float, float]] | None:
     """Small rigid motion from the chunks' offsets, its covariance, the effect of shared errors, and the size's error.
 
-    None where the offsets do not determine the motion. Shared errors: columns for edges farther out and a larger body,
-    shape (3, 2), and the covariance by shadows, shape (3, 3).
+    None where the offsets do not determine the motion. Columns for the common errors of edge position and body size,
+    shape (3, 2), and the covariance from shadows, shape (3, 3).
     """
     used = edges.used
     arm = chunks.middles[:, used] - about[:, None]

@@ -135,7 +135,7 @@ class StraightEdges:
 
 
 class NoEdgeFitError(ValueError):
-    """The pixels do not determine such edges."""
+    """The pixels do not determine the requested edges."""
 
 
 def reach_px(blur_px: float) -> float:

@@ -1,7 +1,8 @@
-"""Straight runs in a chain of points: the best piecewise straight line under a price for every run.
+"""Division of a chain of points into straight runs: the best piecewise line with a penalty for every run.
 
-Dynamic programming over all ways to part the chain (Bellman & Roth, JASA 64, 1969, doi:10.1080/01621459.1969.10501038),
-with total least squares as the cost of a run, from the chain's cumulated moments. Points may be left out, at a price.
+Dynamic programming over all divisions of the chain (Bellman & Roth, JASA 64, 1969, doi:10.1080/01621459.1969.10501038),
+with total least squares as the cost of a run, computed from the chain's cumulative moments. Points may be left out, for
+a penalty each.
 """
 
 from typing import NamedTuple
@@ -23,12 +24,12 @@ MEDIAN_OF_CHI_SQUARE = 0.79
 
 
 class _Moments(NamedTuple):
-    """Cumulated sums of weights, places and their products, shape (n + 1, 6), and the places' own origin."""
+    """Cumulative sums of weights, positions and their products, shape (n + 1, 6), and the positions' origin."""
 
     sums: Floats
 
     def squares(self, first: Ints, last: Ints) -> Floats:
-        """Smallest sum of squared distances of points first to last (exclusive) from a straight line."""
+        """Smallest sum of squared distances from a straight line, for the points first to last (exclusive)."""
         w, x, y, xx, xy, yy = (self.sums[last] - self.sums[first]).T
         weight = np.maximum(w, 1e-300)
         xx, xy, yy = xx - x * x / weight, xy - x * y / weight, yy - y * y / weight
@@ -36,7 +37,7 @@ class _Moments(NamedTuple):
 
 
 def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
-    """Part a chain of points into straight runs.
+    """Divide a chain of points into straight runs.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
 
 
 def _joined(runs: list[Ints], terms: Floats, noise: float) -> list[Ints]:
-    """The same runs, those on one straight line joined: what was left out between them was dust."""
+    """Join runs on one straight line: the points left out between them were dust."""
     joined: list[Ints] = []
     for run in runs:
         if joined:

@@ -1,7 +1,7 @@
-"""An edge spread alike to both sides by optics of any shape: how much of a mean profile this leaves unexplained.
+"""Fit of an edge blurred symmetrically by any optics: how much of a mean profile it leaves unexplained.
 
-A disc of defocus, motion, or a halo spreads a step of light into a profile that is odd about the edge, whatever its
-shape. Glare on one side and a shadow on the other are not: their profiles have an even part.
+A disc of defocus, motion, or a halo turns a step of light into a profile that is odd about the edge, whatever its
+shape. Glare on one side and a shadow on the other do not: their profiles have an even part.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ FARTHEST_PX = 1.0
 
 
 def symmetric_squares(t: Floats, value: Floats, weight: Floats, blur: float) -> float:
-    """Weighted squares that a step leaves whose spread is symmetric but of free shape.
+    """Weighted sum of squares left by a step with symmetric blur of free shape.
 
     Parameters
     ----------

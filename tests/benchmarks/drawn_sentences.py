@@ -50,7 +50,7 @@ def sentences(texts: Iterator[tuple[str, str]]) -> list[tuple[str, str]]:
     """Cut texts into sentences; sections of parameters, examples and code are left out."""
     found = []
     for place, text in texts:
-        prose = re.split(r"\n(?:Parameters|Returns|Raises|Yields|Examples)\n-{3,}", text)[0]
+        prose = re.split(r"\n(?:Parameters|Attributes|Returns|Raises|Yields|Examples)\n-{3,}", text)[0]
         for paragraph in re.split(r"\n\s*\n", prose):
             if ">>>" in paragraph or "::" in paragraph or paragraph.lstrip().startswith("|"):
                 continue

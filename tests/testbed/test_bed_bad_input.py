@@ -278,5 +278,5 @@ def test_a_bed_that_makes_no_sense_is_said(tmp_path: Path, text: str, sentence: 
 def test_a_bed_without_a_camera_or_a_scale_is_said(tmp_path: Path) -> None:
     config = tmp_path / "bed.toml"
     config.write_text('schema = 1\n[actuator]\nkind = "simulated"\n')
-    with pytest.raises(FingervisionError, match=r"A run must be seen, but the bed has no camera: add a \[camera\]"):
+    with pytest.raises(FingervisionError, match=r"A run must be filmed, but the bed has no camera: add a \[camera\]"):
         run(tmp_path, steps(MOVE), bed_name=str(config))

@@ -58,7 +58,7 @@ class MeasuringChain:
 
     @cached_property
     def _stages(self) -> tuple[tuple[DriveEffect, ...], tuple[PointEffect, ...]]:
-        """Effects of the drive, and those of mechanism and camera, each in order."""
+        """Effects of the drive, and effects of mechanism and camera, each in the catalogue's order."""
         effects = self.effects.values()
         drives = tuple(effect for effect in effects if isinstance(effect, DriveEffect))
         return drives, tuple(effect for effect in effects if isinstance(effect, PointEffect))

@@ -1,4 +1,4 @@
-"""Search beside random effects: gains that differ from run to run, and a map of position errors."""
+"""Search with random effects added: gains that differ from run to run, and a map of position errors."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,8 +31,9 @@ Effected = TypeVar("Effected", bound=RunGains | PositionMap)
 def beside_gains(state: Searched, look: Look) -> Searched:
     """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one.
 
-    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name.
-    Where further effects are no far likelier than they are, they stay: a name claims more than a scatter does.
+    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name. If
+    further effects are not far more probable than such gains, the gains are kept: naming an effect claims more than
+    stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
@@ -119,9 +120,9 @@ def beside_map(state: Searched, look: Look) -> Searched:
 def _likelier(
     found: Findings, estimated: Callable[[Problem, Explanation], tuple[Effected, float]], least: float
 ) -> tuple[Explanation | None, Effected] | None:
-    """Find a random effect beside few effects that gains `least` over the answer, with these; None without one.
+    """Find a random effect, added to few effects, that gains `least` over the answer; return it with these, or None.
 
-    Two or three effects bend to much: to a map that was read from one side, or to runs of different gain.
+    Two or three effects can imitate much: a map that was measured from one side only, or runs of different gain.
     """
     problem = found.problem
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
@@ -143,13 +144,16 @@ def _likelier(
 
 
 def _line(problem: Problem) -> Explanation:
-    """Fit a straight line over the input, as an offset and a ratio where both can be named; maps have none."""
+    """Fit a straight line over the input, as an offset and a ratio where both can be named.
+
+    With a map there is no such line.
+    """
     names = tuple(name for name in ("rest_gap_error", "lever_ratio_error") if name in problem.effects)
     return fit(problem, names, {name: {} for name in names}, iterations=5) if names else problem.nothing()
 
 
 def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """Add the columns of a random effect to those that are refitted beside every explanation."""
+    """Add the columns of a random effect to those that are refitted for every explanation."""
     drawn = problem.whitener.drawing
     columns = effect.columns_mm if drawn is None else np.hstack([effect.columns_mm, drawn])
     return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=columns)))

@@ -82,7 +82,7 @@ def refitted_search(
 
 
 def _over_the_ends(state: Searched, look: Look) -> Searched:
-    """Search along a path with overshoots, and keep it where an effect with memory then explains the data better."""
+    """Search along a path with overshoots, and keep the result where an effect with memory then fits better."""
     data = state.data.with_overshoots()
     if data is state.data:
         return state
@@ -97,7 +97,7 @@ def _over_the_ends(state: Searched, look: Look) -> Searched:
 
 
 def _common_offset(state: Searched, look: Look) -> Searched:
-    """Search once more for a constant that the runs share, where their offsets had taken it.
+    """Search again for a constant common to all runs, which run offsets had absorbed.
 
     Runs with nearly the same offset share a cause; the spread of their offsets is then limited to their departure from
     the mean.
@@ -119,7 +119,7 @@ def _common_offset(state: Searched, look: Look) -> Searched:
 
 
 def _beside_drawing(state: Searched, look: Look) -> Searched:
-    """Redraw a gripper whose numbers are uncertain, and search again until neither changes the other."""
+    """Refit the uncertain dimensions of the drawing, and search again, until neither changes the other."""
     if not state.data.refit.moved:
         return state
     for _ in range(MOST_SEARCHES - 1):
@@ -135,7 +135,7 @@ def _beside_drawing(state: Searched, look: Look) -> Searched:
 
 
 def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
-    """Drop effects that are not needed, estimate the map and the gains, and give every parameter its posterior."""
+    """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, without_unneeded_effects(state.data, state.found)
     found = with_simpler_parts(data, found)
     best, posterior = settled(found.problem, found.best, rng)

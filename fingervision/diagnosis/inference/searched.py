@@ -1,4 +1,4 @@
-"""A search that was made, and how searches are made."""
+"""A finished search, and the settings of searches."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +13,7 @@ from fingervision.diagnosis.input.observations import Observations
 
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
-    """Estimate the noise on what an explanation leaves; on the whole disagreement where there is none yet."""
+    """Estimate the noise from the residual of an explanation, or from the disagreement where there is none yet."""
     values = {} if explanation is None else explanation.values
     free = 0 if explanation is None else explanation.free
     return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)

@@ -136,7 +136,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
     """Subtract each run's deviation from the mean of all runs; a common constant remains, if it is one.
 
-    Runs that were zeroed by chance have a mean that is not zero, by as much as their scatter lets it be.
+    If runs were zeroed at random, their mean differs from zero by an amount that their scatter allows.
     """
     means = np.array([values[run].mean() for run in runs])
     common = float(means.mean())

@@ -155,7 +155,7 @@ def pure_error(
 
 
 def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
-    """Take each run's own zero out, where it is most of the scatter; also how many zeros were estimated."""
+    """Subtract each run's own zero where it is most of the scatter; return also how many zeros were estimated."""
     if len(runs) < 2 or not groups:
         return values, 0
     number = np.zeros(values.size, dtype=np.intp)

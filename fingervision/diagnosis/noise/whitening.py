@@ -148,7 +148,7 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
+        """Return G: r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads allowed."""
         known = self._metrics.get(sigma_mm)
         if known is not None:
             return known

@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.gauges import common_keys
-from fingervision.gauges.edge_follower import (
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Distance, Position
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.straight_edge import (
     CONTRAST_FLOOR,
     GUARD,
     LARGEST_BLUR_PX,
@@ -19,10 +23,6 @@ from fingervision.gauges.edge_follower import (
     MOST_OF_KNOWN,
     MOST_TIMES,
 )
-from fingervision.gauges.picture import Picture
-from fingervision.gauges.quantities import Distance, Position
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
 from fingervision.storage.toml_section import Section
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
 from fingervision.vision.response_shift import edge_shift_px

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 
-from fingervision.gauges import common_keys
-from fingervision.gauges.edge_follower import Axes, EdgeFollower, NotFound
+from fingervision.gauges.common_keys import EdgeKeys, edge_keys
+from fingervision.gauges.edge_follower import EdgeFollower
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Position
 from fingervision.gauges.reading import Mark, Reading
 from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.straight_edge import Axes, NotFound
 from fingervision.storage.toml_section import Section
 
 KEYS = ("x_px", "y_px", "direction_deg", "length_px", "reach_px", "polarity")
@@ -15,14 +16,8 @@ QUANTITIES = (("position", "length"),)
 
 
 @dataclass(frozen=True, slots=True)
-class EdgeSpec:
-    """Settings of an edge gauge: centre, measuring direction, length, and how far the edge may move."""
-
-    middle_px: tuple[float, float]
-    direction_rad: float
-    length_px: float
-    reach_px: float
-    polarity: int
+class EdgeSpec(EdgeKeys):
+    """Settings of an edge gauge; its direction is that in which the position is measured."""
 
     def follower(self) -> "FollowedEdge":
         """Begin a recording."""
@@ -31,13 +26,7 @@ class EdgeSpec:
 
 def read(section: Section) -> EdgeSpec:
     """Read the keys of one gauge."""
-    return EdgeSpec(
-        common_keys.middle(section),
-        common_keys.angle(section, "direction_deg"),
-        common_keys.length(section),
-        common_keys.reach(section),
-        common_keys.polarity(section),
-    )
+    return EdgeSpec(*edge_keys(section, "direction_deg"))
 
 
 class FollowedEdge:

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from math import atan, cos, hypot, pi, sin, sqrt
 
-from fingervision.gauges import common_keys
-from fingervision.gauges.edge_follower import Axes, EdgeFollower, NotFound
+from fingervision.gauges.common_keys import EdgeKeys, edge_keys
+from fingervision.gauges.edge_follower import EdgeFollower
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Angle, Position
 from fingervision.gauges.reading import Mark, Reading
 from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.straight_edge import Axes, NotFound
 from fingervision.storage.toml_section import Section
 
 KEYS = ("x_px", "y_px", "angle_deg", "length_px", "reach_px", "polarity")
@@ -18,14 +19,8 @@ TURN_AT = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class LineSpec:
-    """Settings of a line gauge: centre, direction, length, and how far the line may move."""
-
-    middle_px: tuple[float, float]
-    angle_rad: float
-    length_px: float
-    reach_px: float
-    polarity: int
+class LineSpec(EdgeKeys):
+    """Settings of a line gauge; its direction is that of the line itself."""
 
     def follower(self) -> "FollowedLine":
         """Begin a recording."""
@@ -34,13 +29,7 @@ class LineSpec:
 
 def read(section: Section) -> LineSpec:
     """Read the keys of one gauge."""
-    return LineSpec(
-        common_keys.middle(section),
-        common_keys.angle(section, "angle_deg"),
-        common_keys.length(section),
-        common_keys.reach(section),
-        common_keys.polarity(section),
-    )
+    return LineSpec(*edge_keys(section, "angle_deg"))
 
 
 class FollowedLine:
@@ -51,9 +40,9 @@ class FollowedLine:
     """
 
     def __init__(self, spec: LineSpec) -> None:
-        self._spec = spec
+        self._angle_rad = spec.direction_rad
         # The direction across it is 90 degrees behind, so that s runs along the line as it was drawn.
-        axes = Axes(*spec.middle_px, spec.angle_rad - 0.5 * pi)
+        axes = Axes(*spec.middle_px, spec.direction_rad - 0.5 * pi)
         self._fixed = axes
         self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, spec.polarity)
 
@@ -69,7 +58,7 @@ class FollowedLine:
         angle = axes.direction_rad + 0.5 * pi - atan(found.slope)
         u_angle = found.u_slope / (1.0 + found.slope**2)
         place, u_place = _crossing(self._fixed, axes, found.position_px, found.slope), found.u_position_px
-        turned = angle - self._spec.angle_rad
+        turned = angle - self._angle_rad
         across = (
             cos(axes.direction_rad - self._fixed.direction_rad)
             + sin(axes.direction_rad - self._fixed.direction_rad) * found.slope
@@ -81,7 +70,7 @@ class FollowedLine:
         u_position = sqrt(max(variance, 0.0)) / max(abs(across), 0.1)
         quantities = (
             Position(place, self._fixed.direction_rad, u_position, found.dark_side, found.u_response_px),
-            Angle(place, self._spec.angle_rad + _wrapped(turned), u_angle),
+            Angle(place, self._angle_rad + _wrapped(turned), u_angle),
         )
         if abs(found.slope) > TURN_AT:
             self._turn(found.position_px, found.slope)

@@ -189,7 +189,7 @@ class FollowedPatch:
         return part, corner, np.array([left + match.x_px, top + match.y_px, turn])
 
     def _turned(self, turn: float) -> Template:
-        """The template, turned as the patch was in the last frame."""
+        """The template, rotated as the patch was in the previous frame."""
         assert self._template is not None  # noqa: S101 - there is a reference
         assert self._around is not None  # noqa: S101 - likewise
         if abs(turn - self._template_turn) > TURN_AT:

@@ -4,7 +4,8 @@ import numpy as np
 
 from fingervision.inspection.blocks import BLOCK_PX, BLOCKY, HEAVY
 from fingervision.inspection.finding import Finding, weighed, without
-from fingervision.inspection.sample import CAMERA_NOISE, Look, Sample
+from fingervision.inspection.look import CAMERA_NOISE, Look
+from fingervision.inspection.sample import Sample
 
 REMEDY = "Record losslessly (raw or FFV1; PNG or TIFF for pictures), or at several times the bit rate."
 FORMULA = (

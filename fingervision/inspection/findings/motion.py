@@ -4,8 +4,9 @@ import numpy as np
 
 from fingervision.domain.status import Status
 from fingervision.inspection.finding import MOSTLY_REFUSED, Finding, refusing, weighed, without
+from fingervision.inspection.look import Look
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX
-from fingervision.inspection.sample import Look, Sample
+from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_choice import MOTION_RADIUS_PX
 
 REMEDY = "Expose shorter (with more light, or flashes), or move slower while frames are taken."

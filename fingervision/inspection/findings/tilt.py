@@ -8,7 +8,8 @@ import numpy as np
 from calib.limits import Limits, rectangular
 from calib.measured_scale import Calibration
 from fingervision.inspection.finding import Finding, weighed, without
-from fingervision.inspection.sample import Look, Sample
+from fingervision.inspection.look import Look
+from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_lines import INNER, ROWS
 
 TURN = "Turn the camera about its own axis until the fingers stand straight in the picture."

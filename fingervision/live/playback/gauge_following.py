@@ -13,9 +13,9 @@ from fingervision.gauges.gauge_file import Gauge
 from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.reading import Mark, Reading, unread
 from fingervision.gauges.recording import cells_of
-from fingervision.gauges.status import MEANING, GaugeStatus
+from fingervision.gauges.status import MEANING
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.playback import Playback
 from fingervision.measuring.frame_loop import Prepared, coded, prepared
@@ -112,8 +112,7 @@ class GaugeFollowing:
                 return
             readings: Sequence[Reading]
             if isinstance(item, LostFrame) or status in (Status.DAMAGED, Status.DUPLICATE):
-                words = item.words if isinstance(item, LostFrame) else ""
-                readings = [Reading(GaugeStatus(status.value), words=words)] * len(gauges)
+                readings = unread(item, status, len(gauges))
             else:
                 if self.first is None:
                     self.first = item.index

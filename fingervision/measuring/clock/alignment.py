@@ -77,7 +77,7 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
-    """Let the gap creep, where that explains it better than chance would."""
+    """Allow the gap to creep, where that explains it better than chance would."""
     creeping = replace(motion, creeps=True)
     slow = fit(creeping, found.at, free_play=found.at.play_mm > 0.0)
     return (creeping, slow) if (found.squares - slow.squares) / slow.variance_mm2 > CREEP_GAIN else (motion, found)

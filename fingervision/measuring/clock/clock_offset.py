@@ -1,4 +1,4 @@
-"""One clock for a recording and a log, or why none was found."""
+"""The relation of the clocks of a recording and a log, or the reason why none was found."""
 
 from dataclasses import dataclass
 

@@ -138,9 +138,11 @@ def inflation(motion: Motion, at: Alignment) -> Array:
 
 
 def shift_by_turns(motion: Motion, found: Fit) -> Array:
-    """Change of offset, rate and play if all turns of the log went further by their uncertainty; shape (3,).
+    """Change of offset, rate and play (s, 1, mm) if all reversals of the log went further by their uncertainty.
 
-    In s, 1 and mm. A stage at one speed shows its play by how long it stands at a turn, and by nothing else.
+    Shape (3,).
+
+    At constant speed of the stage, only the duration of the gap's stop at a reversal shows the play.
     """
     path = motion.path
     drive = replace(path.drive, input_mm=path.turned_mm)
@@ -171,7 +173,7 @@ class _Solved:
 
 
 def _solve(motion: Motion, at: Alignment) -> _Solved:
-    """Solve for scale and bend, the bend held small beside the scale."""
+    """Solve for scale and bends, with a prior that keeps the bends small compared with the scale."""
     design = motion.design(at)
     white_design, white_gap = motion.whitened(design), motion.whitened(motion.gap_mm)
     straight = np.linalg.lstsq(white_design[:, :2], white_gap, rcond=None)[0]

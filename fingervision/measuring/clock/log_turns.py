@@ -1,4 +1,4 @@
-"""The turns of a logged motion, and how well they are known."""
+"""Reversals of a logged motion, with their uncertainty."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ from fingervision.domain.effect import Array
 
 
 def turns(input_mm: Array, least_mm: float) -> NDArray[np.intp]:
-    """Find the extremes from which a motion comes back by `least_mm` and more; shape (k,), in order."""
+    """Find the extremes from which a motion returns by `least_mm` or more; shape (k,), in order."""
     values = input_mm.tolist()
     found: list[int] = []
     high = low = 0
@@ -31,10 +31,10 @@ def turns(input_mm: Array, least_mm: float) -> NDArray[np.intp]:
 
 
 def turned(input_mm: Array, u_mm: Array, least_mm: float) -> Array:
-    """Push every turn out by the RMS of their uncertainty, and what lies within `least_mm` of it by less.
+    """Move every reversal outwards by the RMS of their uncertainty, and points within `least_mm` of it by less.
 
-    Smoothing, a curve between rows and an encoder's rounding flatten all turns alike, and a play remembers how far they
-    went: however many turns there are, their errors do not average out.
+    Smoothing, interpolation between rows and an encoder's rounding flatten all reversals in the same way, and the play
+    depends on how far they went. Their errors therefore do not average out, however many reversals there are.
 
     Parameters
     ----------

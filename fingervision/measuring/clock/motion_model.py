@@ -1,4 +1,4 @@
-"""The gap as a stage's log foretells it: behind a play, on another clock, through a bent line, with creep and noise."""
+"""Model of the gap from a stage's log: play, another clock, a line with bends, creep and noise."""
 
 from dataclasses import dataclass, field
 
@@ -106,7 +106,9 @@ class Motion:
         return np.asarray(self.time_s - at.offset_s - at.rate * (self.time_s - self.middle_s))
 
     def _behind_play(self, at: Alignment) -> tuple[Array, Array]:
-        """Input behind the play at the frames, and at the log's points; exact for a log of straight lines.
+        """Input after the play at the frames, and at the log's points.
+
+        Exact for a log that is linear between its points.
 
         Between two samples the input is monotone, so that the play operator is one clip of its state at the earlier.
         """
@@ -120,10 +122,11 @@ class Motion:
         return np.asarray(np.clip(states[before], inputs - half, inputs + half)), states
 
     def design(self, at: Alignment) -> Array:
-        """Columns of the gap: 1, z, max(0, z - z_k) and creep; z is the input behind the play over the log's range.
+        """Columns of the gap: 1, z, max(0, z - z_k) and creep, with z the input after the play over the log's range.
 
-        Gap against input is a line that may bend at every knot: a gripper's curve, and the kink where fingers meet. Of
-        a creep with each time constant, its lag behind the input. The result has shape (n, 2 + knots [+ 2]).
+        Gap against input is a line that may bend at every knot: a gripper's curve, and the kink where fingers meet. The
+        column of a creep is its lag behind the input, one for each time constant. The result has shape (n, 2 + knots [+
+        2]).
         """
         low, high = float(self.drive.input_mm.min()), float(self.drive.input_mm.max())
         half = 0.5 * max(high - low, 1e-12)
@@ -135,7 +138,7 @@ class Motion:
         return np.column_stack([np.ones_like(z), z, np.maximum(z[:, None] - knots, 0.0), *lags])
 
     def _lagging(self, at: Alignment, states: Array, tau_s: float) -> Array:
-        """Exponential mean of the past of `states` with a time constant, at the frames; shape (n,)."""
+        """Exponential mean of the past of `states` with a given time constant, at the frames; shape (n,)."""
         times_s = self.drive.time_s
         step_s = CREEP_STEP * min(CREEP_S)
         grid_s = times_s[0] + step_s * np.arange(int((times_s[-1] - times_s[0]) / step_s) + 2)

@@ -17,7 +17,7 @@ MOST_OF_STROKE = 0.9
 FIRST_PLAYS = (0.0, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Plays that are tried first, over the largest: a factor of two apart, each within the reach of the next."""
 BESIDE_S, BESIDE_STEP_S = 2.0, 0.1
-"""Offsets that are looked at beside a correlation's peak: halts of a staircase are seldom longer than 2 s, and moves that
+"""Offsets that are tried beside a correlation's peak: halts of a staircase are seldom longer than 2 s, and moves that
 take less than 0.1 s have a narrow peak of their own."""
 OUT_OF_REACH = 14.0
 """Twice the logarithm of the likelihood ratio at which a play no longer counts: a weight of one in a thousand."""

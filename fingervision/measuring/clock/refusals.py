@@ -1,4 +1,4 @@
-"""Why a log is not laid on a recording: nothing moves, the gap follows something else, or the motion repeats."""
+"""Reasons to refuse a log: nothing moves, the gap follows something else, or the motion repeats."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ LEAST_SHARE = 0.5
 
 
 def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffset | None:
-    """Refuse records that are too short, and a drive or a gap that stands."""
+    """Refuse records that are too short, and a drive or a gap that does not move."""
     if time_s.size < FEWEST_FRAMES or float(np.ptp(time_s)) == 0.0:
         return NoClockOffset(f"only {time_s.size} frames have a time and a gap, and {FEWEST_FRAMES} are needed.")
     if drive.time_s.size < FEWEST_ROWS or float(np.ptp(drive.input_mm)) == 0.0:
@@ -30,7 +30,7 @@ def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffs
 
 
 def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse a log of the places that a stage was sent to."""
+    """Refuse a log of target positions instead of actual ones."""
     share = gap_arrives(motion, found)
     if share is None or share >= ARRIVED:
         return None

@@ -1,4 +1,4 @@
-"""Other offsets than the best one that explain the frames which they share with it as well."""
+"""Offsets other than the best one that explain the frames shared with it as well."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ def _between_runs(log_s: Array, drive: DriveHistory) -> NDArray[np.bool_]:
 
 
 def only(motion: Motion, kept: NDArray[np.bool_]) -> Motion:
-    """Keep some of the frames, with white noise until it is estimated again."""
+    """Keep some of the frames, with white noise assumed until the noise is estimated again."""
     return replace(motion, time_s=motion.time_s[kept], gap_mm=motion.gap_mm[kept], noise=WHITE)
 
 

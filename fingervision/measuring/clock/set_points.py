@@ -1,4 +1,4 @@
-"""Whether a log holds the places that the stage was sent to, instead of those where it was."""
+"""Check whether a log contains target positions of the stage, instead of its actual positions."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ that is a fifth of a frame off take less than a tenth of it."""
 
 
 def gap_arrives(motion: Motion, found: Fit) -> float | None:
-    """Share of the log's jumps that the gap makes as fast as the log does; None where the log does not jump.
+    """Fraction of the log's jumps that the gap makes as fast as the log does; None where the log has no jumps.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A fit put into the terms of the log's clock, with its uncertainty, or refused where the motion leaves it open."""
+"""Conversion of a fit to the log's clock, with its uncertainty; refused where the motion leaves it undetermined."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ COARSE = 2.0
 
 
 def crossed_in_s(path: LogPath) -> float:
-    """Time that the moving stage takes from one encoder's line to the next; 0 without lines."""
+    """Time that the moving stage takes from one line of the encoder to the next (s); 0 without lines."""
     steps_mm, steps_s = np.abs(np.diff(path.drive.input_mm)), np.diff(path.drive.time_s)
     moving = steps_mm > 0.1 * float(steps_mm.max())
     return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))

@@ -1,4 +1,4 @@
-"""An axis that its maker's or a community's library drives: what such stages have in common; they keep no step data."""
+"""Base of stages that a library drives, from their maker or a community; they keep no step data."""
 
 import threading
 from abc import ABC, abstractmethod
@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 
 class LibraryAxis(ABC):
-    """An actuator (`testbed.actuator`) by six calls of a library, each of which may raise any exception.
+    """An actuator (`testbed.actuator`) built on six calls of a library, each of which may raise any exception.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ class LibraryAxis(ABC):
 
     @abstractmethod
     def _moving(self) -> bool:
-        """Ask whether a motion is under way."""
+        """Whether a motion is under way, asked from the device."""
 
     @abstractmethod
     def _position_mm(self) -> float:
-        """Ask for the position."""
+        """Position in mm, asked from the device."""
 
     @abstractmethod
     def _go_home(self) -> None:

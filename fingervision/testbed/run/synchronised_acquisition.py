@@ -134,7 +134,7 @@ class Sight:
 
     def __init__(self, bed: Bed) -> None:
         if bed.camera is None:
-            raise DataError("A run must be seen, but the bed has no camera: add a [camera].")
+            raise DataError("A run must be filmed, but the bed has no camera: add a [camera].")
         if bed.scale is None:
             raise DataError(
                 "A run must have a scale, but the bed has none: add a [scale] with px_per_mm or a calibration."

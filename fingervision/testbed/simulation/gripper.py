@@ -89,7 +89,7 @@ class SimulatedGripper:
         self._known: tuple[object, Array, Response] | None = None
 
     def looked_at(self, begin_s: float, period_s: float) -> None:
-        """State when the camera exposes: at one bed time, and every period before and after."""
+        """Set when the camera exposes: at one bed time, and every period before and after."""
         self._begin_s, self._period_s = begin_s, period_s
         self._known = None
 
