@@ -21,6 +21,10 @@ from fingervision.tables.own_format import is_own
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.understanding import Understood, understand
 
+TEXT_ENDINGS = ("", ".asc", ".csv", ".dat", ".log", ".lvm", ".out", ".prn", ".tab", ".tsv", ".txt")
+TABLE_ENDINGS = frozenset((*TEXT_ENDINGS, ".mat", ".parquet", ".tdms", ".xls", ".xlsm", ".xlsx"))
+"""How tables are named; a file of another name that cannot be read as one was most likely never meant to be."""
+
 
 def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTable:
     """Read a measured table of any kind.
@@ -149,6 +153,21 @@ def read_simulation_table(path: Path, columns: Path | None = None) -> TableModel
     return simulation_table.simulation_rows(path, values)
 
 
+def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
+    """Read a simulation table; of a file that is not named like one, say what a model is."""
+    try:
+        return read_simulation_table(path, columns)
+    except OpenQuestionError:
+        raise
+    except DataError as error:
+        if path.is_dir() or path.suffix.lower() in TABLE_ENDINGS:
+            raise
+        raise DataError(
+            f"{path} is no model: it must be a simulation table, a gripper.toml, mechanism.toml or model.toml, an FMU, "
+            f"or a Python file with simulate(time_s, input_mm). As a table it cannot be read: {error}"
+        ) from error
+
+
 def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) -> CorrectedModel:
     """Read a model: a simulation table of any kind, a gripper, or a corrected model.
 
@@ -166,7 +185,7 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
     DataError, InputFileError, ModelError, UsageError
         As `storage.model_toml.read_model` and `read_simulation_table`.
     """
-    reader: Callable[[Path], TableModel] = partial(read_simulation_table, columns=columns)
+    reader: Callable[[Path], TableModel] = partial(_table_or_no_model, columns=columns)
     return model_toml.read_model(path, kind, table=reader)
 
 

@@ -60,6 +60,21 @@ def test_an_fmu_for_another_system_is_refused(tmp_path):
         model.simulate([(TIME_S, INPUT_MM)])
 
 
+@needs_gcc
+def test_an_fmu_that_nothing_drives_is_refused(tmp_path):
+    # As BouncingBall, VanDerPol and Stair of the Reference FMUs, which have no input.
+    packed, changed = build_fmu(tmp_path), tmp_path / "changed.fmu"
+    with zipfile.ZipFile(packed) as old, zipfile.ZipFile(changed, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(b'causality="input"', b'causality="local"')
+                content = content.replace(b'<Real unit="m" start="0"/>', b'<Real unit="m"/>')
+            new.writestr(name, content)
+    with pytest.raises(FingervisionError, match="must have a real input to be driven in time"):
+        FunctionModel(changed).simulate([(TIME_S, INPUT_MM)])
+
+
 @pytest.mark.slow
 @needs_gcc
 def test_a_crash_and_an_endless_loop_become_sentences(tmp_path, monkeypatch):

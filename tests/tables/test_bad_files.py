@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.tables import needed_library, text_file
 from fingervision.tables.formats import xlsx
 from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry
-from fingervision.tables.read import read_drive, read_measured_table
+from fingervision.tables.read import read_drive, read_measured_table, read_model
 from tests.storage.foreign import binary
 
 GB = 1_000_000_000
@@ -195,3 +195,13 @@ def test_a_reader_that_crashes_is_a_sentence(tmp_path: Path) -> None:
         patch.syspath_prepend(tmp_path)
         with pytest.raises(FingervisionError, match=r"crashed on it \(signal 11"):
             read_apart("crashing_reader", tmp_path / "table.mat", Entry())
+
+
+def test_prose_given_as_a_model_is_said_to_be_none(tmp_path: Path) -> None:
+    prose = tmp_path / "README.md"
+    lines = [f"* part {k}, " + "which has, " * (k % 4) + "a hinge" for k in range(12)]
+    prose.write_text("# A gripper\n\n" + "\n".join(lines), encoding="utf-8")
+    with pytest.raises(DataError, match="is no model") as caught:
+        read_model(prose)
+    assert "simulation table" in str(caught.value)
+    assert "FMU" in str(caught.value)

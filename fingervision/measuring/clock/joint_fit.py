@@ -137,6 +137,20 @@ def inflation(motion: Motion, at: Alignment) -> Array:
     return np.maximum(kept, 1.0)
 
 
+def shift_by_creep(motion: Motion, found: Fit) -> Array:
+    """Change of offset, rate and play if the gap may creep after the input; shape (3,), zero where it may already.
+
+    In a slow motion a creep too small to be told is a delay of its share times its time constant, and takes the place
+    of play as well.
+    """
+    at = found.at if motion.creeps else fit(replace(motion, creeps=True), found.at, free_play=found.at.play_mm > 0.0).at
+    return _change(at, found.at)
+
+
+def _change(to: Alignment, since: Alignment) -> Array:
+    return np.array([to.offset_s - since.offset_s, to.rate - since.rate, to.play_mm - since.play_mm])
+
+
 def shift_by_turns(motion: Motion, found: Fit) -> Array:
     """Change of offset, rate and play (s, 1, mm) if all reversals of the log went further by their uncertainty.
 
@@ -147,8 +161,7 @@ def shift_by_turns(motion: Motion, found: Fit) -> Array:
     path = motion.path
     drive = replace(path.drive, input_mm=path.turned_mm)
     pushed = replace(motion, path=replace(path, drive=drive))
-    at = fit(pushed, found.at, free_play=True).at
-    return np.array([at.offset_s - found.at.offset_s, at.rate - found.at.rate, at.play_mm - found.at.play_mm])
+    return _change(fit(pushed, found.at, free_play=True).at, found.at)
 
 
 def _prior(size: int) -> Array:

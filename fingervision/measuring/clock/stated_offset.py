@@ -4,7 +4,7 @@ import numpy as np
 
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.correlation import LARGEST_RATE
-from fingervision.measuring.clock.joint_fit import Fit, inflation, shift_by_turns
+from fingervision.measuring.clock.joint_fit import Fit, inflation, shift_by_creep, shift_by_turns
 from fingervision.measuring.clock.log_path import FINER, LogPath
 from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.play_posterior import Posterior
@@ -39,8 +39,9 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
     first_s = float(motion.drive.time_s[0])
     more = np.sqrt(inflation(motion, best.at))
     offset_s, rate, covariance = at.offset_s, at.rate, at.covariance * np.outer(more[:2], more[:2])
-    shift = shift_by_turns(motion, best)
-    covariance = covariance + np.outer(shift[:2], shift[:2])
+    shifts = [shift_by_turns(motion, best), shift_by_creep(motion, best)]
+    # Without their correlation: by chance it would cancel at one instant what is off at all others.
+    covariance = covariance + np.diag(sum(shift[:2] ** 2 for shift in shifts))
     # Recording's time at which the log begins; there the offset is middle's plus the rate times the way to it.
     begins_s = (first_s + offset_s - rate * motion.middle_s) / (1.0 - rate)
     away_s = np.append(motion.time_s, begins_s) - motion.middle_s
@@ -89,6 +90,11 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
             f"{crossing_s:.2g} s from one to the next: where it stood and turned within a step decides on the offset, "
             "which may be off by more than a frame."
         )
+    if motion.creeps:
+        notes.append(
+            "The gap seems to creep after the drive: in a slow motion a creep looks like a delay, and the offset may "
+            "hold a part of it that is more than a frame."
+        )
     if u_time_s > 0.5 * frame_s:
         notes.append(
             f"The clock offset is known to no better than U = {2.0 * u_time_s:.3g} s (k = 2), more than one frame of "
@@ -106,7 +112,7 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
         reference_s=first_s,
         u_time_s=u_time_s,
         play_mm=at.play_mm,
-        u_play_mm=float(np.hypot(at.u_play_mm * more[2], shift[2])),
+        u_play_mm=float(np.sqrt((at.u_play_mm * more[2]) ** 2 + sum(shift[2] ** 2 for shift in shifts))),
         explained_share=share,
         notes=tuple(notes),
     )
