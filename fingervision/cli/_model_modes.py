@@ -116,7 +116,7 @@ def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:
         swing = cos(2.0 * pi * picture / _PICTURES)
         for axes, curve, shape in moving:
             curve.set_visible(True)
-            curve.set_segments(list(shape.lines_mm + swing * shape.shift_mm))
+            curve.set_segments(list(shape.lines_mm + swing * shape.swing * shape.shift_mm))
             axes.draw_artist(curve)
         pictures.append(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
     try:

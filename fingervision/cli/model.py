@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     from fingervision.domain.response import Response
     from fingervision.models.answer_figures import ModelFigures
 
-_METRES_BELOW_OF_HEIGHT = 1e-4
-_ROWS_BETWEEN = 61
-"""Over the range of a drive, in the deformed shape: straight lines between them are within 1 um for the sample."""
-_MOST_ROWS = 401
 _SWEPT = ("vary.csv", "vary.png")
 _PREDICTED = (
     "models.csv", "models.png", "simulation.csv", "mechanism.csv", "deformed.png", "mesh.png", "modes.csv", "modes.png",
@@ -96,6 +92,7 @@ def command(
     (mechanism.toml) is answered by finite elements: mechanism.csv, deformed.png.
     """
     from fingervision.cli._model_grip import part_asked, write_grip
+    from fingervision.cli._model_inputs import inputs_mm, inputs_until_touch, with_rows_between
     from fingervision.cli._model_motion import motion_asked, move
     from fingervision.cli._model_report import print_table, say_what_limits, write_table
     from fingervision.domain.errors import FingervisionError, UsageError
@@ -137,7 +134,7 @@ def command(
         check_uncertainties(gripper)
     wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
-    inputs = None if drive is None else _inputs_mm(drive, columns, gripper)
+    inputs = None if drive is None else inputs_mm(drive, columns, gripper)
     _make_folder(out)
     rows: dict[str, dict[str, Any]] = {}
     answers: dict[str, Response] = {}
@@ -152,9 +149,9 @@ def command(
             figures[name] = model.figures()
             given = inputs
             if given is None:
-                given = _inputs_until_touch(figures[name])
+                given = inputs_until_touch(figures[name])
             elif physics != LINEAR and not models:
-                given = _with_rows_between(given, figures[name])
+                given = with_rows_between(given, figures[name])
             answers[name] = model.respond(given)
             row = gripper_figures(gripper, model, given, figures[name])
         except FingervisionError as error:
@@ -208,47 +205,6 @@ def _make_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"--out must be a folder that can be written, but {out} is not: {error.strerror}.") from error
-
-
-def _inputs_mm(drive: Path, columns: Path | None, gripper: "Gripper") -> "NDArray[np.float64]":
-    import numpy as np
-
-    from fingervision.domain.errors import UsageError
-    from fingervision.tables.read import read_drive
-
-    inputs = np.unique(read_drive(drive, columns).input_mm)
-    largest = float(np.abs(inputs).max())
-    if 0.0 < largest < _METRES_BELOW_OF_HEIGHT * gripper.body.height_mm:
-        raise UsageError(
-            f"The inputs of {drive} must be millimetres, but the largest is {largest:g} for a gripper of "
-            f"{gripper.body.height_mm:g} mm: are they metres? Multiply the column by 1000."
-        )
-    if largest > gripper.body.height_mm:
-        raise UsageError(
-            f"The inputs of {drive} must be millimetres, but the largest is {largest:g} for a gripper of "
-            f"{gripper.body.height_mm:g} mm: are they micrometres? Divide the column by 1000."
-        )
-    if inputs.size < 2:
-        raise UsageError(f"The drive {drive} must hold at least two different inputs, but holds {inputs.size}.")
-    return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
-
-
-def _with_rows_between(inputs: "NDArray[np.float64]", figures: "ModelFigures") -> "NDArray[np.float64]":
-    """Add rows between a drive's inputs, and at the first touch, because a table is linear between its rows."""
-    import numpy as np
-
-    low, high = float(inputs.min()), float(inputs.max())
-    touch = figures.contact_input_mm
-    bends = [touch] if touch is not None and low < touch < high else []
-    return np.union1d(inputs, np.concatenate([np.linspace(low, high, _ROWS_BETWEEN), bends]))
-
-
-def _inputs_until_touch(figures: "ModelFigures") -> "NDArray[np.float64]":
-    """Inputs from the first touch to three times as far in the other direction: the published range."""
-    import numpy as np
-
-    touch = figures.contact_input_mm or -0.1
-    return np.union1d(np.linspace(touch, 0.0, 26), np.linspace(0.0, -3.0 * touch, 76))
 
 
 def _draw(

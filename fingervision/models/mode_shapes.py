@@ -44,6 +44,9 @@ class ModeShape:
     lines_mm, shift_mm : ndarray of float, shape (n, 2, 2)
         The body's outline or bars as pieces from one point to another, at rest, and their displacements at the
         greatest deflection that is drawn (its size means nothing).
+    swing : float
+        Share of the displacements by which the mode can be drawn both ways: mirrored halves pass through each other
+        beyond.
     """
 
     family: str
@@ -51,6 +54,7 @@ class ModeShape:
     frequency_hz: float
     lines_mm: Array
     shift_mm: Array
+    swing: float = 1.0
 
 
 class MeshedMechanism(Protocol):
@@ -115,7 +119,8 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
             # The left half mirrors the right one; where both sway the same way its motion is turned round.
             flip = np.array([-1.0, 1.0])
             both = np.concatenate([lines, flip * lines]), np.concatenate([shift, mirror * flip * shift])
-            found.append(ModeShape(family, number, float(angular / (2.0 * pi)), *both))
+            swing = min(1.0, _way_to_meeting(lines[..., 0], -shift[..., 0])) if mirror > 0.0 else 1.0
+            found.append(ModeShape(family, number, float(angular / (2.0 * pi)), *both, swing))
     return found
 
 

@@ -22,6 +22,10 @@ from fingervision.models.mechanism_frame import MechanismFrame
 
 Array = NDArray[np.float64]
 
+PARTS = ("x_mm", "y_mm", "angle_mrad")
+"""Of a body's pose."""
+_SIMPSON = (1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0)
+"""Weights of an edge's ends and middle: exact for what is quadratic along it, as displacements are."""
 _UNIT = 1e-3
 """Motion by which a linear functional of the motions is told, in mm and rad: any would do."""
 _THINNEST, _THICKEST = 0.3, 2.5
@@ -92,7 +96,7 @@ class PlaceAnswers:
     @cached_property
     def channels(self) -> tuple[str, ...]:
         """Names of the outputs: poses of bodies, angles of hinges, probes, pairs, the force at the drive."""
-        bodies = [f"{name}.{part}" for name in self._weights for part in ("x_mm", "y_mm", "angle_mrad")]
+        bodies = [f"{name}.{part}" for name in self._weights for part in PARTS]
         hinges = [f"{flexure.name}.angle_mrad" for flexure in self.mechanism.flexures]
         probes = [f"{name}_{axis}_mm" for name in self.mechanism.probes for axis in "xy"]
         return (*bodies, *hinges, *probes, *(f"{name}_mm" for name in self.mechanism.pairs), "force_n")
@@ -157,6 +161,42 @@ class PlaceAnswers:
             held = [float(body.holds(model.plate.nodes_mm[:, nodes[::7]]).mean()) for body in model.bodies]
             found[number] = model.bodies[int(np.argmax(held))]
         return found
+
+    @cached_property
+    def by_edges(self) -> Array:
+        """How much more each channel changes by 1 mm of input where poses are those of edges, shape (channels,).
+
+        A body that bends moves its outline otherwise than its area: a picture shows the rigid motion nearest to the
+        displacements of its edges along their normals.
+        """
+        model, plate = self.model, self.model.plate
+        moved = model.driven.equilibrium(1.0, large_rotation=False, contact=False).displacement
+        first, last, middle = plate.outline_edges
+        own_of, angle_of = dict.fromkeys(self.channels, 0.0), {}
+        for number, link in self.numbered_bodies().items():
+            body, on = model.assembly.bodies[number], model.assembly.piece == number
+            edges = on[first] & on[last] & on[middle]
+            if link.name not in self._weights or not edges.any():
+                continue
+            way = plate.nodes_mm[:, last[edges]] - plate.nodes_mm[:, first[edges]]
+            length = np.hypot(*way)
+            normal = np.tile(np.stack([-way[1], way[0]]) / length, 3)
+            root = np.sqrt(np.concatenate([share * length for share in _SIMPSON]))
+            at = np.concatenate([first[edges], last[edges], middle[edges]])
+            _, centroid = self._weights[link.name]
+            arm = plate.nodes_mm[:, at] - centroid[:, None]
+            columns = np.stack([normal[0], normal[1], arm[0] * normal[1] - arm[1] * normal[0]], axis=1)
+            bent = body.shapes_mm @ moved[body.unknowns]
+            along = normal[0] * bent[plate.x_dofs[at]] + normal[1] * bent[plate.y_dofs[at]]
+            found = np.linalg.lstsq(columns * root[:, None], along * root, rcond=None)[0] * (1.0, 1.0, 1e3)
+            place = 3 * list(self._weights).index(link.name)
+            change = found - self._poses[place : place + 3] @ moved
+            own_of |= {f"{link.name}.{part}": float(v) for part, v in zip(PARTS, change, strict=True)}
+            angle_of[number] = float(change[2])
+        for number, flexure in enumerate(self.mechanism.flexures):
+            before, beyond = self.ends(number)
+            own_of[f"{flexure.name}.angle_mrad"] = angle_of.get(beyond, 0.0) - angle_of.get(before, 0.0)
+        return np.array([own_of[name] for name in self.channels])
 
     def body_of_frame(self, frame: int) -> int:
         """Number of the body that a frame belongs to."""

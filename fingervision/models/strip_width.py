@@ -37,6 +37,8 @@ def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]
         Of a strip whose ends turn against each other, and of one whose ends keep their direction, as in a stage: its
         moments are largest at its ends, where it is held.
     """
+    if poisson <= 0.0:
+        return 0.0, 0.0
     ratio = max(width_over_length, _NARROW)
     bent, swayed = _shares(round(float(np.log(ratio)), _DIGITS), poisson)
     return bent * width_over_length / ratio, swayed * width_over_length / ratio

@@ -47,6 +47,8 @@ CLEARLY = 16.0
 # The integral of what a Gaussian step leaves of a disc of defocus, squared, is at most 0.0017 contrast^2 blur (of a box
 # 0.0038): what leaves more than this is two steps, or a line between them, even where it is alike to both sides.
 DISC_LEAVES = 0.002
+# Glare that is fitted to a disc of defocus lies 1.0 to 1.1 of its own blurs inside, however large the disc is.
+DISC_BREADTH = 1.12
 # What stands beside an edge makes this share of the contrast: less is texture, more is no finger's edge.
 SHARES = (0.05, 0.85)
 # Levels within so many standard deviations of the end of the scale are cut off now and then.
@@ -144,6 +146,12 @@ def with_profile(
     outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
+        is_strip = [
+            each[STEP].squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * each[WALL].squares)
+            for each, (profile, _, _) in zip(fits, profiles, strict=True)
+        ]
+        if is_strip[0] != is_strip[1]:
+            return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
             # Flanks that are broader than the tips: by a wall, or by motion, and nothing here tells which.
             wall = [
@@ -171,6 +179,14 @@ def with_profile(
     ]
     if is_one_sided[0] != is_one_sided[1]:
         return replace(edges, beside=STRIP)
+    # Light from one side casts a shadow beside one finger's inner flank and the other finger's outer one, and nothing
+    # else does. Up to two pixels broad it only widens them: a strip of two equal steps by half of its breadth.
+    wider = [each[STEP].blur ** 2 - width**2 for each, width in zip(fits, widths, strict=True)]
+    if (
+        min(wider) < -ONE_SIDED * min(fits[0][STEP].blur, fits[1][STEP].blur) ** 2
+        and max(wider) > ONE_SIDED * min(widths) ** 2
+    ):
+        return _unsure(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
     if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
         narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
         remains = sum(fit.squares for fit in narrow)
@@ -181,6 +197,10 @@ def with_profile(
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
     if any(widened):
         return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
+    if not (is_step or is_lopsided) and left[GLARE] < enough and _are_of_size(glare, 1.0):
+        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of light hides in such optics, or none
+            return _unsure(edges, [abs(fit.position) for fit in glare], "glare")
+        return edges
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
     if not is_lopsided or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
         return edges

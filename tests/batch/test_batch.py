@@ -214,6 +214,16 @@ def test_an_output_folder_of_something_else_is_left_alone(run: Run, copy: Path) 
     assert (code, "--out must lie apart from the inputs" in err) == (2, True)
 
 
+def test_a_batch_of_another_command_is_left_alone(run: Run, copy: Path) -> None:
+    Path("told").mkdir()
+    mark = Path("told/batch.json")
+    mark.write_text('{"schema": 1, "command": "diagnose"}', encoding="utf-8")
+    code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "told")
+    assert code == 1
+    assert "--out must be a folder of batch measure, but told is one of batch diagnose" in err
+    assert [path.name for path in Path("told").iterdir()] == [mark.name]
+
+
 def test_an_unreadable_file_is_listed(run: Run, copy: Path) -> None:
     # A link to itself cannot be read by anybody, not even by root.
     Path("rec/a/loop.mkv").symlink_to("loop.mkv")

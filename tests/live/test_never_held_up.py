@@ -33,7 +33,7 @@ from fingervision.live.free_space import minutes_left
 from fingervision.live.opening import opened
 from fingervision.live.outlet import PATIENCE_S, Outlet
 from fingervision.live.overflow_report import OverflowReport
-from fingervision.live.preview import Known, message
+from fingervision.live.preview import Known, message, state_has_changed
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines
 from fingervision.storage.gaps_csv import GapRow
@@ -47,6 +47,7 @@ def session(tmp_path: Path) -> Session:
 
 
 def head_of(session: Session) -> dict[str, Any]:
+    state_has_changed()  # what pages are told is composed for all of them at once
     content = message(session, Known(), None).content
     (length,) = struct.unpack(">I", content[:4])
     head: dict[str, Any] = json.loads(content[4 : 4 + length])

@@ -26,6 +26,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"body.plate_mm": 1e300}, "body.plate_mm"),
     ({"body.plate_mm": 10**400}, "body.plate_mm"),
     ({"body.plate_mm": 1e-300}, "body.plate_mm"),
+    ({"body.plate_mm": 3000.0}, "body.plate_mm"),
+    ({"hinge.web_mm": 20.0}, "hinge.web_mm"),
     ({"body.width_mm": 0.0}, "body.width_mm"),
     ({"body.height_mm": -100.0}, "body.height_mm"),
     ({"hinge.thickness_mm": 0.0}, "hinge.thickness_mm"),

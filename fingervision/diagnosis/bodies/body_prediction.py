@@ -109,6 +109,11 @@ class BodyPrediction:
         nearest = min(bodies, key=lambda each: float(np.hypot(*(each.centroid_mm - middle))))
         return found.get(f"{nearest.name}.angle_mrad", 0.0)
 
+    @cached_property
+    def by_edges(self) -> Array:
+        """Change of the prediction where poses are those of edges in a picture, shape (n, channels)."""
+        return np.outer(self.input_mm, self.answers.by_edges[self._places])
+
     def slipped(self, flexure: int, play_mm: float) -> Array:
         """Change of the prediction by play in a pivot, shape (n, channels); see `slip_mm`."""
         slip = slip_mm(self.linear(), flexure, self.input_mm, play_mm)

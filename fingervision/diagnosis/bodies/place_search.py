@@ -21,6 +21,9 @@ otherwise than in the mirror image of that channel. Beside finite elements poses
 halves alike to 2e-6 (`tests/models/test_body_poses.py` holds 3e-4 of every drawing)."""
 FORCE_SLOPE_ERROR = 0.05
 """Relative: the modulus of a printed or rolled sheet is known no better (mechanics.md, section 5)."""
+BY_EDGES = 3.0
+"""Poses are those of the bodies' areas (0), of all of their straight edges (1) or of some that a picture shows, which
+may be two or three times as far from the area where a body bends. The table does not say which."""
 HINGE_ERROR, OWN_HINGE_ERROR = 0.01, 0.003
 """Relative: the tables of hinges beside bricks, and what a body's own root adds (`models/README.md`); and what of it is
 not shared with the hinge's mirror image."""
@@ -159,6 +162,9 @@ class PlaceSearch:
         is_mm = np.array([name.endswith("_mm") for name in prediction.channels])
         columns += [prediction.bent, prediction.drawn * is_mm]
         spread += [np.inf, SCALE_ERROR]
+        if np.any(prediction.by_edges):
+            columns.append(prediction.by_edges)
+            spread.append(BY_EDGES)
         turned = prediction.turned()
         if np.any(turned):
             columns.append(turned)

@@ -1,0 +1,46 @@
+"""How the plate's width holds a leaf back: limits, and a plate of scikit-fem's Morley elements."""
+
+import numpy as np
+import pytest
+import skfem
+from skfem.helpers import dd
+
+from fingervision.models.strip_width import strip_share
+
+NU = 0.34
+MORLEY = 0.04
+"""Of the share, by sixty of these elements along: they converge from below, in proportion to their size."""
+
+
+def test_narrow_strips_are_free_and_wide_ones_held() -> None:
+    shares = np.array([strip_share(ratio, NU) for ratio in (1e-3, 0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)])
+    assert np.all(np.diff(shares, axis=0) > 0.0)
+    assert np.all(shares[:, 1] >= shares[:, 0])
+    assert shares[0] == pytest.approx(0.0, abs=0.005)
+    assert shares[-1] == pytest.approx(1.0, abs=0.01)
+    assert strip_share(1.0, 0.0) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("width", [0.3, 0.8])
+def test_the_share_is_that_of_a_clamped_plate(width: float) -> None:
+    mesh = skfem.MeshTri.init_tensor(np.linspace(0.0, 1.0, 61), np.linspace(0.0, width, int(60 * width) + 1))
+    basis = skfem.Basis(mesh, skfem.ElementTriMorley())
+
+    @skfem.BilinearForm
+    def energy(u, v, _):  # type: ignore[no-untyped-def]
+        a, b = dd(u), dd(v)
+        mixed = NU * (a[0][0] * b[1][1] + a[1][1] * b[0][0]) + 2.0 * (1.0 - NU) * a[0][1] * b[0][1]
+        return a[0][0] * b[0][0] + a[1][1] * b[1][1] + mixed
+
+    clamped = basis.get_dofs(lambda x: (x[0] < 1e-9) | (x[0] > 1.0 - 1e-9))
+    for place, turns_back in enumerate((0.0, 2.0)):
+
+        @skfem.LinearForm
+        def pull(v, w, turns_back=turns_back):  # type: ignore[no-untyped-def]
+            return (1.0 - turns_back * w.x[0]) * (dd(v)[0][0] + NU * dd(v)[1][1])
+
+        load = pull.assemble(basis)
+        moved = skfem.solve(*skfem.condense(energy.assemble(basis), -load, D=clamped))
+        bar = width * (1.0 if place == 0 else 1.0 / 3.0)
+        stiffness = (bar + load @ moved) / (bar * (1.0 - NU**2))
+        assert strip_share(width, NU)[place] == pytest.approx((1.0 - 1.0 / stiffness) / NU**2, abs=MORLEY)
