@@ -63,5 +63,12 @@ class PhysicalModel(Model, Protocol):
         ...
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalModel":
-        """Return the gripper with some of its dimensions changed by the given amounts, each in its own unit."""
+        """Return the gripper with some of its dimensions changed by the given amounts, each in its own unit.
+
+        It may take the ratio of a simpler model's answers, which is precise enough for derivatives.
+        """
+        ...
+
+    def drawn_anew(self, changes: Mapping[str, float]) -> "PhysicalModel":
+        """Return the same with its own answer computed anew, however long that takes."""
         ...

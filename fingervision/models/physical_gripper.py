@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
-from fingervision.domain.model import PhysicalLaw
+from fingervision.domain.model import Model, PhysicalLaw
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
 from fingervision.models.drawn_answer import DrawnAnswer
@@ -52,11 +52,9 @@ class PhysicalGripper:
     def __init__(self, gripper: Gripper, kind: str, theory: HingeTheory = HingeTheory.CORRECTED) -> None:
         self.gripper, self.theory = gripper, theory
         self._model = build_model(kind, gripper, LINEAR, theory)
+        self._kind = kind
         self.input_range_mm = self._model.input_range_mm
-        answer = self._model.respond(np.array([0.0, 1.0]))
-        gap, force = answer.gap_mm, answer.force_n
-        self._drawn = SmallAnswer(float(gap[0]), float(gap[1] - gap[0]), 0.0 if force is None else float(force[1]))
-        self.answer = self._drawn
+        self._drawn = self.answer = _own_answer(self._model)
 
     def respond(self, input_mm: Array) -> Response:
         """Respond by small displacements, with two identical halves."""
@@ -94,23 +92,41 @@ class PhysicalGripper:
         }
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalGripper":
-        """Return the gripper with some dimensions changed; its laws stay those of the original drawing."""
-        changed = copy(self)
-        changed.laws = self.laws
+        """Return the gripper with some dimensions changed, in the ratio of the frame's answers; its laws stay."""
         if not changes:
-            changed.answer = self._drawn
-            return changed
+            return self._with(self._drawn)
+        new, old, drawn = small_answer(self._changed(changes), self.theory), self._frame, self._drawn
+        return self._with(
+            SmallAnswer(
+                drawn.rest_gap_mm + new.rest_gap_mm - old.rest_gap_mm,
+                drawn.gap_per_input * new.gap_per_input / old.gap_per_input,
+                drawn.force_per_input_n_mm * new.force_per_input_n_mm / old.force_per_input_n_mm,
+            )
+        )
+
+    def drawn_anew(self, changes: Mapping[str, float]) -> "PhysicalGripper":
+        """Return the same, with the kind's own answer to the changed drawing; the ratio is off by some 1e-4 of it."""
+        if not changes:
+            return self._with(self._drawn)
+        return self._with(_own_answer(build_model(self._kind, self._changed(changes), LINEAR, self.theory)))
+
+    def _changed(self, changes: Mapping[str, float]) -> Gripper:
         gripper = self.gripper
         for name, by in changes.items():
             gripper = redrawn(gripper, name, by)
-        new, old, drawn = small_answer(gripper, self.theory), self._frame, self._drawn
-        changed.answer = SmallAnswer(
-            drawn.rest_gap_mm + new.rest_gap_mm - old.rest_gap_mm,
-            drawn.gap_per_input * new.gap_per_input / old.gap_per_input,
-            drawn.force_per_input_n_mm * new.force_per_input_n_mm / old.force_per_input_n_mm,
-        )
+        return gripper
+
+    def _with(self, answer: SmallAnswer) -> "PhysicalGripper":
+        changed = copy(self)
+        changed.laws, changed.answer = self.laws, answer
         return changed
 
     @cached_property
     def _frame(self) -> SmallAnswer:
         return small_answer(self.gripper, self.theory)
+
+
+def _own_answer(model: Model) -> SmallAnswer:
+    answer = model.respond(np.array([0.0, 1.0]))
+    gap, force = answer.gap_mm, answer.force_n
+    return SmallAnswer(float(gap[0]), float(gap[1] - gap[0]), 0.0 if force is None else float(force[1]))

@@ -62,7 +62,9 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
     columns, names = [], []
     for name in drawn.uncertain:
         ends = [
-            replace(chain, model=with_moved(drawn, {**moved, name: moved.get(name, 0.0) + step})).stacked({})
+            replace(chain, model=drawn.redrawn(_changes(drawn, {**moved, name: moved.get(name, 0.0) + step}))).stacked(
+                {}
+            )
             for step in (-STEP, STEP)
         ]
         column = (ends[1] - ends[0]) / (2.0 * STEP)
@@ -75,8 +77,12 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
 
 
 def with_moved(drawn: PhysicalModel, moved: Mapping[str, float]) -> PhysicalModel:
-    """Return the gripper with each dimension moved by the given number of its standard uncertainties."""
-    return drawn.redrawn({name: by * (drawn.uncertain[name].u or 0.0) for name, by in moved.items()})
+    """Return the gripper, computed anew, with each dimension moved by this number of its standard uncertainties."""
+    return drawn.drawn_anew(_changes(drawn, moved))
+
+
+def _changes(drawn: PhysicalModel, moved: Mapping[str, float]) -> dict[str, float]:
+    return {name: by * (drawn.uncertain[name].u or 0.0) for name, by in moved.items()}
 
 
 def estimated(
