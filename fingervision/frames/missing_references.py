@@ -12,7 +12,8 @@ to an older one, and a moving finger is shown in an old position. Four signs are
   depends on a missing one.
 * Times. In a file with equidistant times (coded at a rate, instead of as a camera delivered the frames), a hole of
   whole steps is a missing picture. If times are irregular, or holes are frequent, the camera or the coder omitted
-  pictures, and a hole means nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay undetected.
+  pictures, and a hole means nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay undetected. Where every
+  n-th picture is a key frame and n packets lie between two of them, none is missing: the camera paused.
 
 AVI is not judged by times, because it counts frames and marks omitted ones by an empty chunk.
 """
@@ -43,6 +44,8 @@ TICKS = 1.01
 MOST_HOLES = 0.2
 # A step is a hole beside so many on each side; cameras that are short of light go on at half the rate.
 BESIDE = 4
+# Key frames come after a fixed number of pictures if nine in ten of three or more distances between them are equal.
+FEWEST_LENGTHS, KEYS_SHARE = 3, 0.9
 # A bit that turns by chance does so in half of the pictures: nineteen in twenty, of ten at least, are no chance.
 FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
@@ -156,6 +159,7 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
         return {}
     needed = sorted((each.tick, k) for k, each in enumerate(packets) if each.is_needed and each.tick is not None)
     keys = [each.tick for each in packets if each.is_key and each.tick is not None]
+    key_numbers = [k for k, each in enumerate(packets) if each.is_key]
     found = {}
     for at, step in holes:
         count = round(step / usual) - 1
@@ -164,12 +168,27 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
         # What is missing was coded after the last picture before it on which others hang.
         last = bisect_right(needed, (at, len(packets)))
         number = needed[last - 1][1] + 1 if last else 0
-        if number >= len(packets) or packets[number].is_key:
+        if number >= len(packets) or packets[number].is_key or _all_came(key_numbers, number, count):
             continue
         if count % 2 and _turns_on(packets, number, unturned) and not _key_is_due(keys, at, count * usual):
             continue  # the bit counts none
         found[number] = TIME_LEFT_OUT.format(count=count)
     return found
+
+
+def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
+    """Whether as many packets as usual lie between the key frames before and after a hole: the camera paused.
+
+    A coder that makes every n-th picture a key frame counts what it coded. If pictures had been lost, fewer would lie
+    there, unless n of them, or a multiple, were lost.
+    """
+    lengths = [after - before for before, after in pairwise(key_numbers)]
+    behind = bisect_right(key_numbers, number)
+    if len(lengths) < FEWEST_LENGTHS or not 0 < behind < len(key_numbers):
+        return False
+    usual, often = Counter(lengths).most_common(1)[0]
+    is_fixed = usual > 1 and often >= KEYS_SHARE * len(lengths)
+    return is_fixed and lengths[behind - 1] == usual and count % usual != 0
 
 
 def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -> bool:

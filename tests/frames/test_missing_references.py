@@ -156,6 +156,17 @@ def test_hidden_pictures_take_no_time(tmp_path: Path, lost: int | None) -> None:
     assert statuses(other).count("x") == damaged
 
 
+def test_a_camera_that_paused_lost_nothing_as_its_key_frames_prove() -> None:
+    # Every 12th coded picture is a key frame; the coder does not count the 27 that the camera never took.
+    packets = row(40.0 * np.arange(120) + np.where(np.arange(120) > 65, 27 * 40.0, 0.0), 12)
+    assert judged(packets, are_timed=True) == {}
+    for lost in (61, 63, 66, 70):
+        assert len(judged(packets[:lost] + packets[lost + 1 :], are_timed=True)) >= 1
+    # As many as lie between two key frames may have been lost: then the count proves nothing.
+    packets = row(40.0 * np.arange(120), 12)
+    assert sorted(judged(packets[:66] + packets[78:], are_timed=True)) == [66]
+
+
 def test_a_hole_before_a_key_frame_harms_nothing() -> None:
     packets = row(np.delete(np.arange(100) * 40.0, 47), 1000)
     packets[47] = replace(packets[47], is_key=True)
