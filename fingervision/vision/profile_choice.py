@@ -6,19 +6,24 @@ side of the edge. A wall is visible on the inner flank only, because the camera 
 motion blurs both flanks and no tip; glare and shadow surround the finger.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from fingervision.vision.beside_edge import without_additions
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
-from fingervision.vision.first_guess import line
 from fingervision.vision.grey import GreyImage
-from fingervision.vision.median import median
+from fingervision.vision.mean_profile import (
+    BIN_PX,
+    REACH_PX,
+    STRAIGHT_ONLY,
+    STRAIGHT_OR_ROUND,
+    MeanProfile,
+    mean_profile,
+)
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
 from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
@@ -29,14 +34,6 @@ Ints = NDArray[np.int_]
 
 # The flanks are looked at where a step leaves so many times the noise of the picture's flat parts.
 UNEXPLAINED = 1.2
-# The mean profile reaches so far to either side (pixels), in bins of this breadth with so many pixels each.
-REACH_PX, BIN_PX, FEWEST_IN_BIN = 16, 0.5, 4
-# Rows are left out on purpose where their neighbours lie so many times as far apart as usual.
-LEFT_OUT = 4.0
-# A flank is known where its rows lie this near to a line (pixels, standard deviation), over so many of them; an inner
-# one also where they lie so near to a curve. The degrees that are tried:
-STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
-STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
 # A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
 # step does with half of that, or with so many times what the best model leaves. A wall improves it by so much in
 # chi-square.
@@ -74,15 +71,6 @@ MOTION_RADIUS_PX = 15.0
 U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Profile:
-    """Mean light across a flank: distances outwards from the fitted step, light, and numbers of pixels."""
-
-    t: Floats
-    light: Floats
-    count: Floats
-
-
 def with_profile(
     upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
 ) -> EdgePoints:
@@ -108,7 +96,7 @@ def with_profile(
     room = _room(edges)
     # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
-    inner = [_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
+    inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
         return edges
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
@@ -143,7 +131,7 @@ def with_profile(
     if is_lopsided and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
         moved = _moved(edges, glare, U_GLARE, all_around, "glare")
         return without_additions(upright, moved, light, GLARE, glare)
-    outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
+    outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
         is_strip = [
@@ -238,7 +226,7 @@ def _without_shadow(
 def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
     """Return the points corrected for sharpening of the stored levels; None where there is no sharpening."""
     stored = np.arange(float(light.size))
-    left, right = (_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
+    left, right = (mean_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
     if left is None or right is None:
         return None
     blur = float(np.hypot(edges.blur_px[:, 0].mean(), np.sqrt(PIXEL_VARIANCE)))
@@ -253,7 +241,7 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
     return replace(moved, marks=_stated(moved, u_px), beside="sharpening")
 
 
-def _is_symmetric(flanks: list[tuple[_Profile, float, float]], steps: list[ProfileFit]) -> bool:
+def _is_symmetric(flanks: list[tuple[MeanProfile, float, float]], steps: list[ProfileFit]) -> bool:
     """Whether the profiles of both flanks could come from optics that spread light symmetrically."""
     squares = left = 0.0
     for (profile, weight, blur), step in zip(flanks, steps, strict=True):
@@ -280,7 +268,7 @@ def _room(edges: EdgePoints) -> int:
 
 def _best(
     kind: int,
-    profile: _Profile,
+    profile: MeanProfile,
     weight: float,
     blur: float,
     is_blur_known: bool = False,
@@ -297,66 +285,6 @@ def _best(
         ),
         key=lambda fit: fit.squares,
     )
-
-
-def _profile(
-    upright: GreyImage,
-    edges: EdgePoints,
-    light: Floats,
-    k: int,
-    part: slice,
-    room: int,
-    curves: tuple[int, ...] = STRAIGHT_ONLY,
-) -> _Profile | None:
-    """Mean profile of the half of a flank farther from the tip; None where it is short or not smooth."""
-    real = np.flatnonzero(edges.lines.weight[k, part] > 0)
-    rows = real[real.size // 2 :]
-    if rows.size < FEWEST_ROWS or room < REACH_PX // 2:
-        return None
-    fixed, found = edges.lines.fixed[k, part][rows], edges.position[k, part][rows]
-    outward = int(edges.lines.outward[k, part][0])
-    for degree in curves:
-        keep = np.ones(rows.size, dtype=bool)
-        for _look in range(3):
-            if degree == 1:  # a hundred times faster
-                curve = Polynomial(line(fixed[keep].astype(np.float64), found[keep]))
-            else:
-                curve = Polynomial.fit(fixed[keep], found[keep], degree)
-            away = found - curve(fixed)
-            spread = 1.4826 * median(np.abs(away[keep]))
-            keep = np.abs(away) < 3.0 * spread + 1e-3
-            if np.count_nonzero(keep) < FEWEST_ROWS + degree - 1:
-                return None
-        if spread <= STRAIGHT_PX:
-            break
-    else:
-        return None
-    fixed = _rows_between(fixed[keep])
-    edge, slope = curve(fixed), curve.deriv()(fixed)[:, None]
-    columns = np.rint(edge).astype(int)[:, None] + outward * np.arange(-REACH_PX, room + 1)
-    is_in = (columns >= 0) & (columns < upright.shape[1])
-    values = light[upright[np.broadcast_to(fixed[:, None], columns.shape)[is_in], columns[is_in]]]
-    t = (outward * (columns - edge[:, None]) / np.hypot(1.0, slope))[is_in]
-    place = np.floor(t / BIN_PX).astype(int) + int(2.0 * REACH_PX / BIN_PX)
-    count = np.bincount(place)
-    full = count >= FEWEST_IN_BIN
-    total, middle = np.bincount(place, values), np.bincount(place, t)
-    return _Profile(middle[full] / count[full], total[full] / count[full], count[full].astype(np.float64))
-
-
-def _rows_between(looked_at: Ints) -> Ints:
-    """Every row between the first and the last searched one, also where lines were thinned out.
-
-    Where many successive rows were left out, a part hides the edge there.
-    """
-    looked_at = np.sort(looked_at)
-    rows, steps = np.arange(looked_at[0], looked_at[-1] + 1), np.diff(looked_at).astype(np.float64)
-    most = LEFT_OUT * median(steps)
-    if steps.max() <= most:
-        return rows
-    after = np.searchsorted(looked_at, rows)
-    before = looked_at[np.maximum(np.searchsorted(looked_at, rows, side="right") - 1, 0)]
-    return np.asarray(rows[looked_at[after] - before <= most])
 
 
 def _across(edges: EdgePoints) -> Floats:
