@@ -88,6 +88,10 @@ class NetworkCamera:
         command = ["ffmpeg", "-loglevel", "quiet", "-re", "-stream_loop", "-1", "-framerate", str(self.rate_hz)]
         command += ["-i", str(self.pictures), *self.coding, "-listen", "1", self.address]
         self.process = subprocess.Popen(command)
+        end_s = time.monotonic() + START_S
+        while not is_listened_at(self.port):
+            assert time.monotonic() < end_s, f"ffmpeg does not listen within {START_S} s"
+            time.sleep(0.02)
 
     def stop(self) -> None:
         if self.process is not None:
@@ -99,6 +103,17 @@ def free_port() -> int:
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         return int(listening.getsockname()[1])
+
+
+def is_listened_at(port: int) -> bool:
+    """Whether a server waits at the port; it is not connected to, since ffmpeg serves its first client alone."""
+    with socket.socket() as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind(("127.0.0.1", port))
+        except OSError:
+            return True
+    return False
 
 
 @pytest.fixture

@@ -228,12 +228,14 @@ def test_a_dropped_file_leaves_the_page_where_it_is_and_a_second_page_is_told_wh
     ):
         assert page.evaluate(DROP, name) is True
         says(page, words)
-    other = opened(view.address)
-    shown(other, "Number(document.querySelector('#picture').dataset.shown) > 3")
-    for each in (page, other):
-        each.evaluate("for (const one of document.querySelectorAll('#panels details')) one.open = true")
+    # The first to do something works the view; to open the panel of the gauges is such a thing already.
+    unfold = "for (const one of document.querySelectorAll('#panels details')) one.open = true"
+    page.evaluate(unfold)
     page.fill("#size_mm", "2")
     page.press("#size_mm", "Enter")
+    other = opened(view.address)
+    shown(other, "document.querySelector('#looks_on').offsetParent")
+    other.evaluate(unfold)
     # Its fields are shut while the first works the view, until it takes over.
     shown(other, "document.querySelector('#size_mm').disabled && document.querySelector('#looks_on').offsetParent")
     other.click("#take_over")
