@@ -146,7 +146,8 @@ class BodyTracker:
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
-                f"The edges of {self.mechanism.name} must be seen where it is laid on frame {index}, but are not: "
+                f"The edges of {self.mechanism.name} must be visible where it was placed on frame {index}, "
+                "but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )
         notes = placed.notes if laid.by_fixed else (*placed.notes, LAID_BY_ALL)
@@ -209,7 +210,7 @@ class BodyTracker:
 
     def _seen(self, grey: Array, view: EdgeView) -> dict[str, SeenPose]:
         if self.placed is None:
-            raise AssertionError("no drawing was laid")
+            raise AssertionError("no drawing was placed on the picture")
         place, pyramid = self.placed.place, list[Array]()
         found: dict[str, SeenPose] = {}
         shared: dict[str, SharedPose] = {}
