@@ -1,4 +1,4 @@
-"""Worker process of a user's model: it reads times and inputs, and writes the points of the fingers."""
+"""Worker process of a user's model: reads times and inputs, and writes positions of the fingers' measuring points."""
 
 import json
 import sys
@@ -62,7 +62,7 @@ def _python_function(path: Path) -> Function:
 
 
 def _points(answer: Answer, time_s: Array) -> dict[str, Array]:
-    """Convert a model's return value to left, right and force; refuse what is no finite number for each time."""
+    """Convert a model's return value to left, right and force; refuse any that has not one finite number per time."""
     out: dict[str, Array] = {}
     for name in ("gap_mm", "left_mm", "right_mm", "force_n"):
         if name not in answer:

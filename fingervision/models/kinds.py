@@ -1,4 +1,4 @@
-"""The parametric models: modules of this package that state their KIND, and those of other distributions."""
+"""Registry of the parametric models: modules of this package that define KIND, and those of other distributions."""
 
 import importlib
 from collections.abc import Iterable
@@ -26,17 +26,17 @@ class GripperModel(Model, Protocol):
 
     @property
     def name(self) -> str:
-        """Its kind."""
+        """Name of the model's kind."""
         ...
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input for which the model is meant (mm)."""
+        """Smallest and largest input for which the model is valid (mm)."""
         ...
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero (mm)."""
+        """The gap at zero input (mm)."""
         ...
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -47,7 +47,7 @@ class GripperModel(Model, Protocol):
         ...
 
     def figures(self) -> ModelFigures:
-        """Figures of the model for the comparison table."""
+        """Characteristic numbers of the model for the comparison table."""
         ...
 
 
@@ -56,14 +56,14 @@ class Kind(Protocol):
 
     Optional attributes are `SMALL_DISPLACEMENTS_ALONE` (True for a model without large rotation and contact) and
     `TRUST`, a number (finite elements of the outline 3, bars in the plane 2, bars at small displacements 1; default 0).
-    Where two kinds differ by more than their own errors, the one with the larger number is trusted, for the reason
-    given in `WHY_TRUSTED`.
+    If two kinds differ by more than their own errors, the kind with the larger `TRUST` is trusted, for the reason given
+    in `WHY_TRUSTED`.
     """
 
     KIND: str
 
     def build(self, gripper: Gripper, physics: Physics, theory: HingeTheory) -> GripperModel:
-        """Build it."""
+        """Build the model of a gripper."""
         ...
 
 
@@ -102,12 +102,12 @@ def by_trust(names: Iterable[str]) -> list[str]:
 
 
 def trust(kind: str) -> int:
-    """Trust in a kind relative to others: how much of the outline it models."""
+    """Number by which a kind is trusted relative to others: the larger, the more of the outline it models."""
     return int(getattr(REGISTRY.get(kind).value, "TRUST", 0)) if kind in kinds() else 0
 
 
 def why_trusted(kind: str) -> str:
-    """Reason why this kind of model is more accurate than simpler ones; empty if it states none."""
+    """Reason why this kind of model is more accurate than simpler kinds; empty if the module gives none."""
     return str(getattr(REGISTRY.get(kind).value, "WHY_TRUSTED", "")) if kind in kinds() else ""
 
 
@@ -121,16 +121,16 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     gripper : Gripper
         The drawing.
     physics : Physics
-        What goes beyond small displacements; some kinds know small displacements alone.
+        Which effects beyond small displacements are included; some kinds support small displacements only.
     theory : HingeTheory
-        Of the hinges; `finite_element` has no need of one.
+        Theory of the hinges' compliance; not used by `finite_element`.
 
     Raises
     ------
     UsageError
-        Where the kind is unknown or does not know the physics asked for.
+        If the kind is unknown or does not support the requested physics.
     PluginShapeError
-        A model from outside the package fails, or answers what is no answer.
+        If a model from outside the package fails or returns an invalid result.
     """
     try:
         entry = REGISTRY.get(kind)
