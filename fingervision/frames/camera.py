@@ -37,7 +37,7 @@ def open_frames(name: str, wish: Wish) -> "CameraFrames":
     Raises
     ------
     DeviceError
-        There is no such camera, somebody else has it, or it gives no picture.
+        The camera does not exist, is in use by another program, or delivers no picture.
     """
     return CameraFrames(name, wish)
 

@@ -46,7 +46,7 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
     InputFileError
         The producer's file is not there.
     DeviceError
-        There is no such camera, somebody else has it, or it gives no grey levels.
+        The camera does not exist, is in use by another program, or delivers no grey levels.
     """
     return GenicamFrames(name, wish)
 
@@ -114,7 +114,7 @@ class GenicamFrames:
         Raises
         ------
         DeviceError
-            It sends nothing any more.
+            The camera has stopped sending pictures.
         """
         try:
             for index in count():

@@ -28,7 +28,7 @@ def open_frames(name: str, wish: Wish) -> "ImageFolder":
     Raises
     ------
     DataError, InputFileError
-        There are no images, or none can be read, or their times make no sense.
+        The folder has no images, none of them can be read, or their times are invalid.
     UsageError
         The rate is not positive, or the images have times already.
     """

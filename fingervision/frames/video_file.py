@@ -59,7 +59,7 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, is no video, or has no picture in it.
+        The file cannot be read, is not a video, or contains no picture.
     UsageError
         A rate is given for what has its own times.
     """

@@ -38,7 +38,7 @@ class OverlayVideo:
     Raises
     ------
     FingervisionError
-        It cannot be written; also from `add` and on leaving.
+        The video cannot be written; also raised by `add` and at the end of the `with` block.
     """
 
     def __init__(self, path: Path, description: Description) -> None:
