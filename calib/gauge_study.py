@@ -115,7 +115,8 @@ def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
     Raises
     ------
     CalibrationError
-        The recordings differ in parts or readings, a reading is missing, or there are fewer than two recordings or readings.
+        The recordings differ in parts or readings, a reading is missing, or there are fewer than two recordings or
+        readings.
     """
     lengths = {len(cell) for recording in readings_mm for cell in recording}
     if len(lengths) != 1 or len({len(recording) for recording in readings_mm}) != 1:
