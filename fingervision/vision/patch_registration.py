@@ -224,7 +224,7 @@ def register(
     first = references[0]
     hessian = np.stack([reference.hessian for reference in references])
     hessian += 1e-6 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-12 * np.eye(3)
-    inverse = np.linalg.inv(hessian)
+    inverse = np.asarray(np.linalg.inv(hessian), dtype=np.float64)
     scores = np.zeros((len(references), BLOCKS**2, 3))
     found = [
         _settled(
