@@ -13,6 +13,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from skfem.helpers import dot, eye, mul, trace, transpose
 
 from fingervision.domain.gripper import Material
+from fingervision.models.point_in_mesh import element_weights
 from fingervision.models.triangulate import PlaneMesh
 from fingervision.models.width_effect import ConstrainedZone, held_moduli, shares_at
 
@@ -95,10 +96,21 @@ class PlaneStressPlate:
         return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
 
     @cached_property
+    def nodes_of_triangles(self) -> Indices:
+        """Corners, then middles of the edges, of every triangle as indices of `nodes_mm`, shape (6, m)."""
+        return np.vstack([self._mesh.t[:3], int(self._basis.nodal_dofs.shape[1]) + self._mesh.t2f])
+
+    def rows_at(self, point: tuple[float, float]) -> Array:
+        """Displacements to the motion along x and y of a point of the body, shape (2, unknowns)."""
+        nodes, weights = element_weights(self.nodes_mm, self.nodes_of_triangles, point)
+        rows = np.zeros((2, self.unknowns))
+        rows[0, self.x_dofs[nodes]] = rows[1, self.y_dofs[nodes]] = weights
+        return rows
+
+    @cached_property
     def unknowns_of_triangles(self) -> Indices:
         """Unknowns of every triangle, first along x, then along y; shape (m, 12)."""
-        corners, edges = self._mesh.t[:3], self._mesh.t2f
-        nodes = np.vstack([corners, int(self._basis.nodal_dofs.shape[1]) + edges])
+        nodes = self.nodes_of_triangles
         return np.ascontiguousarray(np.vstack([self.x_dofs[nodes], self.y_dofs[nodes]]).T)
 
     @cached_property
