@@ -157,6 +157,8 @@ class PlaneStressPlate:
         # All points of a triangle in one product.
         along = strains.reshape(triangles, 3 * points, 12)
         elements = np.swapaxes(along, 1, 2) @ stressed.reshape(triangles, 3 * points, 12)
+        if not displacement_mm.any():
+            return self._assembled(elements, at_rest=True), np.zeros(self.unknowns)
         # The stress that is there already resists a turn: slope, stress, slope.
         sx, sy, txy = (stress[..., k, None] * weights[..., None] for k in range(3))
         pulled = np.stack([sx * dx + txy * dy, txy * dx + sy * dy], axis=2)
@@ -164,7 +166,7 @@ class PlaneStressPlate:
         turned = np.swapaxes(flat, 1, 2) @ pulled.reshape(triangles, 2 * points, 6)
         elements[:, :6, :6] += turned
         elements[:, 6:, 6:] += turned
-        return self._assembled(elements, at_rest=not displacement_mm.any()), self._collected(deformation, stress)
+        return self._assembled(elements, at_rest=False), self._collected(deformation, stress)
 
     def nodal_force_n(self, displacement_mm: Array) -> Array:
         """Nodal forces of the deformed plate without the tangent stiffness, at a tenth of the cost."""
