@@ -101,7 +101,7 @@ def _least_refuted(distance: float) -> float:
     If it is true, the other leaves `distance` more than it, with a standard deviation of 2 sqrt(distance) (Cox 1961).
     Two explanations that such data could distinguish are both kept if these data favour neither.
     """
-    return -distance + SURELY * 2.0 * float(np.sqrt(distance)) + SPARE
+    return -distance + SURELY * 2.0 * float(np.sqrt(max(0.0, distance))) + SPARE
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
