@@ -112,7 +112,7 @@ class CameraFrames:
                 if not read or pixels is None:
                     failed += 1
                     if failed >= FAILED_READS:
-                        raise DeviceError(f"The camera {self.name} gives no pictures any more: is it plugged in?")
+                        raise DeviceError(f"The camera {self.name} has stopped sending pictures: is it plugged in?")
                     continue
                 failed = 0
                 arrived_s = monotonic()

@@ -123,8 +123,8 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
         if grey.shape != first.shape:
             (height, width), (first_height, first_width) = grey.shape, first.shape
             raise DataError(
-                f"All pictures must be of one size, but {name} is {width}x{height} and {first_name} is "
-                f"{first_width}x{first_height}: take all of them with the camera set alike."
+                f"All pictures must have the same size, but {name} is {width}x{height} and {first_name} is "
+                f"{first_width}x{first_height}: take all of them with the same camera settings."
             )
     return pictures
 

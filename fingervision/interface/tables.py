@@ -219,7 +219,7 @@ def told_apart(paths: list[Path]) -> list[str]:
         names = [Path(*path.parts[-parts:]).as_posix() for path in paths]
         if len(set(names)) == len(names):
             return names
-    raise UsageError("--model names the same file twice: each model counts once.")
+    raise UsageError("--model names the same file twice: name each model only once.")
 
 
 def effect_names(argument: str, names: Any) -> frozenset[str]:

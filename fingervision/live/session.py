@@ -157,7 +157,9 @@ class Session:
         """
         with self._lock:
             if MOVES_ZERO & set(changes) and (self._recorder is not None or self._beginning):
-                raise StateError("While a run is recorded the measurement stays as it is: stop recording first.")
+                raise StateError(
+                    "The settings of the measurement cannot be changed while a run is recorded: stop recording first."
+                )
             chosen, unzeroed = self.choices.changed(**changes)
             chosen.check(self.description)
             self.choices = chosen
@@ -183,7 +185,7 @@ class Session:
             if self._beginning:
                 raise StateError("A recording is being begun already.")
             if task is None:
-                raise StateError("The scale is not known: give it before recording, so that the run has gaps.")
+                raise StateError("The scale is not known: give the scale before recording, so that the run has gaps.")
             if not self.description.has_times:
                 raise StateError("These images have no times, which a recording needs: give --rate-hz.")
             self._beginning = True

@@ -168,8 +168,9 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     if not best or best[0][0] < LEAST_OVERLAP:
         share = best[0][0] if best else 0.0
         raise DataError(
-            f"The drawing {mechanism.name} must cover what the picture shows, but at best {100.0 * share:.0f} % of "
-            "both is common: show the whole mechanism, check the scale, or give --at X,Y=XMM,YMM for three points."
+            f"The drawing {mechanism.name} must cover the mechanism that the picture shows, but at best only "
+            f"{100.0 * share:.0f} % of the two areas overlap: show the whole mechanism, check the scale, or give "
+            "--at X,Y=XMM,YMM for three points."
         )
     top = best[0]
     others = [entry for entry in best[1:] if entry[0] > top[0] - AS_GOOD]

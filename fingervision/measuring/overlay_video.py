@@ -100,7 +100,8 @@ class OverlayVideo:
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)
         return OutputError(
-            f"{self._path} could not be written ({why}): make room, name another --out, or leave out --overlay."
+            f"{self._path} could not be written ({why}): free disk space, name another folder with --out, or "
+            "leave out --overlay."
         )
 
 

@@ -189,7 +189,7 @@ def assemble_bodies(
         nodes = np.flatnonzero(piece == body)
         if not own:
             x, y = plate.nodes_mm[:, nodes[0]]
-            raise ModelError(f"The body of {mechanism.name} at ({x:.4g}, {y:.4g}) mm is joined to nothing.")
+            raise ModelError(f"The body of {mechanism.name} at ({x:.4g}, {y:.4g}) mm is not joined to any other body.")
         unknowns = np.concatenate([plate.x_dofs[nodes], plate.y_dofs[nodes]])
         bodies.append(condensed(plate, unknowns, [frames.found[i] for i in own], own))
     turning = [CorotationalBody(np.array([frames.found[i].at_mm for i in body.frames]), body.stiffness_n_mm)

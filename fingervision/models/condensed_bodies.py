@@ -100,8 +100,8 @@ def condensed(
     except RuntimeError as error:
         x, y = frames[0].at_mm
         raise ModelError(
-            f"The body at ({x:.5g}, {y:.5g}) mm must be held apart by its faces and flexures, but two of them hold the "
-            "same nodes; check that no two faces or flexures lie on each other."
+            f"The body at ({x:.5g}, {y:.5g}) mm must have separate faces and flexures, but two of them share "
+            "mesh nodes; check that no two faces or flexures overlap."
         ) from error
     given = np.vstack([np.zeros((unknowns.size, motion.shape[1])), motion])
     moved = solver.solve(given)[: unknowns.size]

@@ -46,7 +46,9 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     try:
         from fmpy import extract, read_model_description, supported_platforms
     except ImportError:
-        raise ValueError("is an FMU, which FMPy reads: install it with `pip install fingervision[fmu]`.") from None
+        raise ValueError(
+            "is an FMU, which is read by the library FMPy: install that with `pip install fingervision[fmu]`."
+        ) from None
     if not path.is_file():
         raise ValueError("must be a file, but is not there.")
     try:
@@ -173,7 +175,8 @@ def _choose(variables: list[Any], causality: str, stated: str | None, usual: tup
     if not real:
         raise ValueError(f"must have a real {causality} to be driven in time, but has none.")
     raise ValueError(
-        f"has {len(real)} {causality}s ({_listed(real)}), and it is not said which is the {word}: name it in a "
+        f"has {len(real)} {causality}s ({_listed(real)}), and it is not stated which of them is the {word}: "
+        "name it in a "
         f'model.toml with base = "the.fmu" and {word} = "its name".'
     )
 

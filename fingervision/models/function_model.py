@@ -136,7 +136,7 @@ class FunctionModel:
             name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
             return f"{self.path} must answer, but crashed ({name}): the fault is in the model; nothing was lost."
         last = f" Its last words: {said[-1][:300]}" if said else ""
-        return f"{self.path} must answer, but its process ended with code {code}: mend the model.{last}"
+        return f"{self.path} must answer, but its process ended with code {code}: correct the model.{last}"
 
 
 SAYS = "fingervision-model: "

@@ -72,7 +72,9 @@ def _points(answer: Answer, time_s: Array) -> dict[str, Array]:
         except (TypeError, ValueError):
             raise ValueError(f"must give numbers for {name}, but gives {type(answer[name]).__name__}.") from None
         if values.shape != time_s.shape:
-            raise ValueError(f"must give {time_s.size} values of {name}, one a time, but gives shape {values.shape}.")
+            raise ValueError(
+                f"must give {time_s.size} values of {name}, one for each time, but gives shape {values.shape}."
+            )
         if not np.all(np.isfinite(values)):
             at_s = float(time_s[np.flatnonzero(~np.isfinite(values))[0]])
             raise ValueError(f"must give finite values of {name}, but gives a NaN or infinity at {at_s:g} s.")

@@ -112,7 +112,7 @@ def integrate(
             v[free] += gamma / (beta * step_s) * change
             a[free] += change / (beta * step_s**2)
         else:
-            raise ModelError(f"The motion did not settle in step {place} of {step_s:g} s; use shorter steps.")
+            raise ModelError(f"The motion did not converge in step {place} of {step_s:g} s; use shorter steps.")
         rows.append((u.copy(), v.copy(), a.copy()))
     return Motion(*(np.array(part) for part in zip(*rows, strict=True)))
 

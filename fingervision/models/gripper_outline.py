@@ -129,8 +129,8 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     if len(pieces) != 2 or not parted:
         end = "clamp" if number == 1 else "drive"
         raise DataError(
-            f"Hinge {number} in {origin} must be all that joins the {end} to the tip, but beside the "
-            f"neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm other material does; check "
+            f"Hinge {number} in {origin} must be the only connection from the {end} to the tip, but other material "
+            f"beside the neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm connects them too; check "
             f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
         )
 
@@ -174,5 +174,5 @@ def check_stated_size(gripper: Gripper, origin: str) -> None:
         if abs(stated - value) > _STATED * value:
             raise DataError(
                 f"body.{name} in {origin} must be that of the drawn links, {value:.6g} mm within "
-                f"{100.0 * _STATED:g} %, but is {stated:g}; correct the one or the other."
+                f"{100.0 * _STATED:g} %, but is {stated:g}; correct one of the two."
             )

@@ -139,7 +139,7 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     if entry.origin.built_in:
         return entry.value.build(gripper, physics, theory)
     if physics != LINEAR and small_displacements_alone(kind):
-        raise UsageError(f"{kind} knows small displacements alone: leave out --large-rotation and --contact.")
+        raise UsageError(f"{kind} handles small displacements only: leave out --large-rotation and --contact.")
     return _tried(kind, entry.origin, entry.value, gripper, physics, theory)
 
 
@@ -161,11 +161,11 @@ def _tried(
         raise
     except Exception as error:
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-        raise PluginShapeError(f"{who} must answer for every drawing, but raised {said}: {origin.remedy}.") from error
+        raise PluginShapeError(f"{who} must work for every drawing, but raised {said}: {origin.remedy}.") from error
     if shapes != {asked.shape} or not np.all(np.isfinite(gap_mm)):
         words = f"{gap_mm.tolist()}" if shapes == {asked.shape} else f"shape {sorted(shapes)}"
         raise PluginShapeError(
-            f"{who} must answer three inputs with three finite gaps, but gave {words}: {origin.remedy}."
+            f"{who} must give three finite gaps for three inputs, but gave {words}: {origin.remedy}."
         )
     if not np.isclose(gap_mm[1], rest_mm, rtol=0.0, atol=1e-9 * max(1.0, abs(rest_mm))):
         raise PluginShapeError(
@@ -173,9 +173,11 @@ def _tried(
         )
     if not isinstance(figures, ModelFigures):
         given = type(figures).__name__
-        raise PluginShapeError(f"{who} must give ModelFigures as its figures, but gave a {given}: {origin.remedy}.")
+        raise PluginShapeError(
+            f"{who} must return a ModelFigures object from `figures`, but returned a {given}: {origin.remedy}."
+        )
     if figures.peak_stress is not None and not hasattr(model, "loaded"):
         raise PluginShapeError(
-            f"{who} must have loaded(inputs_mm) where it knows a stress, but has none: {origin.remedy}."
+            f"{who} must have a method loaded(inputs_mm) if it states a stress, but has none: {origin.remedy}."
         )
     return model

@@ -145,8 +145,8 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         raise DataError(f"In {name}: {error}") from error
     if outer != 1:
         raise DataError(
-            f"The bodies of {name} must be one piece, but are {outer}; let bodies and flexures overlap, and "
-            "no cut part them."
+            f"The bodies of {name} must form one connected piece, but form {outer}; let bodies and flexures "
+            "overlap, and let no cut separate them."
         )
     size = region.size_mm
     uncut = PlanarRegion(mechanism.bodies)
@@ -166,17 +166,17 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             _check_leaf(flexure, region, uncut, name)
         elif flexure.is_notch and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
             raise DataError(
-                f"The cuts of flexure {flexure.name} of {name} must open through the faces of what they part, but a "
-                f"whole ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm is a closed hole; make it "
-                "larger, or check its unit."
+                f"The cuts of flexure {flexure.name} of {name} must reach the outer edges of the body, but an "
+                f"ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm lies wholly inside it, as a closed "
+                "hole; enlarge the ellipse, or check its unit."
             )
     for place, flexure in enumerate(mechanism.flexures):
         for other in mechanism.flexures[:place]:
             apart = hypot(flexure.at_mm[0] - other.at_mm[0], flexure.at_mm[1] - other.at_mm[1])
             if apart < 0.5 * (flexure.thickness_mm + other.thickness_mm):
                 raise DataError(
-                    f"flexures {other.name} and {flexure.name} of {name} must be apart, but lie on each other; take "
-                    "one away or move it."
+                    f"flexures {other.name} and {flexure.name} of {name} must be apart, but overlap; remove "
+                    "or move one of them."
                 )
     for probe, (x, y) in mechanism.probes.items():
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
@@ -199,8 +199,8 @@ def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, nam
     beside = np.array([flexure.point_mm(x * t, s * 0.501 * t) for x in (-0.5, 0.5) for s in (-1.0, 1.0)]).T
     if region.holds(beside).any():
         raise DataError(
-            f"flexure {flexure.name} of {name} must be free for longer than its thickness of {t:g} mm, but is not; "
-            "check its length and whether all lengths are millimetres."
+            f"flexure {flexure.name} of {name} must have a free length greater than its thickness of {t:g} "
+            "mm, but is not; check its length and whether all lengths are millimetres."
         )
     ends = np.array([flexure.point_mm(s * reach * (1.0 - 1e-6), 0.0) for s in (-1.0, 1.0)]).T
     inside = uncut.holds(ends)

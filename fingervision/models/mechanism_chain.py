@@ -216,7 +216,7 @@ class MechanismChain:
         """
         if large_rotation or contact:
             raise ModelError(
-                "The stiffness matrix knows small displacements without contact alone; take --kind lumped or "
+                "The stiffness matrix handles small displacements without contact only; take --kind lumped or "
                 "finite_element."
             )
         mechanism, load = self.mechanism, input_mm * self._load
@@ -253,7 +253,7 @@ class MechanismChain:
                     if one in self._reached and other not in self._reached:
                         self._reached[other] = [*self._reached[one], place]
             if len(self._reached) == before:
-                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that nothing holds.")
+                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that is not joined to a fixed face.")
         return self._reached[body]
 
     def _inward(self, point: tuple[float, float]) -> Array:

@@ -193,8 +193,8 @@ class DrivenMechanism:
             step *= 0.5
             if step < _LEAST_STEP:
                 raise ModelError(
-                    f"The equilibrium of {self.name} was followed to an input of {reached * input_mm:.4g} mm and no "
-                    f"farther, but {input_mm:g} mm are asked for; take a smaller input."
+                    f"The equilibrium of {self.name} could be computed up to an input of "
+                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are asked for; take a smaller input."
                 )
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
         return MechanismEquilibrium(moved, float(self.by_input @ loads), self._by_pair(pressed) if pairs else ())

@@ -184,7 +184,7 @@ def mechanism_sweep_answers(
             else:
                 rows.append({})
         except FingervisionError as error:
-            raise ModelError(f"The variant {_spelt(variations, values)} has no answer: {error}") from error
+            raise ModelError(f"The variant {_spelt(variations, values)} could not be computed: {error}") from error
     found = rows[len(corners) :]
     columns = tuple(dict.fromkeys(name for row in found for name in row if not name.startswith("model_error")))
     return np.array(grid), columns, np.array([[row.get(name, np.inf) for name in columns] for row in found])

@@ -231,5 +231,5 @@ def _lifted_mass(member: Member, plate_mm: float) -> Array:
 def build(gripper: Gripper, physics: Physics, theory: HingeTheory) -> StiffnessMatrixGripper:
     """Build the model; see `fingervision.models.kinds`."""
     if physics != LINEAR:
-        raise UsageError("The stiffness matrix knows small displacements alone; take --kind lumped or finite_element.")
+        raise UsageError("The stiffness matrix handles small displacements only; take --kind lumped or finite_element.")
     return StiffnessMatrixGripper(gripper, theory)

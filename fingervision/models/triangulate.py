@@ -53,7 +53,7 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
         if inside.shape[1] + len(sides) > MOST_NODES:
             raise ModelError(
                 f"The body must be meshed by at most {MOST_NODES} nodes, but {inside.shape[1] + len(sides)} are "
-                "needed: its thinnest part is too thin beside its length."
+                "needed: its thinnest part is too thin for the size of the body."
             )
         corners, triangles = relaxed_nodes(region, field, outline_points(sides), inside)
         missing = missing_sides(sides, triangles)

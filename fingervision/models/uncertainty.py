@@ -164,6 +164,6 @@ def _samples(
     if refused > _MOST_REFUSED * count:
         raise ModelError(
             f"The stated uncertainties must leave a drawing that works, but {refused} of {count} drawings within them "
-            f"do not; state smaller ones. The last: {last}"
+            f"do not; state smaller uncertainties. The last failure: {last}"
         )
     return {figure: np.array(values) for figure, values in rows.items()}

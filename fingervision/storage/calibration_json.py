@@ -119,7 +119,7 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} stands where a number must be")
+    raise ValueError(f"{name} is given where a number is needed")
 
 
 class _Reader:

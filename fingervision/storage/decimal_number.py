@@ -24,7 +24,7 @@ def decimal_number(cell: str) -> float:
     ValueError: 1_0 is no decimal number
     """
     if not are_decimal((cell,)):
-        raise ValueError(f"{cell} is no decimal number")
+        raise ValueError(f"{cell} is not a decimal number")
     return float(cell)
 
 

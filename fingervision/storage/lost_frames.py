@@ -59,7 +59,7 @@ class LostFrames:
     def _failed(self, error: OSError) -> FingervisionError:
         return OutputError(
             f"{self._path} could not be written any further ({error.strerror}); what was recorded until then is valid: "
-            "make room, or name another --out."
+            "free disk space, or name another folder with --out."
         )
 
 
@@ -93,8 +93,8 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
     path = files[0].parent / LOST
     if not path.exists():
         raise DataError(
-            f"{path} must say which frames of {files[0].name} were damaged when they came, but is missing: put it "
-            "back, or measure a copy of the video in another folder, where damaged frames may look whole."
+            f"{path} must list the frames of {files[0].name} that were damaged on arrival, but is missing: put the "
+            "file back, or measure a copy of the video in another folder, where damaged frames may look whole."
         )
     columns = read_columns(path, ("time_s", "status", "words"), ())
     found = []

@@ -103,4 +103,4 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
         part.replace(path)
     except OSError as error:
-        raise OutputError(f"{path} could not be written ({error.strerror}): make room.") from error
+        raise OutputError(f"{path} could not be written ({error.strerror}): free disk space.") from error

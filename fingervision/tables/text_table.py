@@ -176,7 +176,7 @@ class _Rows:
         if len(odd) > max(1.0, MOST_ODD * len(rows)):
             raise DataError(
                 f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
-                f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): mend them, or state the "
+                f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
                 "key separator in columns.toml."
             )
         left_out = []
