@@ -1,4 +1,4 @@
-"""A finished search, and the settings of searches."""
+"""Result of a completed search, and the settings of searches."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +13,7 @@ from fingervision.diagnosis.input.observations import Observations
 
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
-    """Estimate the noise from the residual of an explanation, or from the disagreement where there is none yet."""
+    """Estimation problem with the noise from an explanation's residual, or from the disagreement if there is none."""
     values = {} if explanation is None else explanation.values
     free = 0 if explanation is None else explanation.free
     return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)
@@ -21,7 +21,7 @@ def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    """A search that was made: measurement and model, what was found, and what slots of known width said."""
+    """A completed search: measurement and model, findings, and the results of reference slots."""
 
     data: Observations
     found: Findings
@@ -30,14 +30,14 @@ class Searched:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """How searches are made."""
+    """Settings of searches."""
 
     rng: np.random.Generator
     forced: frozenset[str]
     progress: Progress
 
     def again(self, data: Observations, known: Explanation | None = None) -> Searched:
-        """Search once more, the noise estimated beside what is known already."""
+        """Search again, with the noise estimated from the residual of a known explanation."""
         found = search(partial(problem_of, data), self.rng, self.forced, self.progress, known)
         found, said = consistent_with_gauges(data, found)
         return Searched(data, found, said)

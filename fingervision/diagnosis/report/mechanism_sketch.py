@@ -1,4 +1,4 @@
-"""Sketch of the mechanism on the page: every body as predicted and as measured, with the difference magnified."""
+"""Sketch of the mechanism on the HTML page: predicted and measured pose of every body, with magnified difference."""
 
 import json
 from collections.abc import Sequence
@@ -13,24 +13,24 @@ from fingervision.models.place_answers import PlaceAnswers
 Array = NDArray[np.float64]
 
 STEPS = 15
-"""Positions of the slider: parts of the input's range, each the mean of its rows."""
+"""Number of slider positions: parts of the input's range, each represented by the mean of its rows."""
 SHOWN = 0.05
-"""Of the mechanism's size: the largest difference as it is drawn."""
+"""Largest displayed difference, as a share of the mechanism's size."""
 CHORDS = 9
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 COLOURS = (("#7a8b99", 3.0), ("#c9a227", 6.0), ("#c1440e", np.inf))
-"""Of a body whose mean is off by up to so many standard deviations."""
+"""Colour of a body whose mean deviation is up to a given number of standard deviations."""
 
 
 def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
-    """Draw the bodies that have a pose; a slider goes through the input's range.
+    """Draw the bodies with a measured pose; a slider moves through the input's range.
 
     Parameters
     ----------
     evidence : BodyEvidence
-        What the channels said.
+        Results of comparing the measured channels with the drawing.
     answers : PlaceAnswers
-        The drawing.
+        Predictions of the drawing.
     """
     u, kept = evidence.prediction.input_mm, evidence.findings.noise.kept
     order = np.flatnonzero(kept)[np.argsort(u[kept], kind="stable")]
@@ -97,9 +97,9 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
 
 
 def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
-    """Mean of measured minus predicted pose of a body in every part of the range, shape (parts, 3).
+    """Mean difference of a body's measured and predicted pose in every part of the range, shape (parts, 3).
 
-    The second value is its largest significance.
+    The second result is the largest significance of these differences.
     """
     means, sigma = np.zeros((len(parts), 3)), np.zeros(len(parts))
     for k, part in enumerate(PARTS):
