@@ -1,4 +1,4 @@
-"""report.html: the whole result on one self-contained page."""
+"""report.html: the whole result on one self-contained HTML page."""
 
 import base64
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ SIMULATION, CORRECTED = "simulation", "corrected model"
 
 
 def curves_of(diagnosis: Diagnosis) -> GapCurves:
-    """Curves of measurement, simulation and, where effects were named, the corrected model."""
+    """Curves of measurement, simulation and, if effects were named, the corrected model."""
     data = diagnosis.data
     predictions = {SIMULATION: data.stacked_mm - diagnosis.before_mm}
     if diagnosis.report.effects:
