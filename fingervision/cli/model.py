@@ -40,8 +40,8 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
-@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Which model.")
-@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs to answer.")
+@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Kind of model.")
+@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs over time.")
 @columns_option
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder to write."
@@ -49,20 +49,22 @@ Examples:
 @click.option("--hinge", type=click.Choice(["corrected", "beam"]), default="corrected", show_default=True,
               help="Hinge compliance: beam theory corrected by finite elements, or beam theory alone.")  # fmt: skip
 @click.option("--large-rotation", is_flag=True, help="Equilibrium in the deformed shape (not for stiffness_matrix).")
-@click.option("--contact", is_flag=True, help="Fingers touch and stop (not for stiffness_matrix).")
-@click.option("--modes", metavar="N|F", help="Write and draw N natural modes of each family, or all up to a frequency "
-              "such as 500Hz.")  # fmt: skip
-@click.option("--film", is_flag=True, help="With --modes: the modes in motion too, modes.mp4.")
-@click.option("--frequency", metavar="A:B", help="Response to a drive that shakes it at A to B Hz: frequency.csv and "
-              "frequency.png.")  # fmt: skip
-@click.option("--damping", default="modal:0.025", show_default=True, metavar="LAW", help="In motion: modal:RATIO, "
-              "loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 above the lowest mode).")  # fmt: skip
-@click.option("--rate-hz", type=float, help="Rows a second of response.csv, beside the drive's own samples.")
-@click.option("--object-mm", type=float, help="Width of a part between the fingers: grip.csv and grip.png.")
-@click.option("--object-n-mm", type=float, help="Stiffness of that part in N/mm; rigid where left out.")
-@click.option("--mesh", is_flag=True, help="Draw the mesh of the finite elements to mesh.png.")
-@click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Table over one number of the drawing, N values from "
-              "A to B; several make a grid. Writes vary.csv and vary.png, by the lumped model.")  # fmt: skip
+@click.option("--contact", is_flag=True, help="Let the fingers touch and stop each other (not for stiffness_matrix).")
+@click.option("--modes", metavar="N|F", help="Write and plot N natural modes of each family, or all modes up to a "
+              "frequency such as 500Hz.")  # fmt: skip
+@click.option("--film", is_flag=True, help="With --modes: also write a film of the modes, modes.mp4.")
+@click.option("--frequency", metavar="A:B", help="Frequency response to a vibrating drive, A to B Hz: frequency.csv "
+              "and frequency.png.")  # fmt: skip
+@click.option("--damping", default="modal:0.025", show_default=True, metavar="LAW", help="Damping in motion: "
+              "modal:RATIO, loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (its equation 4).")  # fmt: skip
+@click.option("--rate-hz", type=float, help="Rows per second in response.csv, in addition to the drive's own samples.")
+@click.option(
+    "--object-mm", type=float, help="Width of a gripped part; writes its gripping force to grip.csv and grip.png."
+)
+@click.option("--object-n-mm", type=float, help="Stiffness of that part in N/mm; rigid if left out.")
+@click.option("--mesh", is_flag=True, help="Plot the finite-element mesh to mesh.png.")
+@click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Vary a number of the drawing over N values from A "
+              "to B; several make a grid. Writes vary.csv and vary.png, computed by the lumped model.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
 def command(
     gripper_toml: Path,
@@ -84,12 +86,12 @@ def command(
     vary: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Predict gap, force, stress and vibration from a drawing, by one model or all of them.
+    """Predict gap, force, stress and vibration from a drawing, by one kind of model or all kinds.
 
     Writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the paper's Figure 9, with
-    differences) and deformed.png (with finite elements). With --drive also response.csv, the gap and the force over
-    the drive's time, which compare and diagnose take as measured, and response.png. A mechanism drawn by bodies
-    (mechanism.toml) is answered by finite elements: mechanism.csv, deformed.png.
+    differences) and deformed.png (with finite elements). --drive also writes response.png and response.csv, the gap and
+    the force over the drive's time; compare and diagnose take response.csv like a measured table. A mechanism.toml is
+    computed by finite elements and by lumped flexures; it gives mechanism.csv and deformed.png.
     """
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_inputs import inputs_mm, inputs_until_touch, with_rows_between
