@@ -9,7 +9,7 @@ COVERAGE_FACTOR = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """A measurement compared with a certified value.
+    """Comparison of a measurement with a certified value.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ class Agreement:
 
     @property
     def deviation_mm(self) -> float:
-        """Measured less certified."""
+        """Measured minus certified value (mm)."""
         return self.measured_mm - self.certified_mm
 
     @property
     def e_n(self) -> float:
-        """Deviation over the expanded uncertainty of the deviation (ISO 13528:2022, 9.6): within +-1 they agree."""
+        """Deviation over its expanded uncertainty, E_n (ISO 13528, 2022, section 9.6); within +-1 both values agree."""
         expanded = COVERAGE_FACTOR * hypot(self.u_measured_mm, self.u_certified_mm)
         return self.deviation_mm / expanded if expanded > 0.0 else float("inf")
 

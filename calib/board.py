@@ -81,11 +81,11 @@ class BoardCorners:
     name : str
         The picture's name.
     points_px : ndarray, shape (n, 2)
-        Where they are seen.
+        Positions of the corners in the picture, in pixels.
     cells : ndarray of int, shape (n, 2)
-        Which they are: column and row on the board.
+        Column and row of each corner on the board.
     board_mm : ndarray, shape (n, 2)
-        Where they are on the board.
+        Positions of the corners on the board, in mm.
     """
 
     name: str

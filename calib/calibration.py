@@ -18,7 +18,7 @@ class BareScale:
     Parameters
     ----------
     px_per_mm : float
-        Pixels to the millimetre; positive.
+        Pixels per millimetre; positive.
 
     Raises
     ------

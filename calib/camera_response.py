@@ -27,13 +27,13 @@ class CameraResponse:
     Parameters
     ----------
     name : str
-        How it is called in files and sentences.
+        Name of the response in files and messages.
     level : ndarray of float, shape (n,)
         Stored level as a share of full scale, from 0 to 1, increasing.
     light : ndarray of float, shape (n,)
-        Light as a share of that which gives full scale, from 0 to 1, increasing.
+        Light as a share of the light that gives full scale, from 0 to 1, increasing.
     top_level : int or None
-        Full scale of the pictures that it was measured on; None where it holds for any depth.
+        Full-scale level of the pictures on which the response was measured; None if it is valid for any bit depth.
 
     Raises
     ------

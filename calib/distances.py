@@ -17,7 +17,7 @@ class Distances:
     u_mm : ndarray of float, shape (n,), or None
         Standard uncertainties with everything in the scale's budget; None where the scale has no uncertainty stated.
     u_random_mm : ndarray of float, shape (n,)
-        Their random part alone, from frame to frame.
+        Random part of the standard uncertainties, independent from frame to frame.
     """
 
     value_mm: NDArray[np.float64]

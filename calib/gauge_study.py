@@ -39,7 +39,7 @@ class GaugeStudy:
     part_mm : float
         Variation of the parts themselves.
     parts, recordings, trials : int
-        How many of each; trials are those of each part in each recording.
+        Numbers of parts, recordings and trials; trials are counted for each part in each recording.
     """
 
     repeatability_mm: float

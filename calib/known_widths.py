@@ -77,7 +77,7 @@ def find_widths(
     region : tuple of int, optional
         x, y, width and height of the part of every picture to look in.
     px_per_mm : float, optional
-        The scale, where it is known already.
+        The scale, if it is already known.
 
     Raises
     ------

@@ -11,14 +11,14 @@ class Limits:
     """Half-widths of the imperfections that no picture shows; the true value lies within +- the limit.
 
     A limit a stands for the standard uncertainty a / sqrt(3) of a rectangular distribution (JCGM 100:2008, 4.3.7). The
-    defaults are those of an ordinary bench: a camera at 100 mm distance, perpendicular, set up with care.
+    defaults are those of an ordinary set-up: a camera at 100 mm distance, perpendicular, set up with care.
 
     Parameters
     ----------
     estimator_px : float
         Phase bias of the edge finder, each edge (pixels).
     edge_bias_px : float
-        Blooming and threshold of both edges together, where the references cannot tell (pixels): 0.3 px an edge.
+        Edge bias by blooming and threshold, both edges together, if the references do not determine it (pixels).
     plane_mm : float
         Distance of the gripper from the plane of the reference.
     camera_distance_mm : float
@@ -26,9 +26,9 @@ class Limits:
     tilt_deg : float
         Tilt of the plane of the gripper against the picture's, about either axis.
     lens_relative : float
-        Distortion that no lens calibration takes off, as part of the radius at the picture's corner.
+        Residual lens distortion, as a fraction of the radius at the corner of the picture.
     temperature_k : float
-        Difference of temperature between the reference's certificate and the day.
+        Difference between the temperature of the reference and that of its certificate.
     expansion_per_k : float
         Thermal expansion of the reference (steel by default); not a limit but a value.
     """

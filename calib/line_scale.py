@@ -63,7 +63,7 @@ class ScaleLines:
     rows : (int, int)
         First and last row (column, where the lines lie along the rows) that was used.
     is_clipped : bool
-        Whether lines or ground stand at an end of the scale: their widths are then too large or too small.
+        Whether lines or background are clipped; measured line widths are then wrong.
     """
 
     middle_px: Floats

@@ -88,30 +88,29 @@ class Calibration:
     parts : tuple of ScalePart
         The covariance of (s, b), cause by cause.
     frame_size_px : tuple of int
-        Width and height of the pictures that it holds for.
+        Width and height of the pictures for which the calibration is valid.
     limits : Limits
-        What the user states about the bench.
+        Limits that the user states about the set-up.
     stated : frozenset of str
         Names of the limits that the user stated; the others are defaults.
     response : Response
-        How scale and bias moved with lens and tilt.
+        Change of scale and bias with lens and tilt.
     lens : Lens or None
-        Distortion to take off.
+        Lens distortion to correct.
     plane : Plane or None
-        Perspective to take off.
+        Perspective to correct.
     references : tuple of Reference
-        What it was made from.
+        Objects of known size from which the calibration was made.
     camera : mapping of str to str
         The camera's settings, where known.
     made_at, software : str
-        When (ISO 8601) and by what.
+        Time of the calibration (ISO 8601), and version of the program.
     camera_response : CameraResponse or None
-        Which light the levels of its pictures were taken for; None where it does not say.
+        Camera response that was used for the pictures; None if not stated in the file.
     response_known : bool
-        Whether that was stated or measured, and not merely assumed.
+        Whether the camera response was stated or measured, and not merely assumed.
     response_shift_px : float or None
-        How much wider a light gap between its edges is than under the other standard response; None where it does not
-        say.
+        Width of a light gap minus its width under the other standard response; None if not stated in the file.
     """
 
     px_per_mm: float
@@ -142,7 +141,7 @@ class Calibration:
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of (px_per_mm, edge_bias_px), shape (2, 2): the sum over the independent causes."""
+        """Covariance of (px_per_mm, edge_bias_px), shape (2, 2), summed over the independent causes."""
         return np.asarray(np.sum([part.covariance for part in self.parts] or [np.zeros((2, 2))], axis=0))
 
     @property
@@ -251,7 +250,7 @@ class Calibration:
             )
 
     def check_camera(self, settings: Mapping[str, str]) -> None:
-        """Refuse a camera whose settings, where both are known, differ from the calibration's."""
+        """Refuse a camera with a setting that differs from that of the calibration; unknown settings are ignored."""
         for name, value in settings.items():
             known = self.camera.get(name)
             if known is not None and known != value:

@@ -25,11 +25,11 @@ class BoardFit:
     calibration : Calibration
         The result.
     lens : LensFit or None
-        None where there is one picture, which gives the plane alone.
+        Lens distortion; None with a single picture, which gives only the plane.
     plane : PlaneFit
         Of the first picture.
     straightness_px : float
-        Root mean square distance of all corners from straight rows and columns, the lens taken off.
+        Root mean square distance of all corners from straight rows and columns, after correction of the lens.
     """
 
     calibration: Calibration

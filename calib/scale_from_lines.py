@@ -32,9 +32,9 @@ class LineScaleFit:
     used : ndarray of bool, shape (n,)
         Whether the line was used.
     residual_um : ndarray of float, shape (n,)
-        Each line's place as measured, less its place on the scale (micrometres).
+        Measured position of each line minus its position on the scale (micrometres).
     by_edge : (float, float)
-        Scale from the edges at which the level rises alone, and from those at which it falls (px/mm).
+        Scale from rising edges only, and from falling edges only (px/mm).
     width_mm, u_width_mm : float or None
         Mean width of the lines as they look, and its standard uncertainty without the edge bias; None where they are
         too narrow to tell.

@@ -28,13 +28,13 @@ class MeasuredSize:
     Parameters
     ----------
     reference : Reference
-        Its certified size.
+        Certified size of the object.
     width_px, u_width_px : float
-        Its width in the picture, lens and plane taken off, and the standard uncertainty from its edges.
+        Width in the picture, corrected for lens and plane, and its standard uncertainty from the edges.
     points_px : ndarray, shape (2, 2)
-        Where the width begins and ends.
+        Points at which the width begins and ends, in pixels.
     light : bool
-        Whether it is light between the edges.
+        Whether the area between the edges is light.
     """
 
     reference: Reference
@@ -55,7 +55,7 @@ class ScaleFit:
     bias_known : bool
         Whether the edge bias was found; otherwise it is zero, with its limit as an uncertainty.
     residual_mm : ndarray, shape (n,)
-        Linearity residuals: each size as measured, less its certified size.
+        Linearity residuals, measured minus certified size.
     chi_square : float
         Of the residuals, against sizes, edges, lens and perspective.
     freedom : int

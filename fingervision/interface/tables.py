@@ -72,9 +72,9 @@ def read_table(
     Raises
     ------
     OpenQuestionError
-        The table can be read in more than one way; the sentence says how to settle it.
+        The table can be read in more than one way; the message says how to decide which.
     DataError, InputFileError
-        It cannot be read, or not be worked with.
+        The table cannot be read, or its content cannot be used.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
     ArgumentTypeError
         It holds no table.
     DataError, InputFileError, OpenQuestionError
-        It cannot be read, or not be worked with.
+        The table cannot be read, or its content cannot be used.
     """
     if isinstance(measured, str | os.PathLike):
         path = path_of("measured", measured, "a measured table's file")
