@@ -48,7 +48,7 @@ class Budget:
 
     @property
     def u_mm(self) -> Floats:
-        """Combined standard uncertainty (mm), the root of the sum of squares of independent sources (GUM, equation 10)."""
+        """Combined standard uncertainty (mm), the root sum of squares of independent sources (GUM, equation 10)."""
         return self._combined(self.lines)
 
     @property
