@@ -82,7 +82,7 @@ class Calibration:
         Raises
         ------
         OutputError
-            The calibration cannot be written, or another file has this name.
+            The calibration cannot be written, or the path is that of another kind of file.
         """
         out = path_of("path", path, "a calibration file")
         refuse_foreign(out)
