@@ -15,7 +15,7 @@ Examples:
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("speed_mm_s", type=float)
 @click.option("--for-s", type=click.FloatRange(0.0, min_open=True), help="Stop after this many seconds.")
-@click.option("--home-first", is_flag=True, help="First search the reference: step data need a known position.")
+@click.option("--home-first", is_flag=True, help="First go to the reference: step data need a known start.")
 @bed_option
 def command(speed_mm_s: float, for_s: float | None, home_first: bool, bed_name: str) -> None:
     """Move the stage at SPEED_MM_S until stopped.

@@ -20,7 +20,7 @@ relative steps, none of them faster than requested. Ctrl-C first stops the motor
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("to_mm", type=float)
 @click.option("--speed-mm-s", type=float, default=1.0, show_default=True, help="Speed of the stage.")
-@click.option("--home-first", is_flag=True, help="First search the reference: step data need a known position.")
+@click.option("--home-first", is_flag=True, help="First go to the reference: step data need a known start.")
 @bed_option
 def command(to_mm: float, speed_mm_s: float, home_first: bool, bed_name: str) -> None:
     """Move the stage to the position TO_MM; positive positions open the gripper.

@@ -78,7 +78,7 @@ def _output_options(command: Command) -> Command:
                 default="auto",
                 show_default=True,
                 metavar="auto|linear|srgb|bt709|FILE",
-                help="Light for each grey level; auto: as the pictures are tagged, else linear.",
+                help="Camera response, from grey level to light; auto: as the pictures are tagged, else linear.",
             ),
             click.option(
                 "--camera",

@@ -63,7 +63,7 @@ Exit codes: 0 done; 1 failed, or no frame has a gap; 2 wrong usage;
     default="auto",
     show_default=True,
     metavar="auto|linear|srgb|bt709|FILE",
-    help="Light for each grey level; auto: as in the calibration, else as the recording is tagged, else linear.",
+    help="Camera response; auto: as in the calibration, else as the recording is tagged, else linear.",
 )
 @click.option("--bits", type=click.IntRange(8, 16), help="True bit depth of levels stored in 16 bits, if not 16.")
 @click.option(
