@@ -1,9 +1,10 @@
-"""Select the model of the mean profile across a flank, which gives the position of the finger's edge.
+"""Select the model of the mean profile across a flank, from which the position of the finger's edge follows.
 
-A shadow, a side wall and a line of glare each leave a characteristic mean profile. Some of these are indistinguishable
-on one flank alone: a wall half as light as the background looks like motion blur, and glare like a wall on the other
-side of the edge. A wall is visible on the inner flank only, because the camera looks into the gap from its middle;
-motion blurs both flanks and no tip; glare and shadow surround the finger.
+A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these are
+indistinguishable on one flank alone: a wall half as light as the background looks like motion blur, and glare looks
+like a wall on the other side of the edge. They are distinguished by where they occur: a wall is visible on the inner
+flank only, because the camera looks into the gap from its middle; motion blurs both flanks but not the tip; glare and
+shadow surround the finger.
 """
 
 from dataclasses import replace
@@ -73,20 +74,21 @@ U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 def with_profile(
     upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
 ) -> EdgePoints:
-    """Return the points moved to the finger's own edge where a structure beside it has displaced the fitted step.
+    """Return the points moved to the finger's own edge, if a structure beside the edge has displaced the fitted step.
 
     Parameters
     ----------
     upright : ndarray, shape (rows, columns)
-        Grey levels, seen with the tips up.
+        Grey levels of the picture, turned so that the tips point up.
     edges : EdgePoints
-        Steps that were fitted to every line.
+        Steps fitted to every line of pixels.
     light : ndarray of float, shape (levels,)
-        Light of every grey level.
+        Light for every grey level (look-up table).
     top_level : int
-        End of the scale.
+        Highest level of the scale.
     is_outline : bool
-        Whether a thick part's edge is that of its whole outline, side walls included, and not that of its front face.
+        Whether the edge of a thick part is that of its whole outline, side walls included, rather than that of its
+        front face.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
@@ -204,10 +206,11 @@ def with_profile(
 def _without_shadow(
     upright: GreyImage, edges: EdgePoints, light: Floats, ramps: list[ProfileFit], fading: list[ProfileFit], bins: int
 ) -> EdgePoints:
-    """Edges corrected for a soft shadow, whose light recovers between linearly and exponentially.
+    """Edges corrected for a soft shadow, whose light recovers with distance linearly or exponentially.
 
-    The edge lies between the positions of these two models, weighted by the squares that each leaves beyond chance. Its
-    displacement towards the model that leaves more is taken as its own standard uncertainty.
+    The edge is placed between the positions of the linear and the exponential model, the nearer to the one with the
+    smaller sum of squared residuals beyond noise. The distance between this position and that of the better model is
+    taken as a standard uncertainty.
     """
     squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
     if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
@@ -226,7 +229,7 @@ def _without_shadow(
 
 
 def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
-    """Return the points corrected for sharpening of the stored levels; None where there is no sharpening."""
+    """Return the points corrected for sharpening of the stored levels; None if there was no sharpening."""
     stored = np.arange(float(light.size))
     left, right = (mean_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
     if left is None or right is None:
@@ -244,7 +247,7 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
 
 
 def _is_symmetric(flanks: list[tuple[MeanProfile, float, float]], steps: list[ProfileFit]) -> bool:
-    """Whether the profiles of both flanks could come from optics that spread light symmetrically."""
+    """Whether the profiles of both flanks could be caused by optics that spread light symmetrically."""
     squares = left = 0.0
     for (profile, weight, blur), step in zip(flanks, steps, strict=True):
         contrast = float(np.ptp(profile.light))
@@ -256,12 +259,12 @@ def _is_symmetric(flanks: list[tuple[MeanProfile, float, float]], steps: list[Pr
 
 
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
-    """Whether the structure beside a dark finger's edge has a plausible sign and size."""
+    """Whether the fitted structure beside a dark finger's edge has a plausible sign and size."""
     return all(SHARES[0] < sign * fit.share < SHARES[1] for fit in fits)
 
 
 def _room(edges: EdgePoints) -> int:
-    """How far a window may extend before it meets the other finger (pixels)."""
+    """Largest length of a window that does not reach the other finger (pixels)."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
     if not (real[0].size and real[1].size):
         return 0
@@ -276,7 +279,7 @@ def _best(
     is_blur_known: bool = False,
     too_many: float = np.inf,
 ) -> ProfileFit:
-    """The best fit of a model among all starting values."""
+    """The best fit of a model from all starting values."""
     weights = profile.count * weight
     blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
     return min(
@@ -290,18 +293,18 @@ def _best(
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement across the picture: a wall repeats the outline beside itself."""
+    """Movement along every line per pixel of movement of the inner edge across the picture, for a side wall."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
 
 def _beyond_wall(fit: ProfileFit) -> ProfileFit:
-    """The far edge of a wall, where the fit found the near one."""
+    """Move the position of a fitted wall from its near to its far edge."""
     return fit._replace(position=fit.position + fit.breadth)
 
 
 def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats, beside: str) -> EdgePoints:
-    """Move the edges to the positions that a model gives, and state the remaining uncertainty."""
+    """Move the edges to the positions given by a model, and state the remaining uncertainty."""
     moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
     u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
     position = edges.position + edges.lines.outward * moves
@@ -309,7 +312,7 @@ def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixe
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Give the inner flanks the blur of the outer ones: a wall is not blur."""
+    """Set the blur of the inner flanks to the given one, because a wall beside an edge is not blur."""
     blur_px = edges.blur_px.copy()
     blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
     blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])
@@ -317,7 +320,7 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
 
 
 def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Leave the edges in place, with an uncertainty of up to the limit because the cause is undecided."""
+    """Leave the edges in place, with an uncertainty up to the limit, because the cause is not decided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
@@ -329,6 +332,6 @@ def _unsure_of_width(edges: EdgePoints) -> EdgePoints:
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Marks with the given uncertainties; both edges have the same error."""
+    """Marks with the given uncertainties, one for each finger."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right
