@@ -110,7 +110,7 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
     Raises
     ------
     CalibrationError
-        If there is no edge at this position, or not enough room for the fit.
+        The strip shows no edge, or is too short to fit one.
     """
     cosine = 1.0 / np.hypot(1.0, coarse.slope)
     profile = (

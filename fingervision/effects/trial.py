@@ -40,7 +40,7 @@ def effects_in(held: object) -> dict[str, Effect]:
     Raises
     ------
     MisfitError
-        One of them is no effect, or does not answer as one.
+        An object is not an effect, or its function returns an invalid response.
     """
     found: list[object] = [held]
     if isinstance(held, ModuleType):

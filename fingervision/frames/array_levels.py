@@ -38,9 +38,9 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
     Raises
     ------
     ArgumentTypeError
-        If it is not an array, or its type cannot represent levels.
+        The argument is not an array, or its numbers cannot be grey levels.
     ArgumentError
-        If its shape is not that of a picture or a stack of pictures.
+        The array's shape is not that of a picture.
     """
     if not isinstance(pictures, np.ndarray):
         advice = "numpy.asarray(...) makes an array of it" if hasattr(pictures, "__array__") else ""

@@ -36,9 +36,10 @@ class ArrayFrames:
     Raises
     ------
     ArgumentTypeError
-        If `pictures` is not a numeric numpy array.
+        The argument is not a numeric numpy array.
     ArgumentError
-        If shape, type or levels are not those of pictures, or the times do not fit.
+        The array's shape, type or levels cannot be those of pictures, or the number of times differs from the number
+        of pictures.
     """
 
     pictures: NDArray[np.generic] = field(repr=False)

@@ -37,7 +37,7 @@ def open_frames(name: str, wish: Wish) -> "CameraFrames":
     Raises
     ------
     DeviceError
-        If there is no such camera, another program uses it, or it delivers no picture.
+        The camera does not exist, is in use by another program, or delivers no picture.
     """
     return CameraFrames(name, wish)
 

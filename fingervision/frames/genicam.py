@@ -49,7 +49,7 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
     InputFileError
         If the producer's file does not exist.
     DeviceError
-        If there is no such camera, another program uses it, or it delivers no grey levels.
+        The camera does not exist, is in use by another program, or delivers no grey levels.
     """
     return GenicamFrames(name, wish)
 
@@ -117,7 +117,7 @@ class GenicamFrames:
         Raises
         ------
         DeviceError
-            If the camera stops sending.
+            The camera has stopped sending pictures.
         """
         try:
             for index in count():

@@ -28,7 +28,7 @@ def open_frames(name: str, wish: Wish) -> "ImageFolder":
     Raises
     ------
     DataError, InputFileError
-        If there are no images, none can be read, or their times are not valid.
+        The folder has no images, none of them can be read, or their times are invalid.
     UsageError
         If the rate is not positive, or is given for images that have times.
     """

@@ -32,7 +32,7 @@ class RenderedFrames:
     Raises
     ------
     FingervisionError
-        If there is no scene, or the frames do not have the same size.
+        No scene is given, or the scenes differ in frame size.
     """
 
     scenes: "Sequence[Scene]"

@@ -59,7 +59,7 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
     Raises
     ------
     DataError, InputFileError
-        If the file cannot be read, is no video, or contains no picture.
+        The file cannot be read, is not a video, or contains no picture.
     UsageError
         If a rate is given for a file with its own times.
     """

@@ -131,7 +131,7 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
     Raises
     ------
     DataError
-        If the centre of a gauge lies outside; the sentence names the gauge.
+        A gauge lies outside the picture or is larger than it; the message names the gauge.
     """
     for gauge in gauges:
         x, y = gauge.spec.middle_px

@@ -40,11 +40,11 @@ def recording_of(
     Raises
     ------
     ArgumentTypeError
-        It holds no pictures.
+        The array holds no pictures.
     UsageError
         An argument that this source has no use for.
     DataError, DeviceError, InputFileError
-        It cannot be read.
+        The file cannot be read.
     """
     if rate_hz is not None:
         rate_hz = number("rate_hz", rate_hz)

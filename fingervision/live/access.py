@@ -58,7 +58,7 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
     Raises
     ------
     UsageError
-        It would be reached from beyond this machine without a password, or only half of what TLS needs is there.
+        Other machines could connect without a password, or only one of the certificate and its key is given for TLS.
     DataError, InputFileError
         A file cannot be read, or the password is too short.
     """

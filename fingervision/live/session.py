@@ -153,7 +153,7 @@ class Session:
         Raises
         ------
         StateError
-            It cannot be meant for these frames, or would change a recording under way.
+            The choice does not fit the source's frames, or would change a recording in progress.
         """
         with self._lock:
             if MOVES_ZERO & set(changes) and (self._recorder is not None or self._beginning):
@@ -172,7 +172,7 @@ class Session:
         Raises
         ------
         StateError
-            There is one already, the source has ended, or the scale is not known.
+            A recording is in progress already, the source has ended, or the scale is not known.
         OutputError
             The folder cannot be written.
         """
@@ -205,7 +205,7 @@ class Session:
         Raises
         ------
         StateError
-            There is none, or it could not be written to its end.
+            No recording is in progress, or its file could not be completed.
         """
         with self._lock:
             recorder, self._recorder = self._recorder, None

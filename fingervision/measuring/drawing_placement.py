@@ -83,7 +83,7 @@ def parse_point(text: str) -> GivenPoint:
     Raises
     ------
     UsageError
-        If the text does not have this form.
+        The text does not state a point in pixels and in millimetres.
     """
     try:
         (x_px, y_px), (x_mm, y_mm) = (tuple(map(float, half.split(","))) for half in text.split("="))
@@ -104,7 +104,7 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
     Raises
     ------
     UsageError
-        If there are too few points, or their scale differs from the stated one.
+        Too few points are given, or their distances contradict the scale.
     """
     if len(points) < 2:
         raise UsageError(f"--at must be given for at least two points of the drawing, but is given for {len(points)}.")
@@ -137,7 +137,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     Raises
     ------
     DataError
-        If the silhouette fits nowhere, or in several ways.
+        The drawing fits the picture nowhere, or equally well in several ways.
     """
     height, width = grey.shape
     step = max(1, max(width, height) // GRID)

@@ -39,7 +39,7 @@ class OverlayVideo:
     Raises
     ------
     FingervisionError
-        If the video cannot be written; also raised by `add` and when the context is left.
+        The video cannot be written; also raised by `add` and at the end of the `with` block.
     """
 
     def __init__(self, path: Path, description: Description) -> None:

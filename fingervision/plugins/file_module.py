@@ -26,9 +26,9 @@ def check_file(path: Path, what: str) -> Origin:
     Raises
     ------
     PluginFileError
-        There is no such file, or it is no Python file.
+        The file does not exist, or is not a Python file.
     PluginVersionError
-        Its inline metadata ask for another version of fingervision.
+        The file's inline metadata require another version of fingervision.
     """
     origin = of_file(str(path))
     if not path.exists():

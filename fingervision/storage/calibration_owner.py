@@ -33,7 +33,7 @@ def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
     Raises
     ------
     OutputError
-        It cannot be written.
+        The file or folder cannot be written.
     """
     import cv2
 

@@ -12,7 +12,7 @@ def decimal_number(cell: str) -> float:
     Raises
     ------
     ValueError
-        It is none, or none that is written so in a table.
+        The cell is not a decimal number in a notation that tables use.
 
     Examples
     --------

@@ -26,7 +26,7 @@ class FolderLock:
     Raises
     ------
     FingervisionError
-        Another program holds it, or it cannot be written.
+        Another program uses the folder, or the folder cannot be written.
     """
 
     def __init__(self, path: Path) -> None:

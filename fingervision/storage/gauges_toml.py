@@ -23,7 +23,7 @@ def text_of(path: Path) -> str | None:
     Raises
     ------
     DataError, InputFileError
-        It cannot be read.
+        The file cannot be read.
     """
     try:
         return plain(path).read_text(encoding="utf-8-sig")
@@ -96,7 +96,7 @@ def write_gauges_text(path: Path, text: str) -> None:
     Raises
     ------
     OutputError
-        It cannot be written; what was there stays.
+        The file cannot be written; its earlier version is kept.
     """
     part = path.with_name(f".{path.name}.part")
     try:

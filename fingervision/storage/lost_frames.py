@@ -31,7 +31,7 @@ class LostFrames:
     Raises
     ------
     FingervisionError
-        It cannot be written; from every method.
+        The table cannot be written; every method may raise this error.
     """
 
     def __init__(self, path: Path) -> None:
@@ -79,7 +79,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
     Raises
     ------
     DataError, InputFileError
-        There should be a table, and it is not there or cannot be read.
+        The run's table of lost frames is missing or cannot be read.
     """
     if len(files) != 1:
         return ()

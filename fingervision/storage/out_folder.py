@@ -14,7 +14,7 @@ def out_folder(path: Path) -> Iterator[None]:
     Raises
     ------
     OutputError
-        It cannot be made or written.
+        The folder cannot be created or written.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)

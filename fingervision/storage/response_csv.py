@@ -23,7 +23,7 @@ def response_named(name: str) -> CameraResponse | None:
     Raises
     ------
     UsageError
-        It is neither.
+        The name is neither a standard response nor an existing file.
     DataError
         The file is no response.
     """

@@ -35,7 +35,7 @@ def read_settings(path: Path) -> dict[str, Any]:
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, or a key is unknown or has no such value.
+        The file cannot be read, or a key is unknown or has a value that is not allowed.
     """
     values, text = read_document(path, "settings")
     top = Section(path, text, "", values)
@@ -81,7 +81,7 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     Raises
     ------
     OutputError
-        It cannot be written.
+        The file or folder cannot be written.
     """
     lines = [
         "# For `fingervision live SOURCE --settings FILE`, and `measure` alike.",

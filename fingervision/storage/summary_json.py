@@ -67,7 +67,7 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
     Raises
     ------
     UsageError
-        It holds those of another.
+        The folder holds the results of another recording.
     """
     of = recording_of(folder)
     if of is None or Path(of).resolve() == Path(recording).resolve():

@@ -45,7 +45,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     Raises
     ------
     DataError
-        There is no table, or too many rows are none.
+        The lines contain no table, or too many lines do not fit its columns.
     OpenQuestionError
         A mark may be a decimal comma or set thousands apart.
     """

@@ -54,7 +54,7 @@ class Bench:
     Raises
     ------
     FingervisionError
-        There is no camera, or no scale for its frames.
+        The test bed has no camera, or no scale for the camera's frames.
     """
 
     has_own_clock = True

@@ -154,7 +154,7 @@ def rows_before(path: Path) -> list[SampleRow]:
     Raises
     ------
     DataError
-        There is no finished run in the folder.
+        The folder holds no finished run.
     """
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
     rows = read_samples(table)

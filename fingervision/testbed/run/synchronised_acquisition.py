@@ -129,7 +129,7 @@ class Sight:
     Raises
     ------
     FingervisionError
-        There is no camera, or no scale for its frames.
+        The test bed has no camera, or no scale for the camera's frames.
     """
 
     def __init__(self, bed: Bed) -> None:
