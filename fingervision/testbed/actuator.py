@@ -63,7 +63,7 @@ class MoveCheck(Protocol):
     def has_steps(self) -> bool:
         """Whether the actuator keeps step data.
 
-        If it does, `run_step` is possible, and only the end positions of steps can be reached.
+        An actuator with step data supports `run_step`, and can reach only the end positions of its steps.
         """
         ...
 

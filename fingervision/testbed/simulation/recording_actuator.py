@@ -76,7 +76,7 @@ class Followed:
         self._actuator.jog(speed_mm_s)
 
     def run_step(self, number: int) -> None:
-        """Begin a step data block."""
+        """Begin the motion of a step data block."""
         self._actuator.run_step(number)
 
     def stop(self) -> None:
