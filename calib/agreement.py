@@ -9,7 +9,7 @@ COVERAGE_FACTOR = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """A measurement compared with a certified value.
+    """Comparison of a measurement with a certified value.
 
     Parameters
     ----------

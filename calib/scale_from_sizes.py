@@ -28,13 +28,13 @@ class MeasuredSize:
     Parameters
     ----------
     reference : Reference
-        Its certified size.
+        Certified size of the object.
     width_px, u_width_px : float
         Width in the picture, corrected for lens and plane, and its standard uncertainty from the fit of the edges.
     points_px : ndarray, shape (2, 2)
         End points of the width.
     light : bool
-        Whether it is light between the edges.
+        Whether the area between the edges is light.
     """
 
     reference: Reference

@@ -14,9 +14,12 @@ import cv2
 
 from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame, LostFrame, Pixels
-from fingervision.frames.camera_settings import READ, coding_of, requests, settled
+from fingervision.frames.camera_controls import control_list, request_of
+from fingervision.frames.camera_settings import READ, V4L2, coding_of, requests, settled
+from fingervision.frames.controls import CameraControl
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
+from fingervision.frames.v4l2_ranges import ranges
 
 BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_MSMF, "darwin": cv2.CAP_AVFOUNDATION}
 DEVICES = Path("/sys/class/video4linux")
@@ -94,6 +97,7 @@ class CameraFrames:
                 "format, size and rate asked for; leave out --format, --size and --rate-hz."
             )
         self._closed = Event()
+        self._ranges = ranges(name) if self._capture.getBackendName() == V4L2 else {}
         self.description = self._described(wish, (pixels.shape[1], pixels.shape[0]))
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
@@ -123,6 +127,25 @@ class CameraFrames:
     def close(self) -> None:
         """End the iteration with the next frame."""
         self._closed.set()
+
+    def controls(self) -> tuple[CameraControl, ...]:
+        """Settings that may be changed while the camera runs, with their values and limits."""
+        with _quiet():
+            return control_list(self._capture.getBackendName(), self._read(), self._ranges)
+
+    def set_control(self, name: str, value: float) -> None:
+        """Ask the camera for another value of one of its controls.
+
+        Parameters
+        ----------
+        name : str
+            Of the control.
+        value : float
+            In the control's unit.
+        """
+        with _quiet():
+            self._capture.set(*request_of(self._capture.getBackendName(), name, value))
+        self.description = self._described(Wish(), (self.description.width_px, self.description.height_px))
 
     def _ask(self, wish: Wish) -> None:
         """Request the wished settings, and no automatic changes; a camera accepts only some of them."""

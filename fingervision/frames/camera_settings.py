@@ -20,6 +20,7 @@ from math import isclose, log2
 import cv2
 
 from fingervision.domain.frame import Coding
+from fingervision.frames import controls
 from fingervision.frames.source import Wish
 
 V4L2, MSMF = "V4L2", "MSMF"
@@ -34,8 +35,6 @@ CODINGS = {
 # One picture is filled while the other is read; more would only be older.
 BUFFERED_PICTURES = 2
 V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED = 1.0, 0.25
-# A camera takes the nearest of its steps; what lies nearer than this is what was asked for.
-SAME_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +59,12 @@ class Control:
     wished: Callable[[Wish], float | None]
 
 
-EXPOSURE = Control("exposure", cv2.CAP_PROP_EXPOSURE, "ms", lambda wish: wish.camera.exposure_ms)
-GAIN = Control("gain", cv2.CAP_PROP_GAIN, "", lambda wish: wish.camera.gain)
-FOCUS = Control("focus", cv2.CAP_PROP_FOCUS, "", lambda wish: wish.camera.focus)
+EXPOSURE = Control(controls.EXPOSURE, cv2.CAP_PROP_EXPOSURE, "ms", lambda wish: wish.camera.exposure_ms)
+GAIN = Control(controls.GAIN, cv2.CAP_PROP_GAIN, "", lambda wish: wish.camera.gain)
+FOCUS = Control(controls.FOCUS, cv2.CAP_PROP_FOCUS, "", lambda wish: wish.camera.focus)
 # Also V4L2's WB_TEMPERATURE; Media Foundation knows it by this name alone.
 WHITE_BALANCE = Control("white balance", cv2.CAP_PROP_TEMPERATURE, "K", lambda wish: wish.camera.white_balance_k)
-ZOOM = Control("zoom", cv2.CAP_PROP_ZOOM, "", lambda wish: None)
+ZOOM = Control(controls.ZOOM, cv2.CAP_PROP_ZOOM, "", lambda wish: None)
 CONTROLS = (EXPOSURE, GAIN, FOCUS, WHITE_BALANCE, ZOOM)
 # What would change by itself from frame to frame, by V4L2's properties, and what that does to the measurement.
 AUTOMATICS: Mapping[str, tuple[int, str]] = {
@@ -127,8 +126,8 @@ def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[t
     for control in CONTROLS:
         value = control.wished(wish)
         if value is not None and backend in (V4L2, MSMF):
-            yield control.what, _of_camera(backend, control, value)
-        elif backend == MSMF and control.name in AUTOMATICS and _has(found, control.what):
+            yield control.what, of_camera(backend, control, value)
+        elif backend == MSMF and control.name in AUTOMATICS and is_there(found, control.what):
             yield control.what, found[control.what]
 
 
@@ -153,23 +152,23 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
             "uncertainty is larger for it; choose a size or rate that it delivers raw (--format YUYV)."
         )
     rate_hz = read.get(cv2.CAP_PROP_FPS, UNSUPPORTED)
-    if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=SAME_SHARE):
+    if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=controls.SAME_SHARE):
         states = f"states {rate_hz:g}" if rate_hz > 0.0 else "states no rate"
         notes.append(f"The camera was asked for {wish.rate_hz:g} frames a second and {states}.")
     for control in CONTROLS:
         asked = control.wished(wish)
-        if not _has(read, control.what) or backend not in (V4L2, MSMF):
+        if not is_there(read, control.what) or backend not in (V4L2, MSMF):
             if asked is not None:
                 notes.append(_cannot(backend, control, asked))
             continue
-        value = _of_user(backend, control, read[control.what])
+        value = of_user(backend, control, read[control.what])
         settings[control.name] = _words(control, value)
-        if asked is not None and not isclose(value, asked, rel_tol=SAME_SHARE):
+        if asked is not None and not isclose(value, asked, rel_tol=controls.SAME_SHARE):
             notes.append(
                 f"The camera was asked for {control.name} {_words(control, asked)} and takes {_words(control, value)}."
             )
     for name, (what, harm) in AUTOMATICS.items() if backend == V4L2 else ():
-        if _has(read, what) and not _is_manual(name, read[what]):
+        if is_there(read, what) and not _is_manual(name, read[what]):
             settings[name] = "automatic"
             notes.append(
                 f"The camera's automatic {name} could not be switched off (it reads back {read[what]:g}): {harm}."
@@ -190,7 +189,8 @@ def four_letters(number: float) -> str:
     return letters.strip() if letters.isascii() and letters.isprintable() and letters.strip() else "unknown"
 
 
-def _has(read: Mapping[int, float], what: int) -> bool:
+def is_there(read: Mapping[int, float], what: int) -> bool:
+    """Whether a camera has a property, by what it read back."""
     return read.get(what, UNSUPPORTED) != UNSUPPORTED
 
 
@@ -198,13 +198,15 @@ def _is_manual(name: str, value: float) -> bool:
     return value in (V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED) if name == EXPOSURE.name else value == 0.0
 
 
-def _of_camera(backend: str, control: Control, value: float) -> float:
+def of_camera(backend: str, control: Control, value: float) -> float:
+    """A user's value in the units of a camera's backend."""
     if control is not EXPOSURE:
         return value
     return float(round(log2(1e-3 * value))) if backend == MSMF else float(max(1, round(10.0 * value)))
 
 
-def _of_user(backend: str, control: Control, value: float) -> float:
+def of_user(backend: str, control: Control, value: float) -> float:
+    """A backend's value in the user's units."""
     if control is not EXPOSURE:
         return value
     return float(1e3 * 2.0**value) if backend == MSMF else 0.1 * value

@@ -11,8 +11,10 @@ from fingervision.frames.avi_places import AviPlaces
 from fingervision.frames.coded_times import is_shown
 from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
+from fingervision.frames.matroska_checksums import BROKEN, UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.matroska_times import ClusterTimes
 from fingervision.frames.missing_references import OWN_RECORDING, missing_references
+from fingervision.frames.mp4_durations import NO_SCALE, states_another_duration
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
@@ -46,6 +48,8 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     codec = stream.codec_context.name
     is_judged = container.metadata.get("comment") == OWN_RECORDING
     unfollowed = {} if is_judged else missing_references(path, stream, container.format.name)
+    is_unchecked = stream.codec.canonical_name in UNCHECKED_CODECS and "matroska" in container.format.name
+    checksums = ClusterChecksums(path) if is_unchecked else None
     with listening(codec) as heard:
         jpegs = SoundJpeg(codec)
         jpegs.learn(_first_packets(path, stream))
@@ -59,6 +63,8 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
                 if leap := losses.before(packet, trail):
                     yield None, leap
                 trail.enters(packet, is_shown=is_shown(packet, codec))
+                if checksums is not None and checksums.is_broken(packet.pos):
+                    trail.breaks(BROKEN)
                 losses.behind(packet, trail)
                 if packet.pts is not None and packet.time_base is not None:
                     last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
@@ -116,6 +122,7 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
     places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
     clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None
     is_doubtful = False
+    is_timeless = "mp4" in container.format.name and states_another_duration(path)
     before: _Read | None = None
     while True:
         end, packet = "", None
@@ -143,11 +150,15 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
             loses_time = NO_CLUSTER if is_doubtful and not was_doubtful else ""
             if is_doubtful:
                 packet.pts = packet.dts = None
+        if is_timeless and packet is not None:
+            packet.pts = packet.dts = None
         if before is not None:
             is_last = (packet is None or not packet.size) and not end
             yield replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
         if packet is None:
             return
+        if is_timeless and before is None:
+            loses_time = NO_SCALE
         before = _Read(packet, missing, loses_time, places is not None)
 
 

@@ -6,6 +6,7 @@ with Viky, the simulated camera that comes with the GenICam reference implementa
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from threading import Event
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DeviceError, InputFileError, MissingLibraryError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.status import Status
+from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraControl
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
 
@@ -27,8 +29,13 @@ MONO = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
 """Pixel formats in which each grey level has one or two bytes of its own, by the names of the PFNC (EMVA, Pixel Format
 Naming Convention)."""
 NODES = {"exposure_ms": ("ExposureTime", 1e3), "gain": ("Gain", 1.0)}
-"""Feature of the Standard Features Naming Convention for each setting that can be requested, and the factor from our
-unit to the feature's."""
+"""Feature of the Standard Features Naming Convention for what may be asked, and its units in ours."""
+CONTROLS = {
+    EXPOSURE: (*NODES["exposure_ms"], "ms"),
+    GAIN: (*NODES["gain"], "dB"),
+    FRAME_RATE: ("AcquisitionFrameRate", 1.0, "Hz"),
+}
+"""What may be set while the camera runs: its feature, its units in ours, our unit."""
 SILENT_S, ASKED_EVERY_S = 2.0, 0.2
 """Time without data after which a camera counts as disconnected, and interval of the checks whether the source was
 closed."""
@@ -137,6 +144,25 @@ class GenicamFrames:
         """End the iteration with the next frame."""
         self._closed.set()
 
+    def controls(self) -> tuple[CameraControl, ...]:
+        """Settings that may be changed while the camera runs, with their values and limits."""
+        return control_list(self._camera.remote_device.node_map)
+
+    def set_control(self, name: str, value: float) -> None:
+        """Ask the camera for another value of one of its controls.
+
+        Parameters
+        ----------
+        name : str
+            Of the control.
+        value : float
+            In the control's unit.
+        """
+        nodes = self._camera.remote_device.node_map
+        node, factor, _ = CONTROLS[name]
+        getattr(nodes, node).value = factor * value
+        self.description = replace(self.description, camera=_settings(nodes))
+
     def _next(self) -> Any:
         """Return the next buffer; None once the source is closed."""
         silent_since_s = monotonic()
@@ -167,6 +193,39 @@ class GenicamFrames:
                 act()
             except Exception:
                 continue
+
+
+def control_list(nodes: Any) -> tuple[CameraControl, ...]:
+    """What a camera's features let be changed; a feature that is locked now states no value or no limit.
+
+    Parameters
+    ----------
+    nodes : GenApi's map of nodes
+        Of the camera.
+    """
+    found = []
+    for name, (node, factor, unit) in CONTROLS.items():
+        value = _value(nodes, node)
+        if value is None:
+            continue
+        least, greatest = (_limit(nodes, node, end) for end in ("min", "max"))
+        found.append(
+            CameraControl(
+                name,
+                float(value) / factor,
+                unit,
+                None if least is None else least / factor,
+                None if greatest is None else greatest / factor,
+            )
+        )
+    return tuple(found)
+
+
+def _limit(nodes: Any, node: str, end: str) -> float | None:
+    try:
+        return float(getattr(getattr(nodes, node), end))
+    except Exception:  # the camera does not tell it now
+        return None
 
 
 def levels(data: NDArray[np.generic], size: tuple[int, int]) -> Pixels:

@@ -17,6 +17,7 @@ from fingervision.frames.damage import DamageTrail
 from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
+from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
@@ -35,6 +36,12 @@ RAW_CAMERA_FILES = {
     "ones): export it from PCC as 16-bit TIFF images or uncompressed AVI, and measure those.",
 }
 """Advice for files of high-speed cameras that cannot be read."""
+
+NO_CHECKSUM = (
+    "Pictures of {codec} carry no checksum, and neither does this file: where its bytes were damaged on the way, a "
+    "frame may look sound and be wrong. If it came over a network or from an old disk, compare it with its source; "
+    "record with FFV1 or H.264."
+)
 
 
 def _coding(properties: int) -> Coding:
@@ -105,6 +112,8 @@ class VideoFile:
                     f"{Path(self.name).name} -map 0:v:1 -c copy second.mkv` takes out the second.",
                 )
             size_px = (codec.width, codec.height)
+            if stream.codec.canonical_name in UNCHECKED_CODECS and not ClusterChecksums(Path(self.name)).cover_all:
+                notes += (NO_CHECKSUM.format(codec=stream.codec.canonical_name),)
             turned = _rotation_deg(container, stream)
             if turned % QUARTER_DEG:
                 notes += (f"The file states a rotation of {turned} degrees, which is no quarter turn: not applied.",)

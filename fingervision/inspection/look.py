@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.inspection.noise_bound import edge_noise_px
-from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.grey import GreyImage
-from fingervision.vision.profile_choice import WIDER
 from fingervision.vision.residuals import SHARED_POINTS
+from fingervision.vision.wall_width import WIDER
 
 Floats = NDArray[np.float64]
 
@@ -62,8 +62,9 @@ class Look:
 
     @property
     def widened_px2(self) -> Floats:
-        """Increase of the variance of each finger's flank blur over that of its tip, due to motion; shape (2,)."""
-        flanks, tips = (self.edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
+        """Variance that motion has added to the blur of each finger's flanks, compared with the tips; shape (2,)."""
+        resolved = np.maximum(self.edges.blur_px, LEAST_RESOLVED_BLUR_PX)
+        flanks, tips = (resolved[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
         return np.asarray(np.where(flanks > (1.0 + WIDER) * tips, flanks - tips, 0.0))
 
     @property

@@ -18,7 +18,7 @@ from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage, top_level
 from fingervision.vision.pipeline import Settings
-from fingervision.vision.profile_choice import WIDER
+from fingervision.vision.wall_width import WIDER
 
 Floats = NDArray[np.float64]
 

@@ -191,7 +191,7 @@ class Session:
             self._beginning = True
         try:
             # Not while measuring waits: a slow disk would hold it up.
-            run = RunFolder(self.out, self.description, task, self.capture.source.template)
+            run = RunFolder(self.out, self.capture.source.description, task, self.capture.source.template)
             self._recorder = Recorder(run)
             self.trouble = ""
         finally:

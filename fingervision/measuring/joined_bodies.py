@@ -22,8 +22,8 @@ LONGEST, SHORTEST = 1.1, 0.6
 flexure on a deforming body move a few per cent differently from those on a rigid body; an arc of 3 rad has a chord of
 0.66."""
 MOST_ACROSS, MOST_ACROSS_NECK = 0.3, 0.1
-"""Largest displacement across the chord, as a share of the flexure's length: a leaf in a parallel guide is used up to a
-fifth, and the thin part of a notch is a third of its length, so that shear moves it by a third of that."""
+"""Displacement across the chord over the flexure's length: a leaf guided in parallel is used up to a fifth of it. The
+part of a notch that bends is a third of its length, and is moved by up to a third of that."""
 SURE = 4.0
 """Number of standard uncertainties of the distance that is exceeded in 1 of 16 000 cases by chance."""
 
@@ -45,8 +45,8 @@ class Joint:
             turn = 1e-3 * pose.angle_mrad
             c, s = np.cos(turn), np.sin(turn)
             arm = np.array(self.flexure.point_mm(along, 0.0)) - body.centroid_mm
-            ends.append(body.centroid_mm + (pose.x_mm, pose.y_mm) + np.array([c * arm[0] - s * arm[1],
-                                                                              s * arm[0] + c * arm[1]]))  # fmt: skip
+            moved = np.array([pose.x_mm + c * arm[0] - s * arm[1], pose.y_mm + s * arm[0] + c * arm[1]])
+            ends.append(body.centroid_mm + moved)
             turned += 0.5 * turn
             variance += float(pose.random[0, 0] + pose.random[1, 1])
             variance += float(pose.random[2, 2]) * 1e-6 * float(arm @ arm)

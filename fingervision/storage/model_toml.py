@@ -23,7 +23,7 @@ from fingervision.models.table import TableModel
 from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
-from fingervision.storage.plain_file import plain, why
+from fingervision.storage.plain_file import in_utf8, plain, why
 from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
@@ -79,8 +79,8 @@ def read_model(
         raise DataError(f"The base of {path} must be another model, but leads back to itself: correct `base`.")
     kind = str(document.get("kind", kind))
     named = document["base"]
-    if not (isinstance(named, str) and named.strip() and named.isprintable()):
-        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: correct it.")
+    if not (isinstance(named, str) and named.strip() and "\0" not in named):
+        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: mend it.")
     base = read_model(path.parent / named, kind, (*inside, place), table)
     names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
     if names and isinstance(base.base, FunctionModel):
@@ -186,7 +186,13 @@ def _gripper(path: Path, kind: str) -> CorrectedModel:
 def write_model(
     path: Path, base_path: Path, effects: Mapping[str, Mapping[str, Estimate]], kind: str | None = None
 ) -> None:
-    """Write a corrected model; the base model's path is relative to the file."""
+    """Write a corrected model; the base model's path is relative to the file.
+
+    Raises
+    ------
+    OutputError
+        The base model's name is not UTF-8, which a TOML file must be.
+    """
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
     lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():
@@ -209,4 +215,4 @@ def write_model(
                 continue
             u = "" if estimate.u is None else f", u = {estimate.u!r}"
             lines.append(f"{key} = {{ value = {estimate.value!r}{u} }}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text(in_utf8(path, "\n".join(lines) + "\n"), encoding="utf-8")

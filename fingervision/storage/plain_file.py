@@ -3,6 +3,8 @@
 import errno
 from pathlib import Path
 
+from fingervision.domain.errors import OutputError
+
 
 def plain(path: Path) -> Path:
     """Return the path if it can be read to its end.
@@ -30,3 +32,22 @@ def plain(path: Path) -> Path:
 def why(error: Exception) -> str:
     """Reason of a system error, without its number and path, for a sentence that names the file itself."""
     return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
+
+
+def in_utf8(path: Path, text: str) -> str:
+    """Return a document's text if it can be written in UTF-8; names of files need not be.
+
+    Raises
+    ------
+    OutputError
+        It holds a name that is not.
+    """
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        line = next(each for each in text.splitlines() if error.object[error.start] in each)
+        raise OutputError(
+            f"{path.name} must be in UTF-8, but would name a file that is not ({line.strip()[:200]!a}): rename that "
+            "file and run again."
+        ) from error
+    return text

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import DataError, OutputError
+from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.toml_section import Section, read_document
 
 NAME = "columns.toml"
@@ -196,7 +197,7 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
     OutputError
         The file cannot be read or written.
     """
-    block = entry_text(table, kind, entry)
+    block = in_utf8(path, entry_text(table, kind, entry))
     try:
         before = path.read_text(encoding="utf-8-sig") if path.exists() else "schema = 1\n"
         parts = [part.strip("\n") for part in re.split(r"(?m)^(?=\s*\[\[\s*table\s*\]\])", before)]

@@ -73,8 +73,17 @@ def with_coding_error(
         if not found.direction.is_vertical:
             across, along = along, across
         step = quantiser.near(edge.x_px, edge.y_px, across, along)
-        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level))
+        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level) * _by_slope(edge.slope))
     return _less_sure(found, displaced[0], displaced[1])
+
+
+def _by_slope(slope: float) -> float:
+    """Displacement of the measuring point across the finger per displacement of an outline along its normal.
+
+    A leaning edge moves across by more than along its normal. The tip is displaced as well, by itself, and takes the
+    measuring height with it, along the edge.
+    """
+    return hypot(hypot(1.0, slope), slope)
 
 
 def with_shared_shift(found: GapMeasurement, shared_px: float, coding: Coding) -> GapMeasurement:

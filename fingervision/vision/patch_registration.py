@@ -47,6 +47,14 @@ LEAST_INFORMATION = 0.02
 NOISE_MARGIN = 1.4
 # Variance of rounding to whole grey levels: no noise is smaller.
 ROUNDING = 1.0 / 12.0
+# The patch is divided into so many blocks across and down: each then holds several correlation lengths of smoothed
+# noise (2.5 px), and sixteen of them tell a variance to a third.
+BLOCKS = 4
+# What blocks scatter by over what white noise makes them scatter by: exceeded by one in a hundred of chi-square with
+# 13 degrees of freedom over 13. Beyond, the residuals are no noise but texture that moves otherwise than the rest
+# (aliased, or of a surface that deforms), and the blocks tell the covariance (White, Econometrica 48, 1980,
+# doi:10.2307/1912934).
+MOST_SCATTER = 2.13
 
 _settled = loop("patch_registration_settled")
 
@@ -69,10 +77,10 @@ class PatchReference:
     hessian : ndarray, shape (3, 3)
         Gram matrix of the jacobian.
     score : ndarray, shape (3, 3)
-        Gram matrix of the jacobian smoothed once more: covariance of the projections of smoothed unit-variance noise on
-        the jacobian.
-    fine : float
-        Share of the gradients' power that the smoothing removes, 0 to 1: near 1 for texture too fine for the pixels.
+        That of the jacobian smoothed once more: covariance of what smoothed noise of unit variance projects on it.
+    fine : (float, float)
+        Share of the gradients' power along x and along y that the smoothing takes off, 0 to 1: most of texture too fine
+        for the pixels.
     template : ndarray, shape (height, width)
         Light without smoothing, for the coarse search.
     """
@@ -85,7 +93,7 @@ class PatchReference:
     jacobian: Floats
     hessian: Doubles
     score: Doubles
-    fine: float
+    fine: tuple[float, float]
     template: Floats
 
     @property
@@ -119,6 +127,13 @@ class Registered:
     correlation: Doubles
     noise: Doubles
     settled: NDArray[np.bool_]
+
+
+def _taken_off(smoothed: Floats, sharp: Floats) -> float:
+    """Share of a gradient's power that the smoothing takes off."""
+    return 1.0 - float(np.sum(smoothed.astype(np.float64) ** 2)) / max(
+        float(np.sum(sharp.astype(np.float64) ** 2)), 1e-30
+    )
 
 
 @cache
@@ -173,8 +188,7 @@ def patch_reference(levels: Floats, column: int, row: int, half_width: int, half
     for axis in (1, 2):
         images = correlate1d(images, gaussian(SMOOTHING_PX), axis=axis, mode="constant")
     smoothed = images.reshape(3, -1)
-    sharp = float(np.sum(sharp_x.astype(np.float64) ** 2 + sharp_y.astype(np.float64) ** 2))
-    fine = 1.0 - float(np.sum(by_x.astype(np.float64) ** 2 + by_y.astype(np.float64) ** 2)) / max(sharp, 1e-30)
+    fine = (_taken_off(by_x, sharp_x), _taken_off(by_y, sharp_y))
     return PatchReference(
         float(column), float(row), half_width, half_height, own.astype(np.float32), jacobian.astype(np.float32),
         jacobian @ jacobian.T, smoothed @ smoothed.T, fine, part[inner, inner].copy(),
@@ -211,14 +225,15 @@ def register(
     first = references[0]
     hessian = np.stack([reference.hessian for reference in references])
     hessian += 1e-6 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-12 * np.eye(3)
-    inverse = np.linalg.inv(hessian)
+    inverse = np.asarray(np.linalg.inv(hessian), dtype=np.float64)
+    scores = np.zeros((len(references), BLOCKS**2, 3))
     found = [
         _settled(
             coefficients(part, SMOOTHING_PX), reference.levels, reference.jacobian, own,
-            first.half_width_px, first.half_height_px, x - left, y - top, turn,
+            first.half_width_px, first.half_height_px, x - left, y - top, turn, by_block,
         )
-        for reference, part, own, (left, top), (x, y, turn) in zip(
-            references, parts, inverse, origins_px.tolist(), start.tolist(), strict=True
+        for reference, part, own, (left, top), (x, y, turn), by_block in zip(
+            references, parts, inverse, origins_px.tolist(), start.tolist(), scores, strict=True
         )
     ]  # fmt: skip
     x, y, turn, gain, correlation, squares = np.array([of[:6] for of in found]).T
@@ -226,6 +241,7 @@ def register(
     score = np.stack([reference.score for reference in references])
     size = (first.half_width_px, first.half_height_px)
     covariance, noise = _covariance(hessian, score, squares, gain, x, y, size, shared_pixels)
+    covariance = _as_blocks_scatter(covariance, inverse, scores)
     return Registered(x + origins_px[:, 0], y + origins_px[:, 1], turn, covariance, correlation, noise, settled)
 
 
@@ -258,6 +274,26 @@ def _covariance(
     noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * derivative_power(SMOOTHING_PX)
     noisy[:, 2, 2] = one * turned * derivative_power(SMOOTHING_PX)
     return _propagated(hessian, score, noisy, spread), np.sqrt(one)
+
+
+def _as_blocks_scatter(covariance: Doubles, inverse: Doubles, scores: Doubles) -> Doubles:
+    """Widen covariances to the scatter of the patch's blocks where it is more than the noise's.
+
+    Parameters
+    ----------
+    covariance : ndarray of float, shape (k, 3, 3)
+        By the noise.
+    inverse : ndarray of float, shape (k, 3, 3)
+        Of the Gram matrices.
+    scores : ndarray of float, shape (k, blocks, 3)
+        Products of gradients and residuals by block; their sum is zero where the registration settled.
+    """
+    blocks = scores.shape[1]
+    away = (scores - scores.mean(axis=1, keepdims=True)) @ inverse
+    seen = np.einsum("kbi,kbi->ki", away, away) * (blocks / (blocks - 3.0))
+    ratio = seen / np.einsum("kii->ki", covariance)
+    wider = np.sqrt(np.where(ratio > MOST_SCATTER, ratio, 1.0))
+    return np.asarray(covariance * wider[:, :, None] * wider[:, None, :])
 
 
 def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.beside_edge import without_additions
-from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage
@@ -29,6 +29,7 @@ from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
 from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 from fingervision.vision.symmetric_spread import symmetric_squares
+from fingervision.vision.wall_width import WIDER, wall_limits_px
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -51,8 +52,6 @@ DISC_BREADTH = 1.12
 SHARES = (0.05, 0.85)
 # Levels within so many standard deviations of the end of the scale are cut off now and then.
 CUT_OFF_SIGMAS = 2.0
-# The inner flank is wider than the outer one, or than the tip, where its variance is larger by this share.
-WIDER = 0.15
 # Motion and focus widen both flanks of a finger, a wall the inner flanks of both fingers: one inner flank alone, wider
 # than the finger's outer one by this share (of variance) and by so many pixels, has a strip of a third tone beside it,
 # as a shadow makes. One of breadth w spreads a step by w / 2 at most: this one is broader than two pixels, and its own
@@ -94,13 +93,13 @@ def with_profile(
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
-        return edges
+        return _unsure_of_width(edges)
     room = _room(edges)
     # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        return edges
+        return _unsure_of_width(edges)
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
@@ -150,7 +149,9 @@ def with_profile(
             ]
             is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and _are_of_size(wall, -1.0)
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
-        return _unsure(edges, [abs(fit.position) for fit in chosen], "wall") if is_wall else edges
+        # A wall is there: the edge lies as far off as the fit says, give or take its own doubt.
+        farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
+        return _unsure(edges, farthest, "wall") if is_wall else _unsure_of_width(edges)
     if is_lopsided and left[SHADOW] < enough:
         # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
         beyond = np.array(
@@ -183,7 +184,8 @@ def with_profile(
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
             chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
             return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
-    flanks, tips = (edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
+    resolved = np.maximum(edges.blur_px, LEAST_RESOLVED_BLUR_PX)
+    flanks, tips = (resolved[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
     if any(widened):
         return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
@@ -321,6 +323,12 @@ def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints
     """Leave the edges in place, with an uncertainty up to the limit, because the cause is not decided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
+
+
+def _unsure_of_width(edges: EdgePoints) -> EdgePoints:
+    """State how far a wall may have moved the edges where nothing but their width says that there is one."""
+    limits = wall_limits_px(edges)
+    return edges if limits is None else _unsure(edges, limits, "wall")
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:

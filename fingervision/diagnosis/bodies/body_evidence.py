@@ -38,13 +38,16 @@ class BodyEvidence:
     rows : ndarray of int, shape (k,)
         Indices of these rows.
     names : tuple of str
-        Names of the channels in the table.
+        The channels as the table calls them.
+    time_s : ndarray of float, shape (k,), or None
+        Times of those rows; None where the table has none.
     """
 
     prediction: BodyPrediction
     findings: PlaceFindings
     rows: NDArray[np.intp]
     names: tuple[str, ...]
+    time_s: Array | None = None
 
 
 def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
@@ -112,7 +115,8 @@ def body_evidence(
     prediction = BodyPrediction(answers, tuple(drawn), input_mm[rows])
     runs = _runs_among(table.runs, rows)
     search = PlaceSearch(prediction, np.stack(columns, axis=1), runs, np.array(floors), timed=table.time_s is not None)
-    return BodyEvidence(prediction, search.run(rng), rows, tuple(names)), tuple(notes)
+    time_s = None if table.time_s is None else table.time_s[rows]
+    return BodyEvidence(prediction, search.run(rng), rows, tuple(names), time_s), tuple(notes)
 
 
 def _floor(values: Array, u: Array | None, rows: NDArray[np.intp]) -> float:

@@ -106,7 +106,7 @@ def _least_refuted(distance: float) -> float:
     sqrt(distance) (Cox 1961). Two explanations that such data could distinguish are both kept if the present data
     favour neither.
     """
-    return -distance + SURELY * 2.0 * float(np.sqrt(distance)) + SPARE
+    return -distance + SURELY * 2.0 * float(np.sqrt(max(0.0, distance))) + SPARE
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:

@@ -1,6 +1,6 @@
 """Candidate explanations of one to three effects: ranked by linear signatures, then refitted jointly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -14,8 +14,14 @@ from fingervision.domain.parameter import Parameter
 
 Progress = Callable[[float], None]
 SCANNED = 6
-"""Number of explanations to which an effect with jumps is added at all its sizes, because the best size depends on the
-other effects."""
+"""Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
+BEGINS = 4
+"""Signatures from which a single effect is fitted: time constants and widths have several valleys, seldom more."""
+REFINED = 8
+"""Extensions that are refitted thoroughly: what lies behind these after seven steps has never come out first."""
+PROMISE = 0.5
+"""Share of the asked gain that a signature must promise before its refit is tried: a refit between the shapes of the
+grid gains a fifth more at most (`REFIT_MARGIN`), along a valley of the effects before it seldom twice as much."""
 LEAST_GAIN = 4.0
 """Least chi-square gain of an effect's signature for which a refit is tried."""
 FEW_ROWS = 0.1
@@ -33,8 +39,8 @@ SWAPS_REFITTED = 24
 """Number of partners refitted for each half of the best pair: each half has at most 26."""
 
 
-def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
-    """Fit each effect alone from its four most promising signatures; return the fits, best first."""
+def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins: int = BEGINS) -> list[Explanation]:
+    """Fit each effect alone, from its most promising signatures; best first."""
     nothing = problem.nothing()
     gain, coefficient = atoms.gains(nothing.residual, problem.offsets, problem.offsets.metric(nothing.sigma_mm))
     owner = np.array(atoms.names)
@@ -44,12 +50,12 @@ def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list
         if not mine.size:
             continue
         mine = mine[np.argsort(-gain[mine])]
-        begins = [atoms.begin(k, coefficient[k]) for k in mine[:4]]
+        starts = [atoms.begin(k, coefficient[k]) for k in mine[:begins]]
         listed = [parameter for _, parameter in problem.parameters((name,)) if parameter.run is None]
         if len(listed) == 1 and listed[0].rugged and listed[0].logarithmic and 2.0 * gain[mine[0]] > np.max(gain):
             between = [{listed[0].name: value} for value in _finely(problem, listed[0]).tolist()]
-            begins.append(scan(problem, nothing, name, between)[0])
-        tries = [fit(problem, (name,), {name: begin}, iterations=5) for begin in begins]
+            starts.append(scan(problem, nothing, name, between)[0])
+        tries = [fit(problem, (name,), {name: start}, iterations=5) for start in starts]
         best = min(tries, key=lambda explanation: explanation.score)
         found.append(fit(problem, (name,), best.values, iterations=iterations))
     return sorted(found, key=lambda explanation: explanation.score)
@@ -68,12 +74,37 @@ def _finely(problem: Problem, parameter: Parameter) -> Array:
 
 
 def extended(
-    problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
+    problem: Problem,
+    atoms: Signatures,
+    bases: list[Explanation],
+    most: int,
+    progress: Progress,
+    *,
+    scanned: int = SCANNED,
+    refined: int = REFINED,
+    asked: Mapping[str, float] | None = None,
 ) -> list[Explanation]:
-    """Add each effect to each base explanation: start from signatures in the base's residual, then refit jointly."""
+    """Add each effect to each base explanation: start from signatures in the base's residual, then refit jointly.
+
+    Parameters
+    ----------
+    problem, atoms
+        The data, and what each effect would add.
+    bases : list of Explanation
+        Explanations to which one effect is added.
+    most, refined : int
+        Extensions that are refitted, and how many of them thoroughly.
+    progress : callable
+        Told the share that is done.
+    scanned : int
+        Bases beside which an effect that jumps is tried at all its sizes.
+    asked : mapping of str to float or None
+        Fall of chi-square by each effect below which nobody will believe in it; extensions that promise less than half
+        of it are not refitted. None to try all.
+    """
     owner = np.array(atoms.names)
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
-    scanned = SCANNED if problem.chain.history.input_mm.size <= LONG else 1
+    scanned = scanned if problem.chain.history.input_mm.size <= LONG else 1
     for place, base in enumerate(bases):
         metric = problem.offsets.metric(base.sigma_mm)
         gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, tangents(problem, base))
@@ -81,12 +112,13 @@ def extended(
             mine = np.flatnonzero(owner == name)
             if name in base.names or not mine.size:
                 continue
+            least = LEAST_GAIN if asked is None else max(LEAST_GAIN, PROMISE * asked.get(name, 0.0))
             if place < scanned and any(parameter.rugged for _, parameter in problem.parameters((name,))):
                 start, score = scan(problem, base, name, [atoms.starts[k] for k in mine])
-                if base.score - score > LEAST_GAIN:
+                if base.score - score > least:
                     planned.append((score, base, name, start))
             k = int(mine[np.argmax(gain[mine])])
-            if gain[k] > LEAST_GAIN:
+            if gain[k] > least:
                 planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
     planned.sort(key=lambda plan: plan[0])
     found: dict[tuple[str, ...], Explanation] = {}
@@ -98,7 +130,8 @@ def extended(
         progress((index + 1) / most)
     ranked = sorted(found.values(), key=lambda explanation: explanation.score)
     return sorted(
-        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:8]] + ranked[8:], key=lambda e: e.score
+        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:refined]] + ranked[refined:],
+        key=lambda e: e.score,
     )
 
 

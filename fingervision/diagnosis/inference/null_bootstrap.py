@@ -85,11 +85,12 @@ def linear_thresholds(
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
     margin = 1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))
     tail, excess = {}, np.full(LINEAR_DRAWS, -np.inf)
+    taken = (kept.T @ noise) ** 2 / np.where(usable, norm, 1.0)[:, None]
     for name in dict.fromkeys(names):
         mine = usable & (owner == name)
         if not mine.any():
             continue
-        gains = np.max((kept.T[mine] @ noise) ** 2 / norm[mine, None], axis=0) * doubt
+        gains = np.max(taken[mine], axis=0) * doubt
         # Refitting finds what lies between the shapes of the grid; a single column has no shape.
         gains = gains * margin + 1.5 if mine.sum() > 1 else gains
         tail[name] = float(np.quantile(gains, OWN_QUANTILE))

@@ -8,7 +8,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
 from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
@@ -140,7 +140,8 @@ def _likelier(
         known = _refitted(_beside(problem, effect), known)
         tried.append((known.bic(rows) + effect.price, known, effect))
     cost, known, effect = min(tried, key=lambda one: one[0])
-    if cost > found.best.bic(rows) - least:
+    rival = found.best if least < 0.0 else min(found.best, found.nearest, key=lambda e: e.bic(rows))
+    if cost > rival.bic(rows) - least:
         return None
     return (known if known.names else None), effect
 
@@ -162,7 +163,7 @@ def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
 
 
 def _refitted(problem: Problem, one: Explanation) -> Explanation:
-    return fit(problem, one.names, one.values, iterations=10) if one.names else problem.nothing()
+    return fit(problem, one.names, one.values, iterations=MANY_STEPS) if one.names else problem.nothing()
 
 
 def _does_more(beside: Searched) -> bool:
@@ -176,12 +177,11 @@ def _does_more(beside: Searched) -> bool:
 
 
 def _gained(state: Searched, beside: Searched, effect: RunGains | PositionMap) -> float:
-    """Reduction of -2 log likelihood by a random effect and the effects found with it, minus the penalty."""
-    best = state.found.best
+    """By how much -2 log of the likelihood falls by a random effect and what was found beside it, the price paid."""
     plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
-    rival = fit(plain, best.names, best.values, iterations=20) if best.names else plain.nothing()
-    return rival.bic(rows) - beside.found.best.bic(rows) - effect.price
+    rivals = [_refitted(plain, one) for one in (state.found.best, state.found.nearest)]
+    return min(rival.bic(rows) for rival in rivals) - beside.found.best.bic(rows) - effect.price
 
 
 def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:

@@ -11,6 +11,12 @@ from fingervision.diagnosis.inference.reference_gauge import consistent_with_gau
 from fingervision.diagnosis.inference.search import Findings, search
 from fingervision.diagnosis.input.observations import Observations
 
+QUIET = 3.0 * 2.0**0.5
+"""Square roots of the rows by which a chi-square must fall short of them before the noise was taken for too large:
+three of its standard deviations, sqrt(2 n)."""
+MOST_REPEATS = 2
+"""Searches repeated with a smaller noise: beside the right effects its estimate hardly changes any more."""
+
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     """Estimation problem with the noise from an explanation's residual, or from the disagreement if there is none."""
@@ -37,7 +43,22 @@ class Look:
     progress: Progress
 
     def again(self, data: Observations, known: Explanation | None = None) -> Searched:
-        """Search again, with the noise estimated from the residual of a known explanation."""
-        found = search(partial(problem_of, data), self.rng, self.forced, self.progress, known)
+        """Search once more, the noise estimated beside what is known already."""
+        look = partial(search, partial(problem_of, data), self.rng, self.forced, self.progress)
+        found = look(known)
+        for _ in range(MOST_REPEATS):
+            if not _noise_is_too_large(found):
+                break
+            found = look(found.best)
         found, said = consistent_with_gauges(data, found)
         return Searched(data, found, said)
+
+
+def _noise_is_too_large(found: Findings) -> bool:
+    """Whether the answer leaves far less than the noise by which it was judged.
+
+    The noise is estimated beside a rough first fit. Where that fit is poor, its errors count as correlated noise, and
+    under so large a noise a second effect is never seen.
+    """
+    rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
+    return bool(found.best.score < rows - QUIET * rows**0.5)

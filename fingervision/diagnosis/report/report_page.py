@@ -130,10 +130,10 @@ def _mechanisms(report: DiagnosisReport) -> str:
     known = catalogue()
     return "".join(
         f"<h3>{escape(effect.name)}</h3><p>{escape(known[effect.name].words.capitalize())}: "
-        f"<code>{escape(known[effect.name].formula)}</code> ({escape(known[effect.name].source)}). In measured minus "
-        f"simulated it looks so: {escape(known[effect.name].residual)}.</p>"
+        f"<code>{escape(known[effect.name].formula)}</code> ({escape(known[effect.name].source)}). Its "
+        f"residual (measured minus simulated): {escape(known[effect.name].residual)}.</p>"
         + _picture(
-            png_bytes(effect_figure(effect.name)), f"{effect.name} alone, on a made-up gripper that opens and closes"
+            png_bytes(effect_figure(effect.name)), f"{effect.name} alone, in a simulated gripper that opens and closes"
         )
         for effect in report.effects
         if effect.name in known

@@ -1,4 +1,4 @@
-"""Recipe step: rest at a position."""
+"""Recipe step: move to a position and stay there for a time."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ APPROACH_MM_S = 0.5
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield a move to the position if the stage is elsewhere, then a rest."""
+    """Move to the position if the stage is elsewhere, then stand."""
     hold_mm, seconds, frames = section.number("at_mm"), section.number("seconds", above=0.0), frames_of(section)
     if at_mm != hold_mm:
         yield Go(hold_mm, APPROACH_MM_S, None if frames is None else 0), "at_mm"
