@@ -1,9 +1,9 @@
-"""Translation and rotation of a textured surface: registration of patches against a reference picture.
+"""Translation and rotation of a textured surface, by registration of patches against a reference picture.
 
-Inverse-compositional Gauss-Newton of the zero-normalised sum of squared differences over translation and rotation
-(Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan, Li & Tong,
-Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A linear gradient of light and a gain are removed
-from both pictures. Both pictures are smoothed in the same way and interpolated by cubic B-splines
+The zero-normalised sum of squared differences is minimised over translation and rotation by the inverse-compositional
+Gauss-Newton method (Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan,
+Li & Tong, Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A linear gradient of light and a gain are
+removed from both pictures. Both pictures are smoothed in the same way and interpolated by cubic B-splines
 (`spline_interpolation`). Many patches of one size are registered together.
 """
 
@@ -66,13 +66,14 @@ class PatchReference:
     Parameters
     ----------
     x_px, y_px : float
-        Its middle, on a pixel.
+        Middle of the patch, on a pixel.
     half_width_px, half_height_px : int
-        Pixels to either side of the middle.
+        Number of pixels on either side of the middle.
     levels : ndarray, shape (n,)
-        Light, with plane and mean taken off; norm `contrast`.
+        Light, smoothed, with the fitted plane (mean included) subtracted.
     jacobian : ndarray, shape (3, n)
-        Change of `levels` with x, y and angle (radians), what plane and gain explain taken off.
+        Derivatives of `levels` by x, y and angle (radians), without the components that a plane of light or a gain
+        explains.
     hessian : ndarray, shape (3, 3)
         Gram matrix of the jacobian.
     score : ndarray, shape (3, 3)
@@ -81,7 +82,7 @@ class PatchReference:
         Share of the gradients' power along x and along y that the smoothing takes off, 0 to 1: most of texture too fine
         for the pixels.
     template : ndarray, shape (height, width)
-        Light as it was seen, for coarse search.
+        Light without smoothing, for the coarse search.
     """
 
     x_px: float
@@ -97,22 +98,22 @@ class PatchReference:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Columns and rows."""
+        """Number of columns and rows."""
         return 2 * self.half_width_px + 1, 2 * self.half_height_px + 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registered:
-    """Positions and rotations of patches in another picture; arrays over the k patches.
+    """Positions and rotations of k patches in another picture.
 
     Parameters
     ----------
     x_px, y_px, turn_rad : ndarray of float, shape (k,)
-        Middle, and rotation clockwise on the screen, since the reference.
+        Middle of each patch, and rotation clockwise on the screen relative to the reference picture.
     covariance : ndarray of float, shape (k, 3, 3)
-        Of the three, from the noise of both pictures.
+        Covariance of x, y and rotation, from the noise of both pictures.
     correlation : ndarray of float, shape (k,)
-        Zero-normalised correlation of the patch with what was found, planes taken off.
+        Zero-normalised correlation of the patch with the registered part of the picture, with planes subtracted.
     noise : ndarray of float, shape (k,)
         Standard deviation of the noise of one picture.
     settled : ndarray of bool, shape (k,)
@@ -137,7 +138,7 @@ def _taken_off(smoothed: Floats, sharp: Floats) -> float:
 
 @cache
 def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
-    """Columns and rows counted from the centre, and an orthonormal basis of planes, shape (3, n)."""
+    """Columns and rows counted from the patch's centre, and an orthonormal basis of planes of light, shape (3, n)."""
     y, x = np.mgrid[-half_height : half_height + 1, -half_width : half_width + 1]
     dx, dy = x.ravel().astype(np.float64), y.ravel().astype(np.float64)
     basis = np.stack((np.ones_like(dx), dx, dy))
@@ -158,16 +159,16 @@ def patch_reference(levels: Floats, column: int, row: int, half_width: int, half
     Parameters
     ----------
     levels : ndarray, shape (height, width)
-        Light of the picture, or of a part of it; at least `MARGIN_PX` to every side of the patch.
+        Light of the picture, or of a part of it that extends at least `MARGIN_PX` beyond the patch on every side.
     column, row : int
         The patch's middle pixel.
     half_width, half_height : int
-        Pixels to either side.
+        Number of pixels on either side of the middle pixel.
 
     Returns
     -------
     PatchReference
-        Its place is in pixels of `levels`.
+        The prepared patch; its position is in pixels of `levels`.
     """
     dx, dy, basis = _grid(half_width, half_height)
     rows = slice(row - half_height - MARGIN_PX, row + half_height + MARGIN_PX + 1)
@@ -201,25 +202,25 @@ def register(
     start: Doubles,
     shared_pixels: float = 1.0,
 ) -> Registered:
-    """Register patches of one size, each in a part of another picture.
+    """Register patches of one size, each in its own part of another picture.
 
     Parameters
     ----------
     references : list of PatchReference
         The patches, all of one size.
     parts : list of ndarray, shape (height, width)
-        Light of the part of the picture in which each is looked for, all of one size.
+        Light of the part of the picture in which each patch is searched, all of one size.
     origins_px : ndarray of float, shape (k, 2)
         Column and row of each part's first pixel.
     start : ndarray of float, shape (k, 3)
-        First guess of x, y and turn, to about half a period of the finest texture.
+        Initial estimate of x, y and rotation, accurate to about half a period of the finest texture.
     shared_pixels : float
-        So many pixels count as one, where a codec is known to share its errors.
+        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
 
     Returns
     -------
     Registered
-        In the order of the references.
+        Results in the order of the references.
     """
     first = references[0]
     hessian = np.stack([reference.hessian for reference in references])
@@ -254,13 +255,14 @@ def _covariance(
     half_size: tuple[int, int],
     shared_pixels: float,
 ) -> tuple[Doubles, Doubles]:
-    """Covariance of x, y and rotation from the residuals, and the noise of one picture.
+    """Covariance of x, y and rotation from the residuals, and standard deviation of the noise of one picture.
 
     Both pictures have noise. Smoothed and interpolated levels have less noise than pixels, so that the residuals have
-    the variance `sigma^2 (k_0 + g^2 k)`, where `k` depends on the sub-pixel phase. The estimate is affected by the
-    pixels' noise after smoothing only, because the texture is coarser than the pixels: `2 sigma^2` times the Gram
-    matrix of the gradients smoothed once more. The noise in the gradients of the reference increases their Gram matrix
-    and is subtracted from it (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
+    the variance `sigma^2 (k_0 + g^2 k)`, where g is the gain and `k` depends on the sub-pixel phase. The estimate is
+    affected by the pixels' noise after smoothing only, because the texture is coarser than the pixels: the covariance
+    of the gradient projections is `2 sigma^2` times the Gram matrix of the gradients smoothed once more. The noise in
+    the gradients of the reference increases their Gram matrix and is subtracted from it (errors in variables):
+    covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
     count, (n, turned) = squares.size, _extent(*half_size)
     table = phase_power(SMOOTHING_PX)
@@ -295,7 +297,7 @@ def _as_blocks_scatter(covariance: Doubles, inverse: Doubles, scores: Doubles) -
 
 
 def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:
-    """Covariances of k patches, shape (k, 3, 3); infinite for gradients of noise only, or of one direction only."""
+    """Covariances of k patches, shape (k, 3, 3); infinite if the gradients are noise, or all in one direction."""
     true = hessian - noisy
     size = np.sqrt(np.maximum(np.einsum("kii->ki", hessian), 1e-30))
     surely = hessian - NOISE_MARGIN * noisy
@@ -309,7 +311,7 @@ def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Double
 def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
     """Predicted covariance of x, y and rotation for a registration of this patch, shape (3, 3).
 
-    Infinite where the gradients do not exceed those of the noise, or have one direction only.
+    The covariance is infinite if the gradients do not exceed those of noise, or all have one direction.
 
     Parameters
     ----------

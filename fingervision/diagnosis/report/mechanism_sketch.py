@@ -23,22 +23,22 @@ STEPS = 15
 TIME_STEPS, FEWEST_STEPS = 24, 4
 """Positions over time, shared by all runs, and the fewest of a run: there and back at either end."""
 SHOWN = 0.05
-"""Of the mechanism's size: the largest difference as it is drawn."""
+"""Largest displayed difference, as a share of the mechanism's size."""
 CHORDS = 9
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 COLOURS = (("#7a8b99", 3.0), ("#c9a227", 6.0), ("#c1440e", np.inf))
-"""Of a body whose mean is off by up to so many standard deviations."""
+"""Colour of a body whose mean deviation is up to a given number of standard deviations."""
 
 
 def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
-    """Draw the bodies that have a pose; a slider goes through the input's range.
+    """Draw the bodies with a measured pose; a slider moves through the input's range.
 
     Parameters
     ----------
     evidence : BodyEvidence
-        What the channels said.
+        Results of comparing the measured channels with the drawing.
     answers : PlaceAnswers
-        The drawing.
+        Predictions of the drawing.
     """
     u = evidence.prediction.input_mm
     parts, said_at = _parts(evidence)
@@ -154,9 +154,9 @@ def _hinges(evidence: BodyEvidence, answers: PlaceAnswers, size: float) -> str:
 
 
 def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
-    """Mean of measured minus predicted pose of a body in every part of the range, shape (parts, 3).
+    """Mean difference of a body's measured and predicted pose in every part of the range, shape (parts, 3).
 
-    The second value is its largest significance.
+    The second result is the largest significance of these differences.
     """
     means, sigma = np.zeros((len(parts), 3)), np.zeros(len(parts))
     for k, part in enumerate(PARTS):

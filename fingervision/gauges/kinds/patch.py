@@ -57,18 +57,18 @@ class PatchSpec:
     reach_px: float
 
     def follower(self) -> "FollowedPatch":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedPatch(self)
 
 
 def read(section: Section) -> PatchSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     width, height = (section.number(key, low=SMALLEST_PX, high=LARGEST_PX) for key in ("width_px", "height_px"))
     return PatchSpec(common_keys.middle(section), width, height, common_keys.reach(section))
 
 
 class FollowedPatch:
-    """Measures one patch in the frames of one recording."""
+    """Tracks one patch through the frames of one recording."""
 
     def __init__(self, spec: PatchSpec) -> None:
         self._spec = spec
@@ -88,7 +88,7 @@ class FollowedPatch:
 
     @staticmethod
     def measured_with(followers: Sequence["FollowedPatch"], picture: Picture) -> list[Reading]:
-        """Measure several patches in the next frame; those of one size are registered together."""
+        """Measure several patches in the next frame; patches of the same size are registered together."""
         readings: dict[int, Reading] = {}
         waiting: dict[tuple[int, ...], list[tuple[int, Floats, tuple[int, int], NDArray[np.float64]]]] = {}
         for number, follower in enumerate(followers):
@@ -124,7 +124,7 @@ class FollowedPatch:
         return Mark(tuple((x + cos(turn) * u - sin(turn) * v, y + sin(turn) * u + cos(turn) * v) for u, v in corners))
 
     def _never(self, status: GaugeStatus, words: str) -> Reading:
-        """Record that the first frame has no texture to register against: no frame of this recording gives a number."""
+        """Record that the first frame has no texture to register against, so that no frame can give a value."""
         self._refused = Reading(status, zone=self._zone(), words=words)
         return self._refused
 
@@ -133,7 +133,7 @@ class FollowedPatch:
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
-        """Take the reference from the first readable frame; a later one would change the zero."""
+        """Take the reference from the first readable frame; a later one would change the zero of displacement."""
         if self._refused is not None:
             return self._refused
         (a, b), (x, y) = self.half, self._spec.middle_px
@@ -164,7 +164,7 @@ class FollowedPatch:
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
-        """Locate the patch roughly: the part of the picture in which to register it, and the initial estimate."""
+        """Locate the patch roughly: return the part of the picture to register it in, and an initial estimate."""
         a, b = self.half
         x, y, turn = self._at
         reach = ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
@@ -208,7 +208,7 @@ class FollowedPatch:
     def taken(
         self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
     ) -> Reading:
-        """Accept or reject the registration's result, and store it."""
+        """Accept or reject the result of the registration, and store an accepted one."""
         x, y, turn = place
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
@@ -244,9 +244,9 @@ def _aliased_px(reference: PatchReference) -> tuple[float, float]:
 
 
 def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:
-    """Light in a rectangle.
+    """Light in a rectangle of the picture.
 
-    Beyond the picture's border it is reflected, which affects only the tails of the interpolation.
+    Beyond the picture's border the light is mirrored, which affects only the tails of the interpolation.
     """
     levels, (left, top) = picture.part(x, y, width, height)
     part = levels.astype(np.float32)
