@@ -1,4 +1,4 @@
-"""Joint fit of offset and rate of two clocks, play, initial state and scale, by variable projection."""
+"""Joint fit of clock offset, clock rate, play, initial state of the play, and scale, by variable projection."""
 
 from dataclasses import dataclass, replace
 
@@ -8,24 +8,25 @@ from fingervision.domain.effect import Array
 from fingervision.measuring.clock.motion_model import CREEP_S, Alignment, Motion
 
 OFFSET_PRIOR_S, PLAY_PRIOR_MM = 1e3, 1e3
-"""Standard deviations, so large that they say nothing: where nothing moves the normal matrix stays regular."""
+"""Standard deviations of uninformative priors, which keep the normal matrix regular if nothing moves."""
 RATE_PRIOR = 6e-4
-"""Standard deviation of the clocks' relative rate before anything is seen: that of anything between -0.1 and 0.1 %."""
+"""Prior standard deviation of the clocks' relative rate: that of a uniform distribution from -0.1 to 0.1 %."""
 START_PRIOR = 0.58
-"""Standard deviation of the play's start state: anything between -1 and 1 is as likely."""
+"""Prior standard deviation of the play's initial state: that of a uniform distribution from -1 to 1."""
 BEND_PRIOR = 0.1
-"""Standard deviation of the change of slope of gap against input at a knot, over the slope: large deflection of a
-flexure gripper bends it by a few per cent in all; more would let any smooth one-way motion be shifted at will.
-Where the data know better, as where the fingers meet, they outweigh it."""
+"""Prior standard deviation of the relative change of slope (gap against input) at a knot. Large deflection changes the
+slope of a flexure gripper by a few per cent in all; a weaker prior would allow any smooth one-way motion to be shifted
+in time. Strong evidence, such as the kink where the fingers meet, outweighs the prior."""
 CREEP_PRIOR = 0.02
-"""Standard deviation of a creep's share of the motion at each time constant: metals creep by 0.1 % of a strain, printed
-polymers by one to five per cent in a decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
+"""Prior standard deviation of the creep's share of the motion at each time constant: metals creep by 0.1 % of a strain,
+printed polymers by one to five per cent per decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
 STEPS = 12
 """Gauss-Newton steps at most; from the correlation's peak three to five suffice."""
 SETTLED = 1e-3
-"""Step, in standard uncertainties, below which a search has settled."""
+"""Step, in standard uncertainties, below which the iteration has converged."""
 OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
-"""Steps of the derivatives: small beside a frame, a clock's rate, the state's range and an encoder's step (mm)."""
+"""Step sizes of the numerical derivatives: small compared with a frame's duration, a clock's rate, the range of the
+play's state and an encoder's step (mm)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,17 +36,17 @@ class Fit:
     Parameters
     ----------
     at : Alignment
-        Estimates.
+        Estimated offset, rate, play and initial state.
     squares : float
-        Whitened residual's sum of squares with the priors' part, in mm^2.
+        Sum of squares of the whitened residuals, including the priors' terms, in mm^2.
     degrees : int
         Degrees of freedom.
     normal : ndarray of float, shape (3, 3) or (4, 4)
-        Normal matrix of offset, rate, start (and play) over the residual's variance.
+        Normal matrix of offset, rate, initial state (and play), divided by the residual variance.
     residual_mm : ndarray of float, shape (n,)
-        Gap minus prediction, not whitened.
+        Gap minus its prediction, not whitened.
     scale : float
-        Change of gap over the log's half range, in mm; negative where the gap closes as the input grows.
+        Change of the gap over half the log's range, in mm; negative if the gap closes as the input increases.
     """
 
     at: Alignment
@@ -57,7 +58,7 @@ class Fit:
 
     @property
     def variance_mm2(self) -> float:
-        """Variance of the whitened residual."""
+        """Variance of the whitened residuals."""
         return self.squares / self.degrees
 
 
@@ -67,11 +68,11 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
     Parameters
     ----------
     motion : Motion
-        Frames and log.
+        The frames and the log.
     start : Alignment
-        Where to begin.
+        Initial estimate.
     free_play : bool
-        Whether the play is fitted too; else it stays.
+        Whether the play is fitted too; otherwise it keeps its initial value.
 
     Notes
     -----
@@ -113,10 +114,10 @@ def squares_at(motion: Motion, at: Alignment) -> float:
 
 
 def shift_by_creep(motion: Motion, found: Fit) -> Array:
-    """Change of offset, rate and play if the gap may creep after the input; shape (3,), zero where it may already.
+    """Change of offset, rate and play if creep is added to the model; shape (3,), zero if it is already included.
 
-    In a slow motion a creep too small to be told is a delay of its share times its time constant, and takes the place
-    of play as well.
+    In slow motion, creep too small to be detected acts as a delay equal to (creep fraction x time constant), and can
+    also be mistaken for play.
     """
     at = found.at if motion.creeps else fit(replace(motion, creeps=True), found.at, free_play=found.at.play_mm > 0.0).at
     return _change(at, found.at)

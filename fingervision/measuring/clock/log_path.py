@@ -13,9 +13,9 @@ from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
 CORNER_ROWS = 3
-"""Rows on either side of a corner that its smoothing spoils."""
+"""Rows on either side of a corner that smoothing distorts."""
 LONG_ROWS = 4 * CORNER_ROWS
-"""Rows of a stretch whose ends may be left out of the look at its rounding errors."""
+"""Number of rows from which on the ends of a stretch are left out when its rounding errors are examined."""
 AVERAGED = 0.5
 """Leverage below which a row is the mean of several, and shares its error with its neighbours."""
 LEAST_LEVERAGE = 1.0 / 241.0
@@ -24,16 +24,16 @@ LEAST_LEVERAGE = 1.0 / 241.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """Stretches of the log, each of which may have one common error.
+    """Stretches of the log, each with one error that is common to its rows.
 
     Parameters
     ----------
     begin_s : ndarray of float, shape (g - 1,)
-        Times at which the second stretch begins, and the further ones.
+        Start times of the second and the later stretches.
     u_mm : ndarray of float, shape (g,)
-        Standard uncertainty of each one's error.
+        Standard uncertainty of each stretch's common error.
     halts : ndarray of bool, shape (g,)
-        Whether it is a halt or a turn, whose place a play remembers.
+        Whether the stretch is a halt or a reversal, whose position determines the state of the play.
     """
 
     begin_s: Array
@@ -69,18 +69,18 @@ class ErrorParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogPath:
-    """Path of the input through the log's rows.
+    """Path of the input, interpolated between the rows of the log.
 
     Parameters
     ----------
     drive : DriveHistory
-        Points so close that straight lines between them will do.
+        Points of the path, so dense that straight lines between them suffice.
     u_mm : ndarray of float, shape (n,)
-        Standard uncertainty at each of them of what lies between rows.
+        Standard uncertainty of the input at each point: random error, and interpolation between rows.
     shared : SharedErrors
         What neighbours are off by alike.
     rows : DriveHistory
-        The log as it is.
+        The log itself.
     step_mm : float
         Its encoder's step; 0 where none is seen.
     parts : ErrorParts
@@ -96,12 +96,12 @@ class LogPath:
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
-        """Smooth the rows as far as their error is random, and draw Akima's curve through them.
+        """Smooth the rows of the log as far as their error is random, and interpolate them by Akima's curve.
 
-        Akima's curve preserves corners.
+        Akima's interpolation is chosen because it preserves corners.
 
-        Without smoothing, the play would follow every peak of a noisy record, and would seem to lead by two standard
-        deviations of the noise.
+        Without smoothing, the model of play would respond to every noise peak, as if the input had gone further by
+        about two standard deviations of the noise.
         """
         names = log.run or ("",) * log.time_s.size
         lengths = [len(list(group)) for _, group in groupby(names)]
@@ -139,16 +139,16 @@ def _shared_errors(
 ) -> tuple[SharedErrors, Array]:
     """Split an encoder's rounding error into a part common to neighbouring rows and a random part.
 
-    Rounding errors do not average out like noise. A stage at rest lies anywhere within a step. A stage that moves by
-    whole steps from row to row is rounded equally in each row. Of a slower stage only the crossings of lines are
-    informative. The path may be shifted as long as every row stays within half a step of it; where the rounding errors
-    cover the whole step, no such shift is possible. At the beginning and the end of a stroke, motion within one step is
-    invisible.
+    Rounding errors do not average out like noise. A stage at rest may be anywhere within a step of the encoder. If a
+    stage moves by whole steps from row to row, the rounding error is the same in each row. For a slower stage, only the
+    crossings of the encoder's lines are informative. The path may be shifted as long as every row stays within half a
+    step of it; if the rounding errors cover the whole step, no such shift is possible. At the beginning and the end of
+    a stroke, motion within one step is invisible.
 
     Returns
     -------
     shared, u_mm : SharedErrors, ndarray of float, shape (n,)
-        The second is what scatters, for the rows.
+        The common errors, and the random standard uncertainty of each row.
     """
     rounding_mm = step_mm / float(np.sqrt(12.0))
     direction = np.where(np.abs(np.diff(smooth_mm)) <= still_mm, 0, np.sign(np.diff(smooth_mm))).astype(int)
@@ -200,9 +200,10 @@ def _shared_errors(
 
 
 def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
-    """Step from row to row below which the stage is at rest; 0 where it never moves (mm).
+    """Step from row to row below which the stage is at rest; 0 if it never moves (mm).
 
-    In a record smoothed over k rows, the scatter from one row to the next is 1/k of its own scatter.
+    In a record smoothed over k rows, differences between neighbouring rows scatter by 1/k of the scatter of a smoothed
+    row.
     """
     steps = np.abs(np.diff(input_mm))
     scatter = sigma_mm * np.minimum(leverage[:-1], leverage[1:]) ** 1.5
@@ -211,9 +212,10 @@ def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
 
 
 def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
-    """Set the stage to one position while it is at rest, and keep the path to it from overshooting it.
+    """Replace positions at rest by one position, and keep the path next to a rest from overshooting it.
 
-    Smoothing makes corners overshoot by some standard deviations of a row, and a play remembers each overshoot.
+    Smoothing makes corners overshoot by some standard deviations of a row, and the modelled play is changed by each
+    overshoot.
     """
     still = _standing_step(input_mm, sigma_mm, leverage)
     if still == 0.0:
