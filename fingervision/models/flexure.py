@@ -11,7 +11,7 @@ from fingervision.domain.gripper import PointMm
 from fingervision.models.hinge_correction import plane_strain_share
 from fingervision.models.notch import Notch
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar
-from fingervision.models.strip_width import strip_share
+from fingervision.models.strip_width import stretched_share, strip_share
 from fingervision.models.width_effect import ConstrainedZone
 
 Array = NDArray[np.float64]
@@ -45,6 +45,9 @@ class Flexure:
         circular flexure. A leaf has no depth.
     fillet_mm : float
         Radius of the corners of a filleted flexure.
+    used : (float, float, float) or None
+        Shares of its strain energy by ends that turn against each other, that sway, and that stretch it; None where not
+        known.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Flexure:
     half_length_mm: float
     depth_mm: float = 0.0
     fillet_mm: float = 0.0
+    used: tuple[float, float, float] | None = None
 
     def point_mm(self, along: Any, across: Any) -> tuple[Any, Any]:
         """A point, or array of points, from its coordinates along and across the axis."""
@@ -104,7 +108,7 @@ class Flexure:
         return Notch(self.thickness_mm, self.half_length_mm, self.depth_mm, plate_mm)
 
     @property
-    def _bent_mm(self) -> float:
+    def bent_mm(self) -> float:
         """Length that bends, of a leaf or a straight neck: fillets as far as they are twice as stiff at most."""
         straight, r = self.half_length_mm - self.fillet_mm, self.fillet_mm
         if r == 0.0:
@@ -115,21 +119,28 @@ class Flexure:
     def width_share(self, plate_mm: float) -> float:
         """How far the plate's width holds it back in bending: 0 in plane stress, 1 in plane strain.
 
-        Of a strip the mean of two: of one whose ends turn, and of one whose ends keep their direction.
+        Of a strip between two: that of one whose ends turn, and of one whose ends keep their direction; their mean
+        where it is not known how its ends move.
         """
         if self.is_notch:
             return plane_strain_share(self.notch(plate_mm))
-        return 0.5 * sum(strip_share(plate_mm / self._bent_mm, _POISSON))
+        bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
+        if self.used is None:
+            return 0.5 * (bent + swayed)
+        return (self.used[0] * bent + self.used[1] * swayed) / max(self.used[0] + self.used[1], 1e-300)
 
     def width_doubt(self, plate_mm: float) -> float:
         """How far that share may be off, because it is not known how a strip's ends move."""
-        if self.is_notch:
+        if self.is_notch or self.used is not None:
             return 0.0
-        bent, swayed = strip_share(plate_mm / self._bent_mm, _POISSON)
+        bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
         return 0.5 * (swayed - bent)
 
     def zone(self, plate_mm: float) -> ConstrainedZone:
-        """Zone in which the plate's width restrains the flexure, and how strongly."""
+        """Zone in which the plate's width restrains the flexure, and how strongly, in the way that it is used."""
         share = self.width_share(plate_mm)
+        if self.used is not None:
+            stretched = stretched_share(plate_mm / self.bent_mm, _POISSON)
+            share += self.used[2] * (stretched - share)
         height = 0.5 * self.thickness_mm + self.depth_mm
         return ConstrainedZone(self.at_mm, self.axis_deg, self.half_length_mm, height, share)

@@ -73,6 +73,38 @@ def test_faces_that_hold_nothing_or_too_much_are_refused(old: str, new: str, nam
         MechanismPlate(mechanism)
 
 
+@pytest.mark.parametrize("kind", ["circular", "elliptic"])
+def test_a_cut_that_is_a_closed_hole_is_refused(kind: str) -> None:
+    """Cuts of 1 mm in a post of 10 mm leave a strip beside each: the neck is not what bends."""
+    sizes = "radius_mm = 1.0" if kind == "circular" else "half_length_mm = 2.0\ndepth_mm = 1.0"
+    post = f"""
+name = "post"
+plate_mm = 3.0
+{STAGE[STAGE.index("[material]") : STAGE.index("[lengths]")]}
+[[body]]
+box_mm = [0, 10, 0, 30]
+[[flexure]]
+name = "neck"
+kind = "{kind}"
+at_mm = [5, 15]
+axis_deg = 90
+thickness_mm = 0.4
+{sizes}
+[[fixed]]
+box_mm = [0, 10, 0, 0]
+[drive]
+box_mm = [0, 10, 30, 30]
+direction = [1, 0]
+"""
+    with pytest.raises(FingervisionError) as refused:
+        mechanism_from_tables(tomllib.loads(post), "post.toml")
+    assert "flexure neck of post" in str(refused.value)
+    assert "closed hole" in str(refused.value)
+    assert "\n" not in str(refused.value)
+    open_cuts = post.replace("box_mm = [0, 10, 0, 30]", "box_mm = [3.8, 6.2, 0, 30]")
+    assert mechanism_from_tables(tomllib.loads(open_cuts), "post.toml").flexures
+
+
 def test_a_mechanism_that_nothing_holds_is_refused() -> None:
     """Held across alone: it would fly away along the drive's face."""
     loose = STAGE.replace("[[fixed]]", '[[slide]]\nholds = "x"')
