@@ -35,7 +35,7 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
     """
     if width_mm is None:
         if stiffness_n_mm is not None:
-            raise UsageError("--object-n-mm needs --object-mm: the width of what is that stiff.")
+            raise UsageError("--object-n-mm, the stiffness of the part, needs its width too: add --object-mm.")
         return None
     if not (isfinite(width_mm) and width_mm > 0.0):
         raise UsageError(f"--object-mm must be the positive width of a part, but is {width_mm:g}.")
@@ -210,7 +210,9 @@ def _draw(rows: Mapping[str, NDArray[np.float64]], part: Part, name: str, path: 
         style = {"color": f"C{place}", "linestyle": ("-", "--", "-.")[place % 3]}
         upper.plot(table[:, 0], table[:, 3], label=kind, **style)
         lower.plot(table[:, 0], table[:, 4], **style)
-    upper.set_title(f"{name}: grip on a part of {part.width_mm:g} mm ({_stiff(part)}), small displacements")
+    upper.set_title(
+        f"{name}: grip on a part of {part.width_mm:g} mm ({_stiff(part)}), small displacements", fontsize="medium"
+    )
     upper.set_ylabel("grip of each finger / N")
     lower.set_ylabel("force at the drive / N")
     lower.set_xlabel("input / mm")

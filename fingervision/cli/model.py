@@ -40,8 +40,8 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
-@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Which model.")
-@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs to answer.")
+@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Kind of model.")
+@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs over time.")
 @columns_option
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder to write."
@@ -85,7 +85,7 @@ def command(
     vary: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Predict gap, force, stress and vibration from a drawing, by one model or all of them.
+    """Predict gap, force, stress and vibration from a drawing, by one kind of model or all kinds.
 
     Writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the paper's Figure 9, with
     differences) and deformed.png (with finite elements). With --drive also response.csv, the gap and the force over
@@ -161,7 +161,7 @@ def command(
             if kind != "all":
                 raise
             refusals[name] = error
-            click.echo(f"{name} has no answer: {error}", err=True)
+            click.echo(f"{name} could not be computed: {error}", err=True)
             continue
         inputs, models[name] = given, model
         rows[name] = {**row, "seconds": round(time.perf_counter() - began, 3)}

@@ -35,11 +35,15 @@ WRONG = [
     (
         'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "leaf", "leaf + block"]',
         "box_mm = [100, 120, 100, 120]",
-        "one piece",
+        "connected piece",
     ),
-    ('box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "-block", 0.0]', "box_mm = [5, -5, -3, 0]", "both growing"),
+    (
+        'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "-block", 0.0]',
+        "box_mm = [5, -5, -3, 0]",
+        "[x from, x to, y from, y to]",
+    ),
     ('kind = "leaf"', 'kind = "spring"', "must be one of circular, elliptic, filleted, leaf"),
-    ("axis_deg = 90.0", "axis_deg = 0.0", "one piece"),
+    ("axis_deg = 90.0", "axis_deg = 0.0", "connected piece"),
     ('at_mm = ["-apart / 2", "leaf / 2"]', 'at_mm = ["-apart / 2"]', "list of 2 numbers"),
     ("direction = [1.0, 0.0]", "direction = [0.0, 0.0]", "drive.direction"),
     ('across = "free"', 'across = "maybe"', "drive.across"),
@@ -211,11 +215,11 @@ box_mm = ["apart / 2 + 5", "apart / 2 + 5", "leaf", "leaf + block"]
 wall_mm = [22, 0, 22, 100]
 """
 WRONG_CONTACTS = [
-    ("wall_mm = [22, 0, 22, 100]", "", "against_box_mm, a face, and wall_mm"),
+    ("wall_mm = [22, 0, 22, 100]", "", "wall_mm (two points"),
     ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22, 0]", "two different points"),
     ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22]", "list of 4 numbers"),
     ("wall_mm = [22, 0, 22, 100]", "wall = [22, 0, 22, 100]", "did you mean wall_mm?"),
-    ("wall_mm = [22, 0, 22, 100]", "against_box_mm = [5, 1, 0, 1]", "both growing"),
+    ("wall_mm = [22, 0, 22, 100]", "against_box_mm = [5, 1, 0, 1]", "[x from, x to, y from, y to]"),
 ]
 
 
