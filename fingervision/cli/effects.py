@@ -18,17 +18,19 @@ Examples:
 
 @click.command(epilog=EXAMPLES)
 @click.argument("name", required=False)
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Draw how it looks in a residual.")
+@click.option(
+    "--figure", type=click.Path(path_type=Path, dir_okay=False), help="Plot the residual that the effect causes."
+)
 @effects_option
 def command(name: str | None, figure: Path | None) -> None:
-    """List the physical effects, or explain one."""
+    """List the physical effects, or explain the effect NAME."""
     from difflib import get_close_matches
 
     from fingervision.effects import catalogue, origin_of
 
     if name is None:
         if figure is not None:
-            raise UsageError("--figure must come with the name of an effect, but none is given: add one.")
+            raise UsageError("--figure needs the name of an effect, but none is given: add the name.")
         for effect in catalogue().values():
             origin = origin_of(effect.name)
             click.echo(

@@ -1,4 +1,4 @@
-"""Cameras of this machine through OpenCV: V4L2, Media Foundation, AVFoundation; settings are read back."""
+"""Cameras of this machine through OpenCV (V4L2, Media Foundation, AVFoundation), with settings read back."""
 
 import sys
 from collections.abc import Iterator
@@ -14,9 +14,12 @@ import cv2
 
 from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame, LostFrame, Pixels
-from fingervision.frames.camera_settings import READ, coding_of, requests, settled
+from fingervision.frames.camera_controls import control_list, request_of
+from fingervision.frames.camera_settings import READ, V4L2, coding_of, requests, settled
+from fingervision.frames.controls import CameraControl
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
+from fingervision.frames.v4l2_ranges import ranges
 
 BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_MSMF, "darwin": cv2.CAP_AVFOUNDATION}
 DEVICES = Path("/sys/class/video4linux")
@@ -37,13 +40,13 @@ def open_frames(name: str, wish: Wish) -> "CameraFrames":
     Raises
     ------
     DeviceError
-        There is no such camera, somebody else has it, or it gives no picture.
+        The camera does not exist, is in use by another program, or delivers no picture.
     """
     return CameraFrames(name, wish)
 
 
 def found_cameras() -> list[tuple[str, str]]:
-    """List the cameras of this machine, each with its name as a source and its own name."""
+    """List the cameras of this machine, each with its name as a source and its product name."""
     if sys.platform == "linux":
         devices = sorted(DEVICES.glob("video*"), key=lambda path: int(path.name.removeprefix("video")))
         return [(f"/dev/{device.name}", _first_line(device / "name")) for device in devices]
@@ -58,16 +61,16 @@ def found_cameras() -> list[tuple[str, str]]:
 
 
 class CameraFrames:
-    """A camera that is open.
+    """An open camera.
 
-    Grey levels are the camera's luma; time stamps are the computer's clock on arrival.
+    Grey levels are the camera's luma; time stamps are taken from the computer's clock on arrival of a frame.
 
     Parameters
     ----------
     name : str
-        Number or device.
+        Number or device of the camera.
     wish : Wish
-        What the camera is asked for.
+        Requested settings of the camera.
     """
 
     has_own_clock = False
@@ -94,6 +97,7 @@ class CameraFrames:
                 "format, size and rate asked for; leave out --format, --size and --rate-hz."
             )
         self._closed = Event()
+        self._ranges = ranges(name) if self._capture.getBackendName() == V4L2 else {}
         self.description = self._described(wish, (pixels.shape[1], pixels.shape[0]))
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
@@ -112,7 +116,7 @@ class CameraFrames:
                 if not read or pixels is None:
                     failed += 1
                     if failed >= FAILED_READS:
-                        raise DeviceError(f"The camera {self.name} gives no pictures any more: is it plugged in?")
+                        raise DeviceError(f"The camera {self.name} has stopped sending pictures: is it plugged in?")
                     continue
                 failed = 0
                 arrived_s = monotonic()
@@ -124,6 +128,25 @@ class CameraFrames:
         """End the iteration with the next frame."""
         self._closed.set()
 
+    def controls(self) -> tuple[CameraControl, ...]:
+        """Settings that may be changed while the camera runs, with their values and limits."""
+        with _quiet():
+            return control_list(self._capture.getBackendName(), self._read(), self._ranges)
+
+    def set_control(self, name: str, value: float) -> None:
+        """Ask the camera for another value of one of its controls.
+
+        Parameters
+        ----------
+        name : str
+            Of the control.
+        value : float
+            In the control's unit.
+        """
+        with _quiet():
+            self._capture.set(*request_of(self._capture.getBackendName(), name, value))
+        self.description = self._described(Wish(), (self.description.width_px, self.description.height_px))
+
     def _ask(self, wish: Wish) -> None:
         """Request the wished settings, and no automatic changes; a camera accepts only some of them."""
         with _quiet():
@@ -134,7 +157,7 @@ class CameraFrames:
         return {what: self._capture.get(what) for what in READ}
 
     def _described(self, wish: Wish, size_px: tuple[int, int]) -> Description:
-        """Description of the camera as it is set now, with a sentence for each setting that differs from the wish."""
+        """Describe the camera with its actual settings, with a sentence for each that differs from the request."""
         backend = self._capture.getBackendName()
         with _quiet():
             read = self._read()
@@ -172,7 +195,7 @@ def _check_device(name: str) -> None:
 
 
 def _luma(pixels: Any) -> Pixels:
-    """Grey levels of an OpenCV picture (blue, green, red), or of raw YUYV."""
+    """Grey levels of an OpenCV picture (blue, green, red), or of a raw YUYV picture."""
     if pixels.ndim == 2:
         levels: Pixels = pixels
         return levels

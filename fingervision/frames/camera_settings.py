@@ -1,6 +1,6 @@
 """Requested and actual settings of a camera, as properties of OpenCV, whose meaning differs between systems.
 
-The properties have another meaning in each of OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
+The meaning of the properties differs between OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
 cap_avfoundation_mac.mm of OpenCV 4 and 5):
 
 * V4L2 returns -1 for a property that a camera lacks. Its exposure counts units of 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE);
@@ -20,6 +20,7 @@ from math import isclose, log2
 import cv2
 
 from fingervision.domain.frame import Coding
+from fingervision.frames import controls
 from fingervision.frames.source import Wish
 
 V4L2, MSMF = "V4L2", "MSMF"
@@ -34,8 +35,6 @@ CODINGS = {
 # One picture is filled while the other is read; more would only be older.
 BUFFERED_PICTURES = 2
 V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED = 1.0, 0.25
-# A camera takes the nearest of its steps; what lies nearer than this is what was asked for.
-SAME_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +44,13 @@ class Control:
     Parameters
     ----------
     name : str
-        In words.
+        Name of the setting in words.
     what : int
-        OpenCV's property.
+        Number of the property in OpenCV.
     unit : str
-        Of the number as it is shown; empty where only the camera's maker knows it.
+        Unit of the displayed number; empty if only the camera's maker knows it.
     wished : callable
-        What the user asked for, None if nothing.
+        Function that returns the value requested by the user, or None.
     """
 
     name: str
@@ -60,12 +59,12 @@ class Control:
     wished: Callable[[Wish], float | None]
 
 
-EXPOSURE = Control("exposure", cv2.CAP_PROP_EXPOSURE, "ms", lambda wish: wish.camera.exposure_ms)
-GAIN = Control("gain", cv2.CAP_PROP_GAIN, "", lambda wish: wish.camera.gain)
-FOCUS = Control("focus", cv2.CAP_PROP_FOCUS, "", lambda wish: wish.camera.focus)
+EXPOSURE = Control(controls.EXPOSURE, cv2.CAP_PROP_EXPOSURE, "ms", lambda wish: wish.camera.exposure_ms)
+GAIN = Control(controls.GAIN, cv2.CAP_PROP_GAIN, "", lambda wish: wish.camera.gain)
+FOCUS = Control(controls.FOCUS, cv2.CAP_PROP_FOCUS, "", lambda wish: wish.camera.focus)
 # Also V4L2's WB_TEMPERATURE; Media Foundation knows it by this name alone.
 WHITE_BALANCE = Control("white balance", cv2.CAP_PROP_TEMPERATURE, "K", lambda wish: wish.camera.white_balance_k)
-ZOOM = Control("zoom", cv2.CAP_PROP_ZOOM, "", lambda wish: None)
+ZOOM = Control(controls.ZOOM, cv2.CAP_PROP_ZOOM, "", lambda wish: None)
 CONTROLS = (EXPOSURE, GAIN, FOCUS, WHITE_BALANCE, ZOOM)
 # What would change by itself from frame to frame, by V4L2's properties, and what that does to the measurement.
 AUTOMATICS: Mapping[str, tuple[int, str]] = {
@@ -83,14 +82,14 @@ READ = (
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """The settings that a camera finally has.
+    """The actual settings of a camera.
 
     Parameters
     ----------
     settings : dict of str to str
-        Each setting that it has, with its unit.
+        Value of each setting that the camera has, with its unit.
     notes : tuple of str
-        A sentence for each in which it does otherwise than it was asked.
+        One sentence for each setting that differs from the request.
     """
 
     settings: dict[str, str]
@@ -103,11 +102,11 @@ def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[t
     Parameters
     ----------
     backend : str
-        OpenCV's name for it.
+        OpenCV's name of the backend.
     wish : Wish
-        What the user asks for; what nobody asks for stays, except that nothing shall change by itself.
+        Settings requested by the user; others are left unchanged, except that automatic changes are switched off.
     found : mapping of int to float
-        What was read before, by property.
+        Values read before, by property.
     """
     if backend == V4L2:
         yield cv2.CAP_PROP_MODE, 0.0
@@ -127,8 +126,8 @@ def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[t
     for control in CONTROLS:
         value = control.wished(wish)
         if value is not None and backend in (V4L2, MSMF):
-            yield control.what, _of_camera(backend, control, value)
-        elif backend == MSMF and control.name in AUTOMATICS and _has(found, control.what):
+            yield control.what, of_camera(backend, control, value)
+        elif backend == MSMF and control.name in AUTOMATICS and is_there(found, control.what):
             yield control.what, found[control.what]
 
 
@@ -138,11 +137,11 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
     Parameters
     ----------
     backend : str
-        OpenCV's name for it.
+        OpenCV's name of the backend.
     wish : Wish
-        What the user asked for.
+        Settings requested by the user.
     read : mapping of int to float
-        What was read after it was asked, by property.
+        Values read after the request, by property.
     """
     settings, notes = {"format": four_letters(read.get(cv2.CAP_PROP_FOURCC, UNSUPPORTED))}, []
     if wish.camera.format is not None and settings["format"] != wish.camera.format:
@@ -153,23 +152,23 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
             "uncertainty is larger for it; choose a size or rate that it delivers raw (--format YUYV)."
         )
     rate_hz = read.get(cv2.CAP_PROP_FPS, UNSUPPORTED)
-    if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=SAME_SHARE):
+    if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=controls.SAME_SHARE):
         states = f"states {rate_hz:g}" if rate_hz > 0.0 else "states no rate"
         notes.append(f"The camera was asked for {wish.rate_hz:g} frames a second and {states}.")
     for control in CONTROLS:
         asked = control.wished(wish)
-        if not _has(read, control.what) or backend not in (V4L2, MSMF):
+        if not is_there(read, control.what) or backend not in (V4L2, MSMF):
             if asked is not None:
                 notes.append(_cannot(backend, control, asked))
             continue
-        value = _of_user(backend, control, read[control.what])
+        value = of_user(backend, control, read[control.what])
         settings[control.name] = _words(control, value)
-        if asked is not None and not isclose(value, asked, rel_tol=SAME_SHARE):
+        if asked is not None and not isclose(value, asked, rel_tol=controls.SAME_SHARE):
             notes.append(
                 f"The camera was asked for {control.name} {_words(control, asked)} and takes {_words(control, value)}."
             )
     for name, (what, harm) in AUTOMATICS.items() if backend == V4L2 else ():
-        if _has(read, what) and not _is_manual(name, read[what]):
+        if is_there(read, what) and not _is_manual(name, read[what]):
             settings[name] = "automatic"
             notes.append(
                 f"The camera's automatic {name} could not be switched off (it reads back {read[what]:g}): {harm}."
@@ -180,17 +179,18 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
 
 
 def coding_of(settings: Mapping[str, str]) -> Coding:
-    """Compression of a camera's pictures before they arrived, judged by the pixel format that it reports."""
+    """Compression of a camera's pictures before their arrival, derived from the reported pixel format."""
     return CODINGS.get(settings.get("format", ""), Coding.LOSSLESS)
 
 
 def four_letters(number: float) -> str:
-    """Four-letter name of a pixel format; "unknown" where there is none."""
+    """Four-letter name of a pixel format; "unknown" if there is none."""
     letters = "".join(chr((int(number) >> shift) & 0xFF) for shift in (0, 8, 16, 24)) if number > 0.0 else ""
     return letters.strip() if letters.isascii() and letters.isprintable() and letters.strip() else "unknown"
 
 
-def _has(read: Mapping[int, float], what: int) -> bool:
+def is_there(read: Mapping[int, float], what: int) -> bool:
+    """Whether a camera has a property, by what it read back."""
     return read.get(what, UNSUPPORTED) != UNSUPPORTED
 
 
@@ -198,13 +198,15 @@ def _is_manual(name: str, value: float) -> bool:
     return value in (V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED) if name == EXPOSURE.name else value == 0.0
 
 
-def _of_camera(backend: str, control: Control, value: float) -> float:
+def of_camera(backend: str, control: Control, value: float) -> float:
+    """A user's value in the units of a camera's backend."""
     if control is not EXPOSURE:
         return value
     return float(round(log2(1e-3 * value))) if backend == MSMF else float(max(1, round(10.0 * value)))
 
 
-def _of_user(backend: str, control: Control, value: float) -> float:
+def of_user(backend: str, control: Control, value: float) -> float:
+    """A backend's value in the user's units."""
     if control is not EXPOSURE:
         return value
     return float(1e3 * 2.0**value) if backend == MSMF else 0.1 * value

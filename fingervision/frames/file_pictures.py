@@ -11,8 +11,10 @@ from fingervision.frames.avi_places import AviPlaces
 from fingervision.frames.coded_times import is_shown
 from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
+from fingervision.frames.matroska_checksums import BROKEN, UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.matroska_times import ClusterTimes
 from fingervision.frames.missing_references import OWN_RECORDING, missing_references
+from fingervision.frames.mp4_durations import NO_SCALE, states_another_duration
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
@@ -31,14 +33,14 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     Parameters
     ----------
     container, stream : PyAV's
-        At their beginning; the decoder is told to be strict.
+        PyAV objects at the start of the file; the decoder is set to strict mode.
     path : Path
         The file.
 
     Yields
     ------
     (int or None, VideoFrame or str)
-        Pictures with their ticks in order of presentation, or what happened instead of one.
+        Tick and picture in order of presentation, or the reason why there is no picture.
     """
     trail = DamageTrail()
     packets, last_end_s, at_end = 0, None, ""
@@ -46,6 +48,8 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     codec = stream.codec_context.name
     is_judged = container.metadata.get("comment") == OWN_RECORDING
     unfollowed = {} if is_judged else missing_references(path, stream, container.format.name)
+    is_unchecked = stream.codec.canonical_name in UNCHECKED_CODECS and "matroska" in container.format.name
+    checksums = ClusterChecksums(path) if is_unchecked else None
     with listening(codec) as heard:
         jpegs = SoundJpeg(codec)
         jpegs.learn(_first_packets(path, stream))
@@ -59,6 +63,8 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
                 if leap := losses.before(packet, trail):
                     yield None, leap
                 trail.enters(packet, is_shown=is_shown(packet, codec))
+                if checksums is not None and checksums.is_broken(packet.pos):
+                    trail.breaks(BROKEN)
                 losses.behind(packet, trail)
                 if packet.pts is not None and packet.time_base is not None:
                     last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
@@ -81,24 +87,24 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
-    """A packet, with what the next packet shows about its place.
+    """A packet, with information on its position that only the next packet gives.
 
     Parameters
     ----------
     packet : av.Packet
-        With the time of the frame that it is.
+        The packet, with the time of its own frame.
     missing : tuple of int
-        Ticks of frames that are missing before it.
+        Ticks of frames that are missing before the packet.
     loses_time : str
-        Why from here on nothing tells when a frame was taken; empty where something does, or that was said before.
+        Reason why times of frames are not known from here on; empty if they are, or the reason was given before.
     is_placed : bool
-        Whether places tell what is missing.
+        Whether missing frames can be detected from positions in the file.
     hole : str
-        What is wrong between it and the next one; empty where nothing is.
+        Damage between this packet and the next one; empty if there is none.
     end : str
-        Why there is no next one, where that is damage.
+        Reason why there is no next packet, if that is damage.
     at_end : str
-        What the container said when there was none: that the file is cut off, mostly.
+        Message of the container at the end, mostly that the file is truncated.
     """
 
     packet: "av.Packet[av.VideoStream]"
@@ -111,11 +117,12 @@ class _Read:
 
 
 def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
-    """Read packets one ahead, because a gap in the stream shows only in the packet after it."""
+    """Read packets one ahead, because a gap in the stream is only visible in the packet after it."""
     demuxed = container.demux(stream)
     places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
     clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None
     is_doubtful = False
+    is_timeless = "mp4" in container.format.name and states_another_duration(path)
     before: _Read | None = None
     while True:
         end, packet = "", None
@@ -143,16 +150,20 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
             loses_time = NO_CLUSTER if is_doubtful and not was_doubtful else ""
             if is_doubtful:
                 packet.pts = packet.dts = None
+        if is_timeless and packet is not None:
+            packet.pts = packet.dts = None
         if before is not None:
             is_last = (packet is None or not packet.size) and not end
             yield replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
         if packet is None:
             return
+        if is_timeless and before is None:
+            loses_time = NO_SCALE
         before = _Read(packet, missing, loses_time, places is not None)
 
 
 def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
-    """Record what is missing before a packet."""
+    """Record the frames that are missing before a packet."""
     if read.loses_time:
         if read.is_placed:
             trail.hole(f"{MISSING} before it.")

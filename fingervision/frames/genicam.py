@@ -1,4 +1,4 @@
-"""GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) by their maker's GenTL producer; needs the extra `genicam`.
+"""GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) through the maker's GenTL producer (extra `genicam`).
 
 A camera's name is `genicam:PRODUCER.cti`, or `genicam:PRODUCER.cti#SERIAL` if there are several cameras. The producer
 is the driver file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` loads it. Tested
@@ -6,6 +6,7 @@ with Viky, the simulated camera that comes with the GenICam reference implementa
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from threading import Event
@@ -19,16 +20,25 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DeviceError, InputFileError, MissingLibraryError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.status import Status
+from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraControl
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
 
 START = "genicam:"
 MONO = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
-"""Grey levels of which each has one or two bytes of its own, as the PFNC names them (EMVA, Pixel Format Naming)."""
+"""Pixel formats in which each grey level has one or two bytes of its own, by the names of the PFNC (EMVA, Pixel Format
+Naming Convention)."""
 NODES = {"exposure_ms": ("ExposureTime", 1e3), "gain": ("Gain", 1.0)}
 """Feature of the Standard Features Naming Convention for what may be asked, and its units in ours."""
+CONTROLS = {
+    EXPOSURE: (*NODES["exposure_ms"], "ms"),
+    GAIN: (*NODES["gain"], "dB"),
+    FRAME_RATE: ("AcquisitionFrameRate", 1.0, "Hz"),
+}
+"""What may be set while the camera runs: its feature, its units in ours, our unit."""
 SILENT_S, ASKED_EVERY_S = 2.0, 0.2
-"""A camera that sends nothing for so long is gone; so often it is looked whether the source was closed."""
+"""Time without data after which a camera counts as disconnected, and interval of the checks whether the source was
+closed."""
 
 
 def accepts(name: str) -> bool:
@@ -42,26 +52,26 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
     Raises
     ------
     MissingLibraryError
-        harvesters is not installed.
+        If harvesters is not installed.
     InputFileError
-        The producer's file is not there.
+        If the producer's file does not exist.
     DeviceError
-        There is no such camera, somebody else has it, or it gives no grey levels.
+        The camera does not exist, is in use by another program, or delivers no grey levels.
     """
     return GenicamFrames(name, wish)
 
 
 class GenicamFrames:
-    """A camera that is open.
+    """An open GenICam camera.
 
-    Time stamps are the camera's own where it sends them, else the computer's clock on arrival.
+    Time stamps are the camera's own if it sends them, else those of the computer's clock on arrival.
 
     Parameters
     ----------
     name : str
-        As the module says.
+        Name of the camera, in the form described in the module.
     wish : Wish
-        Size, rate, exposure (ms) and gain that the camera is asked for.
+        Requested size, frame rate, exposure (ms) and gain.
     """
 
     template: av.VideoStream | None = None
@@ -114,7 +124,7 @@ class GenicamFrames:
         Raises
         ------
         DeviceError
-            It sends nothing any more.
+            The camera has stopped sending pictures.
         """
         try:
             for index in count():
@@ -134,6 +144,25 @@ class GenicamFrames:
         """End the iteration with the next frame."""
         self._closed.set()
 
+    def controls(self) -> tuple[CameraControl, ...]:
+        """Settings that may be changed while the camera runs, with their values and limits."""
+        return control_list(self._camera.remote_device.node_map)
+
+    def set_control(self, name: str, value: float) -> None:
+        """Ask the camera for another value of one of its controls.
+
+        Parameters
+        ----------
+        name : str
+            Of the control.
+        value : float
+            In the control's unit.
+        """
+        nodes = self._camera.remote_device.node_map
+        node, factor, _ = CONTROLS[name]
+        getattr(nodes, node).value = factor * value
+        self.description = replace(self.description, camera=_settings(nodes))
+
     def _next(self) -> Any:
         """Return the next buffer; None once the source is closed."""
         silent_since_s = monotonic()
@@ -141,11 +170,11 @@ class GenicamFrames:
             try:
                 buffer = self._camera.try_fetch(timeout=ASKED_EVERY_S)
             except Exception as error:
-                raise DeviceError(f"The camera {self.name} cannot be read any more ({_said(error)}).") from error
+                raise DeviceError(f"The camera {self.name} can no longer be read ({_said(error)}).") from error
             if buffer is not None:
                 return buffer
             if monotonic() - silent_since_s > SILENT_S:
-                raise DeviceError(f"The camera {self.name} sends nothing any more: is it plugged in?")
+                raise DeviceError(f"The camera {self.name} has stopped sending pictures: is it plugged in?")
         return None
 
     def _item(self, buffer: Any, index: int, arrived_s: float) -> Frame | LostFrame:
@@ -166,8 +195,41 @@ class GenicamFrames:
                 continue
 
 
+def control_list(nodes: Any) -> tuple[CameraControl, ...]:
+    """What a camera's features let be changed; a feature that is locked now states no value or no limit.
+
+    Parameters
+    ----------
+    nodes : GenApi's map of nodes
+        Of the camera.
+    """
+    found = []
+    for name, (node, factor, unit) in CONTROLS.items():
+        value = _value(nodes, node)
+        if value is None:
+            continue
+        least, greatest = (_limit(nodes, node, end) for end in ("min", "max"))
+        found.append(
+            CameraControl(
+                name,
+                float(value) / factor,
+                unit,
+                None if least is None else least / factor,
+                None if greatest is None else greatest / factor,
+            )
+        )
+    return tuple(found)
+
+
+def _limit(nodes: Any, node: str, end: str) -> float | None:
+    try:
+        return float(getattr(getattr(nodes, node), end))
+    except Exception:  # the camera does not tell it now
+        return None
+
+
 def levels(data: NDArray[np.generic], size: tuple[int, int]) -> Pixels:
-    """Copy the grey levels out of a buffer, which the producer will fill again; shape (height, width)."""
+    """Copy the grey levels out of a buffer, which the producer will reuse; shape (height, width)."""
     pixels: Pixels = np.array(data).reshape(size)
     return pixels
 
@@ -196,7 +258,7 @@ def _connected(name: str) -> tuple[Any, Any]:
         harvester.reset()
         which = f"with the serial number {serial} " if serial else ""
         there = f"those found: {', '.join(found)}" if found else "none was found"
-        raise DeviceError(f"{file} must show a camera {which}but does not ({there}): is it plugged in?")
+        raise DeviceError(f"{file} must list a camera {which}but does not ({there}): is it plugged in?")
     try:
         return harvester, harvester.create({"serial_number": serial} if serial else 0)
     except Exception as error:
@@ -207,7 +269,7 @@ def _connected(name: str) -> tuple[Any, Any]:
 
 
 def _ask(nodes: Any, wish: Wish) -> tuple[str, ...]:
-    """Request the wished settings and grey levels; return a sentence for each one that the camera refuses."""
+    """Request settings and a grey format; return a sentence for each one that the camera refuses."""
     asked: dict[str, Any] = {}
     if _value(nodes, "PixelFormat") not in MONO:
         asked["PixelFormat"] = next((each for each in MONO if each in _choices(nodes, "PixelFormat")), None)
@@ -252,7 +314,7 @@ def _choices(nodes: Any, node: str) -> tuple[str, ...]:
 
 
 def _own_time_s(buffer: Any) -> float | None:
-    """Time of the exposure by the camera's own clock (s); None where the camera states none."""
+    """Time of the exposure by the camera's own clock (s); None if the camera states none."""
     try:
         return 1e-9 * float(buffer.timestamp_ns)
     except Exception:

@@ -17,6 +17,7 @@ from fingervision.frames.damage import DamageTrail
 from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
+from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
@@ -34,7 +35,13 @@ RAW_CAMERA_FILES = {
     ".cine": "must be a Phantom camera's recording, but cannot be read as one (FFmpeg reads uncompressed 8- and 16-bit "
     "ones): export it from PCC as 16-bit TIFF images or uncompressed AVI, and measure those.",
 }
-"""What to do with high-speed cameras' own files that cannot be read."""
+"""Advice for files of high-speed cameras that cannot be read."""
+
+NO_CHECKSUM = (
+    "Pictures of {codec} carry no checksum, and neither does this file: where its bytes were damaged on the way, a "
+    "frame may look sound and be wrong. If it came over a network or from an old disk, compare it with its source; "
+    "record with FFV1 or H.264."
+)
 
 
 def _coding(properties: int) -> Coding:
@@ -44,7 +51,7 @@ def _coding(properties: int) -> Coding:
 
 
 TAKES_THE_REST = True
-"""A file that no other kind of source knows is read as a video: FFmpeg tells what it is."""
+"""A file that no other kind of source accepts is read as a video: FFmpeg determines its format."""
 
 
 def accepts(name: str) -> bool:
@@ -59,9 +66,9 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, is no video, or has no picture in it.
+        The file cannot be read, is not a video, or contains no picture.
     UsageError
-        A rate is given for what has its own times.
+        If a rate is given for a file with its own times.
     """
     if wish.rate_hz is not None:
         raise UsageError(f"--rate-hz is for images without times, but {name} is a video with its own: leave it out.")
@@ -70,12 +77,12 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
 
 @dataclass(frozen=True, slots=True)
 class VideoFile:
-    """A video file; every pass over it opens it anew.
+    """A video file; it is opened again for every pass over its frames.
 
     Parameters
     ----------
     name : str
-        Its path.
+        Path of the file.
     """
 
     name: str
@@ -87,7 +94,8 @@ class VideoFile:
             codec = stream.codec_context
             if codec.width < 1 or codec.height < 1:
                 raise DataError(
-                    f"{self.name} has no pictures in its video: it is empty or was cut off at once; record it again."
+                    f"{self.name} has no pictures in its video: it is empty or was cut off at its start; "
+                    "record it again."
                 )
             rate = float(stream.average_rate) if stream.average_rate else None
             length_s = float(container.duration / av.time_base) if container.duration else None
@@ -104,6 +112,8 @@ class VideoFile:
                     f"{Path(self.name).name} -map 0:v:1 -c copy second.mkv` takes out the second.",
                 )
             size_px = (codec.width, codec.height)
+            if stream.codec.canonical_name in UNCHECKED_CODECS and not ClusterChecksums(Path(self.name)).cover_all:
+                notes += (NO_CHECKSUM.format(codec=stream.codec.canonical_name),)
             turned = _rotation_deg(container, stream)
             if turned % QUARTER_DEG:
                 notes += (f"The file states a rotation of {turned} degrees, which is no quarter turn: not applied.",)
@@ -180,12 +190,12 @@ def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream
 
 
 def _tracks(container: av.container.InputContainer) -> list[av.VideoStream]:
-    """Tracks that are videos; a cover picture, which is listed among them, is excluded."""
+    """Tracks that are videos; a cover picture, which is listed as a track too, is excluded."""
     return [one for one in container.streams.video if not one.disposition & Disposition.attached_pic]
 
 
 def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream) -> int:
-    """Angle by which the file asks to turn its pictures, anticlockwise; 0 where the first picture cannot be decoded."""
+    """Rotation that the file requests for its pictures, anticlockwise; 0 if the first picture cannot be decoded."""
     try:
         first = next(iter(container.decode(stream)), None)
     except (av.FFmpegError, OSError):
@@ -194,7 +204,7 @@ def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream
 
 
 def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
-    """Turn a picture by quarter turns as its file asks; other angles are ignored."""
+    """Rotate a picture by quarter turns as its file requests; other angles are ignored."""
     if rotation_deg % QUARTER_DEG or not rotation_deg:
         return pixels
     turned: Pixels = np.ascontiguousarray(np.rot90(pixels, rotation_deg // QUARTER_DEG))  # type: ignore[assignment]
@@ -202,7 +212,7 @@ def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
 
 
 def upright_steps(picture: av.VideoFrame) -> Quantiser | None:
-    """Quantiser steps of a picture, turned as the file asks."""
+    """Quantiser steps of a picture, rotated as the file requests."""
     steps = quantiser_steps(picture)
     if steps is None or picture.rotation % QUARTER_DEG:
         return steps

@@ -1,4 +1,4 @@
-"""The file gauges.toml: the gauges of one picture.
+"""Read the file gauges.toml: the gauges of one picture.
 
 schema = 1
 [[gauge]]
@@ -34,11 +34,11 @@ class Gauge:
     Parameters
     ----------
     name : str
-        As the user called it.
+        Name given by the user.
     kind_name : str
         Name of its kind.
     spec : Spec
-        What its keys say.
+        Settings of the gauge.
     """
 
     name: str
@@ -47,12 +47,12 @@ class Gauge:
 
     @property
     def kind(self) -> Kind:
-        """Its kind's module."""
+        """Module of the gauge's kind."""
         return kind_named(self.kind_name)
 
     @property
     def quantities(self) -> tuple[tuple[str, str], ...]:
-        """Names of the gauge's quantities, and whether each is a length or an angle."""
+        """Name of each of the gauge's quantities, and whether it is a length or an angle."""
         return self.kind.QUANTITIES
 
 
@@ -62,7 +62,7 @@ def read_gauges(path: Path) -> tuple[Gauge, ...]:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or a value in it cannot be meant; the sentence names the line.
+        If the file cannot be read, or a value in it is not allowed; the sentence names the line.
     """
     return gauges_in(path, *read_document(path, "gauge file"))
 
@@ -73,16 +73,16 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
     Parameters
     ----------
     path : Path
-        The file, for the sentences.
+        Path of the file, for error messages.
     values : mapping
-        Its tables.
+        Parsed tables of the file.
     text : str
-        Its text.
+        Text of the file.
 
     Raises
     ------
     DataError
-        A value in it cannot be meant; the sentence names the line.
+        If a value is not allowed; the sentence names the line.
     """
     top = Section(path, text, "", values)
     top.only(("schema", "gauge"))
@@ -105,14 +105,14 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
     Parameters
     ----------
     section : Section
-        Its table.
+        Table of the gauge.
     others : collection of str
-        Names that are taken.
+        Names that are already in use.
 
     Raises
     ------
     DataError
-        A value in it cannot be meant.
+        If a value is not allowed.
     """
     name = section.word("name")
     if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
@@ -131,20 +131,21 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
     Raises
     ------
     DataError
-        One does; the sentence names it.
+        A gauge lies outside the picture or is larger than it; the message names the gauge.
     """
     for gauge in gauges:
         x, y = gauge.spec.middle_px
         if not (-0.5 <= x <= width_px - 0.5 and -0.5 <= y <= height_px - 0.5):
             raise DataError(
-                f"The gauge {gauge.name!r} must have its middle inside the frame of {width_px}x{height_px} pixels, but "
-                f"x_px = {x:g}, y_px = {y:g}: move it there."
+                f"The gauge {gauge.name!r} must have its centre inside the picture of {width_px}x{height_px} "
+                "pixels, but "
+                f"x_px = {x:g}, y_px = {y:g}: move the gauge into the picture."
             )
         largest = (width_px**2 + height_px**2) ** 0.5
         for key in SIZES:
             size = getattr(gauge.spec, key, 0.0)
             if size > largest:
                 raise DataError(
-                    f"The gauge {gauge.name!r} must be smaller than the frame of {width_px}x{height_px} pixels, but "
-                    f"its {key} is {size:g}: lower it."
+                    f"The gauge {gauge.name!r} must be smaller than the picture of {width_px}x{height_px} pixels, but "
+                    f"its {key} is {size:g}: make it smaller."
                 )

@@ -136,7 +136,7 @@ class Measurement:
 
     @property
     def budget(self) -> Budget:
-        """Uncertainty budget of `gap_mm`: every source with its standard uncertainty for each gap, shape (n,).
+        """Uncertainty budget of `gap_mm`, with every source and its standard uncertainty for each gap, shape (n,).
 
         The squares of the sources add to the square of `u_gap_mm` (JCGM 100:2008, equation 10); what is not `shared` is
         `u_random_mm`. With a scale that has no stated uncertainty, only the sources within the pictures are listed.
@@ -173,7 +173,7 @@ class Measurement:
         UsageError
             The measurement has no drive.
         DataError, NoCalibrationError
-            There are too few such frames, or they do not move.
+            Too few frames have both a gap and an input, or the input does not change.
         """
         from fingervision.interface.measurement_tables import measured_table
 
@@ -210,7 +210,7 @@ class Measurement:
         Raises
         ------
         UsageError
-            There is no such frame, or it could not be read.
+            The recording has no frame of that number, or the frame could not be read.
         """
         from fingervision.interface.measurement_pictures import marked_picture
 
@@ -285,7 +285,7 @@ class Measurement:
         UsageError
             The folder holds the results of another recording, or there is no such frame.
         OutputError
-            It cannot be written.
+            The file or folder cannot be written.
         """
         from fingervision.measuring.save import save_measured
 

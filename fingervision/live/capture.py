@@ -9,6 +9,7 @@ from time import monotonic
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import Driven, LiveSource, OwnPacket, Received
+from fingervision.live.adjustments import Adjustments
 from fingervision.live.promptness import be_prompt
 from fingervision.live.timeline import Timeline
 
@@ -70,6 +71,9 @@ class Capture:
     def __init__(self, first: LiveSource, again: Open | None) -> None:
         self.source = first
         self.overflowed = 0
+        self.adjustments = Adjustments()
+        """Settings of the camera that may be changed while it runs."""
+        self.adjustments.begin(first)
         self.waiting: Queue[Arrival | Happening | Ended] = Queue(FRAMES_WAITING)
         self._again = again
         self._begun, self._stopped = Event(), Event()
@@ -108,6 +112,7 @@ class Capture:
                 for received in self.source.received():
                     if self._begun.is_set():
                         self._hand_over(received)
+                    self.adjustments.act(self.source)
                     if self._stopped.is_set():
                         return
                 if self._stopped.is_set():
@@ -141,9 +146,12 @@ class Capture:
                 continue
             found = (source.description.width_px, source.description.height_px)
             if found == size_px:
-                if source.description.camera != self.source.description.camera:
-                    self._put(Happening("camera", f"The camera is set otherwise now. {source.description.notes[-1]}"))
-                self.source = source
+                before, self.source = self.source.description.camera, source
+                for words in self.adjustments.begin(source):
+                    self._put(Happening("camera", words))
+                if source.description.camera != before:
+                    notes = "".join(f" {note}" for note in source.description.notes[-1:])
+                    self._put(Happening("camera", f"The camera is set otherwise now.{notes}"))
                 return True
             source.close()
             words = (

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calib.limits import rectangular
 from calib.measured_scale import Calibration
-from fingervision.domain.body_poses import COVERED, DAMAGED, OK, OUT_OF_VIEW, FramePoses, SeenPose
+from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK, OUT_OF_VIEW, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.gauges.picture import Picture, picture_of
@@ -26,6 +26,7 @@ from fingervision.measuring.drawing_placement import (
     refined,
 )
 from fingervision.measuring.flat_picture import flat_map_of
+from fingervision.measuring.joined_bodies import Joint, torn_off
 from fingervision.measuring.pose_uncertainty import SharedErrors, SharedPose, in_drawing
 from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
@@ -39,8 +40,9 @@ from fingervision.vision.rigid_outline import LEAST_IN_VIEW, RigidFit, capture_r
 Array = NDArray[np.float64]
 
 LEAST_SIZE_ERROR, MOST_SIZE_ERROR, SURE = 1e-3, 0.01, 4.0
-"""Relative: printed parts are off by 0.2 % (mechanics.md, section 5), and a scale by no more; beyond 1 % it is another
-scale or drawing. And standard uncertainties at which an error of the size is none of the noise."""
+"""Smallest relative size error that is reported, largest that is accepted, and standard uncertainties from which on an
+error counts as significant. Printed parts are off by 0.2 % (mechanics.md, section 5), and a scale by no more; beyond 1
+% the scale or the drawing is wrong."""
 BODIES, GAPS = "bodies.csv", "gaps.csv"
 LAID_BY_ALL = (
     "no fixed body is in view: the drawing was laid by all bodies together, so that poses count from their mean place "
@@ -55,13 +57,13 @@ class BodiesMeasured:
     Parameters
     ----------
     path : Path
-        bodies.csv.
+        Path of bodies.csv.
     poses : list of FramePoses
-        Of every frame.
+        Poses of all bodies, for every frame.
     counts : mapping of str to Counter
-        Statuses of every body and hinge.
+        Number of frames with each status, for every body and hinge.
     placed : Placed or None
-        Where the drawing lies; None where no frame could be read.
+        Position of the drawing in the picture; None if no frame could be read.
     """
 
     path: Path
@@ -71,18 +73,19 @@ class BodiesMeasured:
 
 
 class BodyTracker:
-    """Follows the bodies of a mechanism from frame to frame.
+    """Tracks the bodies of a mechanism from frame to frame.
 
     Parameters
     ----------
     mechanism : Mechanism
         The drawing.
     scale : Scale
-        From pixels to millimetres; lens and plane of a calibration are taken off the outlines' points.
+        Conversion from pixels to millimetres; lens distortion and perspective of a calibration are removed from the
+        outlines' points.
     points : sequence of GivenPoint
-        Where points of the drawing lie in the first picture; none to find it by its silhouette.
+        Points of the drawing and their positions in the first picture; if empty, the silhouette is used.
     settings : Settings
-        How the recording is measured: which light a level is taken for.
+        Settings of the measurement, such as the camera response.
     """
 
     def __init__(
@@ -91,15 +94,17 @@ class BodyTracker:
         self.mechanism, self.scale, self._points = mechanism, scale, tuple(points)
         self.settings = Settings(below_tip_px=1.0) if settings is None else settings
         self.outlines = outlines_of(mechanism)
+        self._joints = [Joint(flexure, (self._joined(flexure.name, -1.0).body, self._joined(flexure.name, 1.0).body))
+                        for flexure in mechanism.flexures]  # fmt: skip
         self.placed: Placed | None = None
 
     def poses(self, frames: Iterable[Frame | LostFrame]) -> Iterator[FramePoses]:
-        """Yield the poses of each frame; the first readable frame determines where the drawing lies.
+        """Yield the poses for each frame; the first readable frame determines the position of the drawing.
 
         Raises
         ------
         DataError, UsageError
-            The drawing cannot be laid on that frame, or the scale is for frames of another size.
+            If the drawing cannot be placed on that frame, or the scale is for frames of another size.
         """
         for item in frames:
             if isinstance(item, LostFrame):
@@ -116,7 +121,7 @@ class BodyTracker:
         return [*bodies, *(flexure.name for flexure in self.mechanism.flexures)]
 
     def _view(self, picture: Picture) -> EdgeView:
-        """How edges appear: edge bias widens a dark body by half of it on each side."""
+        """How edges appear: the edge bias widens a dark body by half of the bias on each side."""
         dark = self.placed is None or self.placed.body_is_dark
         outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
         flat, shared_pixels = flat_map_of(self.scale), picture.shared_pixels
@@ -146,7 +151,8 @@ class BodyTracker:
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
-                f"The edges of {self.mechanism.name} must be seen where it is laid on frame {index}, but are not: "
+                f"The edges of {self.mechanism.name} must be visible where it was placed on frame {index}, "
+                "but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )
         notes = placed.notes if laid.by_fixed else (*placed.notes, LAID_BY_ALL)
@@ -162,7 +168,7 @@ class BodyTracker:
         self._check_size(grey, index, self._view(picture))
 
     def _check_size(self, grey: Array, index: int, view: EdgeView) -> None:
-        """Compare the sizes of the bodies with the drawing: a difference means a wrong scale, or another mechanism."""
+        """Compare the sizes of the bodies with the drawing; a difference means a wrong scale or another mechanism."""
         fits = [self._fit(grey, [], number, view) for number in range(len(self.outlines))]
         self._note_shadows([o.body.name for o, fit in zip(self.outlines, fits, strict=True)
                             if fit is not None and fit.by_shadows.any()], index)  # fmt: skip
@@ -195,7 +201,7 @@ class BodyTracker:
         self.placed = replace(self.placed, notes=(*self.placed.notes, words))
 
     def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
-        """Fit from the pose in the last frame, or else by a search from farther away."""
+        """Fit a body's motion from its pose in the last frame, or else by a search from farther away."""
         dark = self.placed is not None and self.placed.body_is_dark
         chunks, about, last = self._chunks[number], self._about[number], self._last[number]
         found = fit_rigid(grey, chunks, about, dark, last, view)
@@ -209,8 +215,8 @@ class BodyTracker:
 
     def _seen(self, grey: Array, view: EdgeView) -> dict[str, SeenPose]:
         if self.placed is None:
-            raise AssertionError("no drawing was laid")
-        place, pyramid = self.placed.place, list[Array]()
+            raise AssertionError("no drawing was placed on the picture")
+        place, pyramid, before = self.placed.place, list[Array](), list(self._last)
         found: dict[str, SeenPose] = {}
         shared: dict[str, SharedPose] = {}
         for number, outline in enumerate(self.outlines):
@@ -232,6 +238,10 @@ class BodyTracker:
             random = into @ fit.covariance @ into.T
             whole = random + into @ shared[name].covariance @ into.T
             found[name] = SeenPose(OK, float(pose[0]), float(pose[1]), float(pose[2]), whole, random)
+        for name in torn_off(self._joints, found):
+            # Something like it was taken for it: the next frame is searched from where it was seen last.
+            number = next(k for k, outline in enumerate(self.outlines) if outline.body.name == name)
+            found[name], self._last[number] = SeenPose(NOT_FOUND), before[number]
         return found | self._hinges(found, shared)
 
     def _why(self, grey: Array, chunks: Chunks, about: Array, last: tuple[Array, float], flat: FlatMap | None) -> str:
@@ -242,10 +252,10 @@ class BodyTracker:
         return COVERED if inside.size and inside.mean() >= LEAST_IN_VIEW else OUT_OF_VIEW
 
     def _hinges(self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose]) -> dict[str, SeenPose]:
-        """Angles of hinges: rotation of the body beyond a hinge against the body before it."""
+        """Angles of hinges: rotation of the body on one side of a hinge relative to the body on the other side."""
         found = {}
-        for flexure in self.mechanism.flexures:
-            first, last = (self._joined(flexure.name, side).body.name for side in (-1.0, 1.0))
+        for joint in self._joints:
+            flexure, (first, last) = joint.flexure, (body.name for body in joint.bodies)
             seen = [poses[first], poses[last]]
             lost = [pose.status for pose in seen if pose.status != OK]
             if lost:
@@ -276,22 +286,22 @@ def measure_bodies(
     out: Path,
     settings: Settings | None = None,
 ) -> BodiesMeasured:
-    """Measure the bodies of a recording into bodies.csv, and add them to the rows of an existing gaps.csv.
+    """Measure the bodies of a recording into bodies.csv, and add columns for them to an existing gaps.csv.
 
     Parameters
     ----------
     source : iterable of Frame or LostFrame
-        The recording; read once.
+        The recording; its frames are read once, in order.
     mechanism : Mechanism
         The drawing.
     scale : Scale
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
     points : sequence of GivenPoint
-        Where points of the drawing lie in the first picture; none to find it by its silhouette.
+        Points of the drawing and their positions in the first picture; if empty, the silhouette is used.
     out : Path
         Folder of the results.
     settings : Settings or None
-        How the recording is measured; plain ones where None.
+        Settings of the measurement; None for the defaults.
     """
     tracker = BodyTracker(mechanism, scale, points, settings)
     poses = list(tracker.poses(source))

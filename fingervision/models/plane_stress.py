@@ -1,6 +1,6 @@
-"""An elastic plate in plane stress: quadratic triangles, small or large displacements.
+"""An elastic plate in plane stress, meshed with quadratic triangles, for small or large displacements.
 
-In a flexure restrained by its width, the law lies between plane stress and plane strain (`width_effect`).
+In a flexure restrained by its width, the material law lies between plane stress and plane strain (`width_effect`).
 """
 
 from functools import cached_property
@@ -13,6 +13,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from skfem.helpers import dot, eye, mul, trace, transpose
 
 from fingervision.domain.gripper import Material
+from fingervision.models.point_in_mesh import element_weights
 from fingervision.models.triangulate import PlaneMesh
 from fingervision.models.width_effect import ConstrainedZone, held_moduli, shares_at
 
@@ -23,7 +24,10 @@ _CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _stress(strain: Any, moduli: Any) -> Any:
-    """Stress in plane stress, where the thickness is free: Timoshenko and Goodier, Theory of Elasticity, chapter 2."""
+    """Stress in plane stress, where the thickness is free to change.
+
+    Source: Timoshenko and Goodier, Theory of Elasticity, chapter 2.
+    """
     E, nu = moduli
     return E / (1.0 + nu) * strain + E * nu / (1.0 - nu**2) * eye(trace(strain), 2)
 
@@ -40,11 +44,12 @@ class PlaneStressPlate:
     mesh : PlaneMesh
         Quadratic triangles.
     material : Material
-        Linear elastic; the St. Venant-Kirchhoff law in large displacements, right where strains are a few per cent.
+        Linear elastic material; for large displacements the St. Venant-Kirchhoff law, which holds for strains of a few
+        per cent.
     plate_mm : float
         Thickness.
     zones : tuple of ConstrainedZone
-        Flexures that the width holds back; none for plane stress everywhere.
+        Flexures restrained by the plate's width; empty for plane stress everywhere.
     """
 
     def __init__(
@@ -89,16 +94,27 @@ class PlaneStressPlate:
 
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
-        """Derivatives of six shape functions at quadrature points, shape (m, q, 2, 6), and weights, shape (m, q)."""
+        """Derivatives of the six shape functions at quadrature points, shape (m, q, 2, 6); weights, shape (m, q)."""
         scalar = skfem.Basis(self._mesh, skfem.ElementTriP2(), intorder=4)
         slopes = np.stack([np.asarray(shape[0].grad) for shape in scalar.basis])  # (6, 2, m, q)
         return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
 
     @cached_property
+    def nodes_of_triangles(self) -> Indices:
+        """Corners, then middles of the edges, of every triangle as indices of `nodes_mm`, shape (6, m)."""
+        return np.vstack([self._mesh.t[:3], int(self._basis.nodal_dofs.shape[1]) + self._mesh.t2f])
+
+    def rows_at(self, point: tuple[float, float]) -> Array:
+        """Displacements to the motion along x and y of a point of the body, shape (2, unknowns)."""
+        nodes, weights = element_weights(self.nodes_mm, self.nodes_of_triangles, point)
+        rows = np.zeros((2, self.unknowns))
+        rows[0, self.x_dofs[nodes]] = rows[1, self.y_dofs[nodes]] = weights
+        return rows
+
+    @cached_property
     def unknowns_of_triangles(self) -> Indices:
         """Unknowns of every triangle, first along x, then along y; shape (m, 12)."""
-        corners, edges = self._mesh.t[:3], self._mesh.t2f
-        nodes = np.vstack([corners, int(self._basis.nodal_dofs.shape[1]) + edges])
+        nodes = self.nodes_of_triangles
         return np.ascontiguousarray(np.vstack([self.x_dofs[nodes], self.y_dofs[nodes]]).T)
 
     @cached_property
@@ -145,6 +161,8 @@ class PlaneStressPlate:
         # All points of a triangle in one product.
         along = strains.reshape(triangles, 3 * points, 12)
         elements = np.swapaxes(along, 1, 2) @ stressed.reshape(triangles, 3 * points, 12)
+        if not displacement_mm.any():
+            return self._assembled(elements, at_rest=True), np.zeros(self.unknowns)
         # The stress that is there already resists a turn: slope, stress, slope.
         sx, sy, txy = (stress[..., k, None] * weights[..., None] for k in range(3))
         pulled = np.stack([sx * dx + txy * dy, txy * dx + sy * dy], axis=2)
@@ -152,14 +170,14 @@ class PlaneStressPlate:
         turned = np.swapaxes(flat, 1, 2) @ pulled.reshape(triangles, 2 * points, 6)
         elements[:, :6, :6] += turned
         elements[:, 6:, 6:] += turned
-        return self._assembled(elements, at_rest=not displacement_mm.any()), self._collected(deformation, stress)
+        return self._assembled(elements, at_rest=False), self._collected(deformation, stress)
 
     def nodal_force_n(self, displacement_mm: Array) -> Array:
         """Nodal forces of the deformed plate without the tangent stiffness, at a tenth of the cost."""
         return self._collected(*self._deformed(displacement_mm))
 
     def _deformed(self, displacement_mm: Array) -> tuple[Array, Array]:
-        """Deformation gradient (m, q, direction, component) and second Piola-Kirchhoff stress (m, q, 3)."""
+        """Deformation gradient, shape (m, q, 2, 2), and second Piola-Kirchhoff stress, shape (m, q, 3)."""
         slopes, weights = self._slopes
         triangles, points = weights.shape
         moved = np.swapaxes(displacement_mm[self.unknowns_of_triangles].reshape(-1, 2, 6), 1, 2)
@@ -209,7 +227,7 @@ class PlaneStressPlate:
         displacement_mm : ndarray of float, shape (unknowns,)
             Displacement components.
         large : bool
-            Cauchy stress of the deformed plate; small displacements otherwise.
+            Whether to compute the Cauchy stress of the deformed plate; if False, the stress for small displacements.
         """
         corners = skfem.Basis(self._mesh, self._element, quadrature=(_CORNERS, np.full(3, 1.0 / 6.0)))
         gradient = corners.interpolate(displacement_mm).grad
@@ -226,7 +244,7 @@ class PlaneStressPlate:
         return np.asarray(np.sqrt(0.5 * squares + 3.0 * txy**2)).T
 
     def at_corners(self, values: Array) -> Array:
-        """Mean over the triangles that meet at each corner node; shape (number of corners,)."""
+        """Mean, over the triangles that meet at each corner node, of their values; shape (number of corner nodes,)."""
         triangles = self.corner_triangles
         size = int(self._basis.nodal_dofs.shape[1])
         total = np.bincount(triangles.ravel(), weights=values.ravel(), minlength=size)

@@ -8,6 +8,7 @@ from typing import Any
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import OutputError
+from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.toml_section import Section, read_document
 
 SCHEMA = 1
@@ -35,7 +36,7 @@ def read_settings(path: Path) -> dict[str, Any]:
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, or a key is unknown or has no such value.
+        The file cannot be read, or a key is unknown or has a value that is not allowed.
     """
     values, text = read_document(path, "settings")
     top = Section(path, text, "", values)
@@ -81,7 +82,7 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     Raises
     ------
     OutputError
-        It cannot be written.
+        The file or folder cannot be written.
     """
     lines = [
         "# For `fingervision live SOURCE --settings FILE`, and `measure` alike.",
@@ -97,10 +98,10 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     camera = {key: value for key, value in (settings.get("camera") or {}).items() if value is not None}
     if camera:
         lines += ["", "[camera]", *(f"{key} = {json.dumps(value)}" for key, value in camera.items())]
-    part = path.with_name(f".{path.name}.part")
+    part, text = path.with_name(f".{path.name}.part"), in_utf8(path, "\n".join(lines) + "\n")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        part.write_text(text, encoding="utf-8")
         part.replace(path)
     except OSError as error:
-        raise OutputError(f"{path} could not be written ({error.strerror}): make room.") from error
+        raise OutputError(f"{path} could not be written ({error.strerror}): free disk space.") from error

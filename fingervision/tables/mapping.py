@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import DataError, OutputError
+from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.toml_section import Section, read_document
 
 NAME = "columns.toml"
@@ -141,7 +142,7 @@ def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
     Raises
     ------
     DataError
-        One is no key, or has no value.
+        A setting has an unknown key, or no value.
     """
     document: dict[str, Any] = {}
     for setting in settings:
@@ -194,9 +195,9 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
     Raises
     ------
     OutputError
-        It cannot be read or written.
+        The file cannot be read or written.
     """
-    block = entry_text(table, kind, entry)
+    block = in_utf8(path, entry_text(table, kind, entry))
     try:
         before = path.read_text(encoding="utf-8-sig") if path.exists() else "schema = 1\n"
         parts = [part.strip("\n") for part in re.split(r"(?m)^(?=\s*\[\[\s*table\s*\]\])", before)]

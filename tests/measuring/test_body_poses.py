@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from fingervision.domain.body_poses import COVERED, DAMAGED, OK
+from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
@@ -134,3 +134,19 @@ def test_points_of_another_scale_or_at_one_place_are_refused() -> None:
     same = GivenPoint(10.0, 10.0, 1.0, 1.0)
     with pytest.raises(UsageError, match="same"):
         by_points((same, same), SCALE)
+
+
+@pytest.mark.slow
+def test_a_body_that_looks_alike_is_never_taken_for_one_that_is_hidden(plate: MechanismPlate) -> None:
+    """The shuttle is painted over by the ground, and a copy of it lies 1.5 mm beside it."""
+    wide, own = ((13.0, 23.0, 9.0, 31.3), (15.5, 23.5, 10.0, 31.0))
+    patches = []
+    for (x0, x1, y0, y1), level in ((wide, Scene().light.ground), (own, 50.0)):
+        corners = PLACE.to_px(np.array([[x0, x1, x1, x0], [y0, y0, y1, y1]]))
+        patches.append(Patch((polygon(tuple((float(x), float(y)) for x, y in corners.T)),), level))
+    frames = [frame(plate, 0.0, 0), frame(plate, 0.2, 1, cover=tuple(patches))]
+    given = points(PLACE, (31, 0), (39, 0), (10, 90))
+    seen = list(BodyTracker(plate.mechanism, BareScale(SCALE), given).poses(frames))
+    assert seen[0].poses["shuttle"].status == OK
+    assert seen[1].poses["shuttle"].status == seen[1].poses["hinge 2"].status == NOT_FOUND
+    assert seen[1].poses["finger"].status == OK

@@ -1,5 +1,6 @@
 """Sizes and values that no bench has are refused in a sentence, before anything is made of them."""
 
+import os
 import re
 import struct
 import zlib
@@ -7,14 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.effects import catalogue
 from fingervision.frames.image_file import PNG_SIGNATURE, UnreadableImageError, read_image
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import MOST_RUNS, read_measured_table
-from fingervision.storage.model_toml import read_model
+from fingervision.storage.model_toml import read_model, write_model
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
+from fingervision.storage.settings_toml import write_settings
 
 SIMULATION = "input_mm,gap_mm\n0,1\n1,2\n"
 
@@ -108,3 +110,19 @@ def test_a_recipes_name_may_hold_quotes(tmp_path: Path) -> None:
     step = {"kind": "move", "to_mm": 0.3, "speed_mm_s": 0.5}
     write_recipe(tmp_path / "recipe.toml", 'two "speeds" \\ one', [step])
     assert read_recipe(tmp_path / "recipe.toml").name == 'two "speeds" \\ one'
+
+
+@pytest.mark.parametrize("name", ['it\'s "one".csv', "two\nlines.csv", "narrow\u202fspace.csv", "back\\slash.csv"])
+def test_a_corrected_model_names_a_base_of_any_name(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(SIMULATION)
+    write_model(tmp_path / "model.toml", tmp_path / name, {})
+    assert read_model(tmp_path / "model.toml").base_path == str(tmp_path / name)
+
+
+def test_a_name_that_is_not_utf8_is_a_sentence(tmp_path: Path) -> None:
+    name = os.fsdecode(b"caf\xe9.csv")
+    with pytest.raises(OutputError, match=r"caf\\udce9\.csv"):
+        write_model(tmp_path / "model.toml", tmp_path / name, {})
+    with pytest.raises(OutputError, match=r"caf\\udce9\.csv"):
+        write_settings(tmp_path / "settings.toml", {"calibration": tmp_path / name})
+    assert not any(tmp_path.iterdir())

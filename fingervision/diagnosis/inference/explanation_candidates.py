@@ -23,20 +23,20 @@ PROMISE = 0.5
 """Share of the asked gain that a signature must promise before its refit is tried: a refit between the shapes of the
 grid gains a fifth more at most (`REFIT_MARGIN`), along a valley of the effects before it seldom twice as much."""
 LEAST_GAIN = 4.0
-"""Chi-square that an effect's signature must take for a refit to be tried."""
+"""Least chi-square gain of an effect's signature for which a refit is tried."""
 FEW_ROWS = 0.1
-"""Share of the rows on which a stop or a contact acts that only the ends of strokes speak for; what acts on more is
-averaged over many roundings."""
+"""Share of the rows affected by an end stop or a contact below which only the ends of strokes give evidence for it;
+with more rows the encoder's rounding averages out."""
 ALIKE = 12.0
-"""Squared whitened distance within which two predictions are one, as in the ambiguity set."""
+"""Squared whitened distance below which two predictions count as equal, as in the ambiguity set."""
 STEPS_HIDDEN = 1.0
-"""Steps of the encoder within which an effect is not told from its roundings."""
+"""Encoder steps below which an effect is indistinguishable from rounding."""
 FINEST, COARSEST = 0.003, 0.02
-"""Relative distance of the sizes of a jump that are tried alone: two thousand at most, and no fewer than signatures."""
+"""Relative spacing of the sizes tried for a jump: at most two thousand sizes, and no fewer than signatures."""
 FINE_VALUES = 4_000_000
-"""Values that such predictions may have in all: 32 MB."""
+"""Largest number of values in all such predictions: 32 MB."""
 SWAPS_REFITTED = 24
-"""Partners refitted beside the halves of the best pair: each half has at most 26."""
+"""Number of partners refitted for each half of the best pair: each half has at most 26."""
 
 
 def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins: int = BEGINS) -> list[Explanation]:
@@ -62,7 +62,7 @@ def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins:
 
 
 def _finely(problem: Problem, parameter: Parameter) -> Array:
-    """Sizes of a jump so near to each other that a stroke's last jump moves by one sample; shape (k,)."""
+    """Sizes of a jump, spaced so closely that the last jump of a stroke moves by one sample; shape (k,)."""
     history = problem.chain.history
     steps = np.concatenate([np.diff(history.input_mm[run]) for run in history.runs])
     moving = np.abs(steps[np.abs(steps) > 0.0])
@@ -136,10 +136,10 @@ def extended(
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Replace each effect of the best explanation by every other effect, the rest starting at their fitted values.
+    """Replace each effect of the best explanation by every other effect; the rest start at their fitted values.
 
-    Fitted alone, the other effect absorbed the action of two effects, and its parameters end far out in a valley from
-    which no joint search returns.
+    An effect that was fitted alone has absorbed the influence of both effects; its parameters are then so far from the
+    joint optimum that a joint search starting there would not find it.
     """
     if not pairs:
         return pairs
@@ -154,7 +154,7 @@ def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> li
 
 
 def different(problem: Problem, explanations: list[Explanation], most: int) -> list[Explanation]:
-    """Keep the best of several explanations with equal predictions, such as offsets of input, gap and edge."""
+    """Keep the best of explanations with equal predictions, such as offsets of input, gap and edge."""
     found, predicted = list[Explanation](), list[Array]()
     for explanation in explanations:
         curve = problem.whitened(explanation.values)
@@ -168,7 +168,7 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of what the larger explanation adds, as a fraction of its whole change of the prediction in mm."""
+    """Size of the additional part of the larger explanation, as a share of its whole change of the prediction in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
     if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
@@ -176,7 +176,7 @@ def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> 
 
 
 def within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether one of its effects acts by less than an encoder step, on few rows or at the ends, as rounding does."""
+    """Whether one of the effects acts, like rounding, by less than an encoder step, on few rows or at stroke ends."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
@@ -197,15 +197,14 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
 
 
 def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
-    """Choose by Schwarz's criterion (Schwarz 1978)."""
+    """Choose the explanation with the smallest BIC (Schwarz 1978)."""
     return min(candidates, key=lambda explanation: explanation.bic(samples))
 
 
 def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose one effect; a simpler formula is preferred if the richer one gains no more than formulas deviate.
+    """Choose one effect; prefer a simpler formula if the richer one gains no more than formulas are inexact.
 
-    Such a difference is due to the formulas' inexactness, and no reason to prefer a resonance to a delay that falls
-    between two samples.
+    For example, such a small difference is no reason to prefer a resonance to a delay by a fraction of a sample.
     """
     best = likeliest(singles, samples)
     within = FORM_SHARE**2 * (nothing.score - best.score)

@@ -1,4 +1,4 @@
-"""Probes: generic shapes that are no effect of the catalogue, for structure that no effect explains."""
+"""Probes: generic shapes, not effects of the catalogue, that detect structure which no effect explains."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, History
 
 SPAN = 5
-"""Samples over which a speed is taken."""
+"""Number of samples over which a speed is computed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probes:
-    """Whitened unit shapes and their descriptions; columns of shape (m, k), RMS before whitening."""
+    """Whitened unit shapes with descriptions; columns of shape (m, k), and RMS of each before whitening."""
 
     words: tuple[str, ...]
     columns: Array
@@ -21,7 +21,7 @@ class Probes:
 
 
 def _speed(input_mm: Array, time_s: Array) -> Array:
-    """Speed as the slope over `SPAN` samples: differences of neighbours contain the input's errors."""
+    """Speed as the slope over `SPAN` samples, because differences of neighbours contain the input's errors."""
     if input_mm.size <= SPAN:
         return np.full(input_mm.size, float(np.ptp(input_mm)) / max(float(np.ptp(time_s)), 1e-9))
     ahead = np.minimum(np.arange(input_mm.size) + SPAN // 2 + 1, input_mm.size - 1)
@@ -37,7 +37,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
     Parameters
     ----------
     most : int
-        Columns at most; finer shapes are thinned out beyond it.
+        Largest number of columns; beyond it, finer shapes are thinned out.
     """
     n, u = history.input_mm.size, history.input_mm
     shapes: list[tuple[str, Array]] = []

@@ -1,4 +1,4 @@
-"""A finished search, and the settings of searches."""
+"""Result of a completed search, and the settings of searches."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -19,7 +19,7 @@ MOST_REPEATS = 2
 
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
-    """Estimate the noise from the residual of an explanation, or from the disagreement where there is none yet."""
+    """Estimation problem with the noise from an explanation's residual, or from the disagreement if there is none."""
     values = {} if explanation is None else explanation.values
     free = 0 if explanation is None else explanation.free
     return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)
@@ -27,7 +27,7 @@ def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    """A search that was made: measurement and model, what was found, and what slots of known width said."""
+    """A completed search: measurement and model, findings, and the results of reference slots."""
 
     data: Observations
     found: Findings
@@ -36,7 +36,7 @@ class Searched:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """How searches are made."""
+    """Settings of searches."""
 
     rng: np.random.Generator
     forced: frozenset[str]

@@ -1,4 +1,4 @@
-"""Whitening: correlated noise of unequal variance converted to unit white noise, by a Kalman filter (Kalman 1960)."""
+"""Whitening: convert correlated noise of unequal variance to unit white noise, by a Kalman filter (Kalman 1960)."""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +9,7 @@ from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.loops import loop
 
 SPREADS = np.concatenate([[0.0], np.geomspace(0.01, 1e4, 121)])
-"""Spreads of the runs that are tried, over the noise."""
+"""Spreads of the run offsets that are tried, relative to the noise."""
 MIDLINE_FREE_MM = 1e3
 """Prior spread of the midline's constant: large enough to be free."""
 GAINS = 5
@@ -20,26 +20,26 @@ _gains, _innovations = loop("whitening_gains"), loop("whitening_innovations")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Whitener:
-    """Covariance of the observations, with the operation of whitening; channels are stacked gap, midline, force.
+    """Covariance of the observations, and the whitening operation; channels are stacked as gap, midline, force.
 
     Parameters
     ----------
     history : History
         Runs and times.
     noises : tuple of Noise
-        One a channel.
+        One noise per channel.
     aside : ndarray of bool, shape (channels * n,)
-        Outliers: they count as not measured.
+        Outliers, which are treated as not measured.
     input_mm : ndarray of float, shape (n,)
-        Standard deviation that an error of the input which stays gives the gap; 0 where there is none.
+        Standard deviation of the gap due to an input error that is constant over samples; 0 if there is none.
     input_samples : float
-        Samples over which it stays.
+        Number of samples for which this error is constant.
     passing_mm : ndarray of float, shape (n,)
-        The same of errors that are another at each sample.
+        Standard deviation of the gap due to input errors that differ between samples.
     drawing : ndarray of float, shape (channels * n, p), or None
-        What one standard uncertainty of each uncertain number of the gripper's drawing does to the prediction.
+        Change of the prediction per standard uncertainty of each uncertain dimension of the drawing.
     runs_scatter_mm : float
-        By how much the runs may be offset against each other by chance at most, as a standard deviation.
+        Largest standard deviation of random offsets between runs.
     """
 
     history: History
@@ -105,15 +105,15 @@ def _filtered(columns: Array, gains: Array, shares: Array) -> Array:
 class RunOffsets:
     """Nuisance parameters of every explanation: re-zeroing between runs, constant of the midline, the drawing.
 
-    Re-zeroing is a zero-mean random effect per channel; the constant is free; an uncertain dimension of the drawing is
-    a random effect with its own uncertainty.
+    Re-zeroing is a zero-mean random effect per channel; the midline's constant is free; an uncertain dimension of the
+    drawing is a random effect with its stated uncertainty.
 
     Parameters
     ----------
     design : ndarray of float, shape (m, columns)
-        Whitened columns: one a run and channel, then the midline's constant, then the drawing's uncertain numbers.
+        Whitened columns: one per run and channel, then the midline's constant, then the drawing's uncertain dimensions.
     channels : int
-        Gap, then midline and force where they were measured.
+        Number of channels: gap, then midline and force if measured.
     runs : int
         Number of runs.
     midline : bool
@@ -121,7 +121,7 @@ class RunOffsets:
     scales_mm : tuple of float
         Noise of each channel.
     drawn : int
-        How many numbers of the drawing are uncertain.
+        Number of uncertain dimensions of the drawing.
     most_mm : float
         Largest spread of the runs' offsets that is considered.
     """
@@ -168,7 +168,7 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G: r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads allowed."""
+        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads fitted."""
         known = self._metrics.get(sigma_mm)
         if known is not None:
             return known
@@ -181,20 +181,20 @@ class RunOffsets:
         return found
 
     def squared(self, whitened: Array, metric: Array) -> float:
-        """Squared length of a whitened column with the offsets of a metric allowed."""
+        """Squared length of a whitened column, with the offsets of a metric fitted."""
         shared = self.design.T @ whitened
         return float(whitened @ whitened - shared @ metric @ shared)
 
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
         """Estimate the spreads from a whitened residual by marginal likelihood.
 
-        A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) keeps two runs from turning every common
-        offset into scatter. With one run the spread is zero.
+        A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) prevents that, for two runs, every common
+        offset is attributed to scatter. With one run the spread is zero.
 
         Returns
         -------
         sigma_mm : tuple of float
-            One a channel.
+            Spread for each channel.
         penalty : float
             -2 log of determinant and prior, to be added to chi-square.
         """
@@ -210,9 +210,9 @@ class RunOffsets:
     def doubt(self, residual: Array) -> float:
         """-2 log of the ratio of a residual's probability over all spreads to that at the best spread.
 
-        It is added to a score.
+        The value is added to a score.
 
-        A few runs hardly determine the spread: parameters that act like an offset then have Student's tails.
+        A few runs hardly determine the spread; by this term, parameters that act like an offset have Student's tails.
         """
         if self.runs == 1:
             return 0.0
@@ -237,7 +237,7 @@ class RunOffsets:
         return tuple(out)
 
     def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
-        """Scale of each channel, and at all spreads the penalty and the fall of chi-square due to offsets."""
+        """Scale of each channel; for all spreads, the penalty and the reduction of chi-square due to offsets."""
         shares = self.design.T @ residual
         if self.drawn:
             # What the drawing's numbers explain is no scatter between runs.

@@ -1,0 +1,161 @@
+"""Settings of a camera that may be changed while it runs: what it has, within which limits, and what it took.
+
+A live source that has them has `controls()` and `set_control(name, value)`; both are called by the thread that reads
+its frames, between two of them, so that a driver needs no lock. A source without these two methods has no such
+settings.
+"""
+
+from dataclasses import dataclass
+from math import isclose, isfinite
+from typing import Protocol, cast
+
+from fingervision.domain.errors import DeviceError, FingervisionError, UsageError
+
+EXPOSURE, GAIN, FOCUS, ZOOM, FRAME_RATE = "exposure", "gain", "focus", "zoom", "frame rate"
+MOVES_SCALE = frozenset({FOCUS, ZOOM})
+"""What changes the picture's scale, so that a calibration no longer holds."""
+# A camera takes the nearest of its steps; what lies nearer than this is what was asked for.
+SAME_SHARE = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class CameraControl:
+    """A setting of a camera, as it is now.
+
+    Parameters
+    ----------
+    name : str
+        In words: `exposure`, `gain`, `focus`, `frame rate`.
+    value : float
+        What the camera reads back.
+    unit : str
+        Of value and limits: `ms`, `Hz`; empty where only the camera's maker knows it.
+    least, greatest : float or None
+        Limits that the camera states; None where it states none.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    least: float | None = None
+    greatest: float | None = None
+
+    def words(self, value: float) -> str:
+        """A value with its unit."""
+        return f"{value:.4g} {self.unit}".strip()
+
+
+class Adjustable(Protocol):
+    """A live source whose camera may be set while it runs."""
+
+    def controls(self) -> tuple[CameraControl, ...]:
+        """What may be set, with its present values."""
+        ...
+
+    def set_control(self, name: str, value: float) -> None:
+        """Ask the camera for another value of one of its controls; what it took is read by `controls`.
+
+        Raises
+        ------
+        DeviceError
+            The driver refuses.
+        """
+        ...
+
+
+def controls_of(source: object) -> tuple[CameraControl, ...]:
+    """Settings that may be changed now; none where the source has no such thing, or fails to say.
+
+    Parameters
+    ----------
+    source : LiveSource
+        Called in the thread that reads it.
+    """
+    if not (callable(getattr(source, "controls", None)) and callable(getattr(source, "set_control", None))):
+        return ()
+    try:
+        found: tuple[object, ...] = tuple(cast("Adjustable", source).controls())
+        return tuple(each for each in found if isinstance(each, CameraControl) and isfinite(each.value))
+    except Exception:  # a driver's fault takes its controls, and not the picture
+        return ()
+
+
+def check_value(controls: tuple[CameraControl, ...], name: str, value: float) -> CameraControl:
+    """Find a control, and refuse a value beyond its limits.
+
+    Raises
+    ------
+    UsageError
+        There is no such control, or the value is none that it has.
+    """
+    control = next((each for each in controls if each.name == name), None)
+    if control is None:
+        there = ", ".join(each.name for each in controls) or "nothing"
+        raise UsageError(f"The camera lets {there} be set while it runs, but {name[:40]!r} was asked.")
+    least, greatest = control.least, control.greatest
+    is_known = name in (EXPOSURE, FRAME_RATE)
+    if not isfinite(value) or (is_known and value <= 0.0):
+        raise UsageError(f"The camera's {name} must be a {'positive ' * is_known}number, but is {value:g}.")
+    if (least is not None and value < least) or (greatest is not None and value > greatest):
+        limits = (
+            f"at least {control.words(cast('float', least))}"
+            if greatest is None
+            else f"at most {control.words(greatest)}"
+            if least is None
+            else f"{least:.6g} to {control.words(greatest)}"
+        )
+        raise UsageError(f"The camera's {name} must be {limits}, but is {value:g}.")
+    return control
+
+
+def adjust(source: object, name: str, value: float) -> tuple[CameraControl, CameraControl]:
+    """Ask a camera for another value, and read back what it took.
+
+    Parameters
+    ----------
+    source : LiveSource
+        Called in the thread that reads it.
+    name : str
+        Of the control.
+    value : float
+        In its unit.
+
+    Returns
+    -------
+    (CameraControl, CameraControl)
+        Before, and after.
+
+    Raises
+    ------
+    DeviceError
+        The camera keeps its value, or its driver fails.
+    UsageError
+        It has no such control, or no such value.
+    """
+    before = check_value(controls_of(source), name, value)
+    try:
+        cast("Adjustable", source).set_control(name, value)
+    except FingervisionError:
+        raise
+    except Exception as error:  # a driver's fault must not end the live view
+        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". ")
+        raise DeviceError(f"The camera did not take {name} {before.words(value)} ({said}).") from error
+    after = next((each for each in controls_of(source) if each.name == name), None)
+    if after is None:
+        raise DeviceError(f"The camera was asked for {name} {before.words(value)} and no longer says what it has.")
+    if after.value == before.value and not _same(after.value, value):
+        raise DeviceError(
+            f"The camera was asked for {name} {before.words(value)} and stays at {after.words(after.value)}: it has no "
+            "such step, or another of its settings holds it."
+        )
+    return before, after
+
+
+def about_change(before: CameraControl, after: CameraControl, asked: float) -> str:
+    """Sentence on a change."""
+    words = f"The camera's {after.name} was {before.words(before.value)} and is {after.words(after.value)} from now on"
+    return f"{words}." if _same(after.value, asked) else f"{words} ({after.words(asked)} was asked)."
+
+
+def _same(one: float, other: float) -> bool:
+    return isclose(one, other, rel_tol=SAME_SHARE)

@@ -1,0 +1,75 @@
+"""Check the clusters of a Matroska file that have a checksum, for codecs that have none.
+
+The arithmetic decoders of VP8 and VP9 give a picture for any bytes: a flipped bit in a packet leaves no error, and a
+finger stands where it was a frame ago. The container may help: a cluster whose first element is a CRC-32 states the
+checksum of all that follows in it (FFmpeg writes it into `.mkv`, not into `.webm`). If it does not fit, every picture
+of the cluster is doubtful, and what hangs on them. Codecs that tell their damage by themselves are not so judged: they
+lose a picture, where this loses a cluster.
+
+Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 11.3.1 (CRC-32: of ISO 3309, little-endian).
+"""
+
+import mmap
+from binascii import crc32
+from bisect import bisect_right
+from pathlib import Path
+
+from fingervision.frames.ebml import element
+from fingervision.frames.matroska_times import CLUSTER
+
+CHECKSUM = b"\xbf"
+CHECKSUM_BYTES, ELEMENT_BYTES = 4, 6
+UNCHECKED_CODECS = frozenset({"vp8", "vp9"})
+"""Codecs, by FFmpeg's canonical names, that decode any bytes without an error."""
+BROKEN = "The checksum of the part of the file that it stands in (a Matroska cluster) does not fit: bytes are damaged."
+
+
+class ClusterChecksums:
+    """The clusters of a file whose checksums fit.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._sound: list[tuple[int, int]] = []
+        self.are_stated = False
+        """Whether the file has checksums at all."""
+        self.cover_all = False
+        """Whether every cluster has one that fits."""
+        try:
+            with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+                self._read(content)
+        except (OSError, ValueError):
+            return
+
+    def is_broken(self, position: int | None) -> bool:
+        """Whether the packet at this position stands in a cluster whose checksum is wrong or gone."""
+        if not self.are_stated or position is None:
+            return False
+        at = bisect_right(self._sound, (position + 1, 0)) - 1
+        return at < 0 or position >= self._sound[at][1]
+
+    def _read(self, content: mmap.mmap) -> None:
+        at, clusters = content.find(CLUSTER), 0
+        while at >= 0:
+            clusters += 1
+            cluster, end = element(content, at), at + len(CLUSTER)
+            if cluster is not None:
+                stated = _stated(content, cluster.begin)
+                self.are_stated = self.are_stated or stated is not None
+                if stated is not None and crc32(content[cluster.begin + ELEMENT_BYTES : cluster.end]) == stated:
+                    self._sound.append((at, cluster.end))
+                    end = cluster.end
+            at = content.find(CLUSTER, end)
+        self.cover_all = self.are_stated and clusters == len(self._sound)
+
+
+def _stated(content: mmap.mmap, at: int) -> int | None:
+    """Checksum that stands at the beginning of a cluster; None where there is none."""
+    first = element(content, at)
+    if first is None or first.name != CHECKSUM or first.end - first.begin != CHECKSUM_BYTES:
+        return None
+    return int.from_bytes(content[first.begin : first.end], "little")

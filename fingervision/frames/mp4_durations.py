@@ -1,0 +1,215 @@
+"""Check the times of an MP4 file's table of contents, because one damaged number there moves all of its frames.
+
+The file states how long its pictures take three times: as the sum of their durations (`stts`), in the head of the track
+(`mdhd`), both in the track's own ticks, and, in the ticks of the whole film, in the edit list (`elst`), which also says
+from which picture on they are shown. A table that cannot be read to its end leaves the rest unread, and then the
+pictures begin where the coder began, too late by its reordering. In a sound file
+
+* all tables of a track that FFmpeg needs can be read to their ends, and tell of the same number of pictures;
+* what is shown is not longer than what there is;
+* if it is shorter, somebody cut the film, and no single damaged byte of the stated durations explains the difference.
+
+Files in fragments state their times with each fragment, and are not judged.
+
+Source: ISO/IEC 14496-12, 8.4.2 (`mdhd`), 8.6 (`stts`, `ctts`, `elst`), 8.7.3 (`stsz`).
+"""
+
+import mmap
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import accumulate, chain, repeat
+from pathlib import Path
+
+import av
+
+from fingervision.frames.mp4_boxes import boxes, edits, numbers, rows
+from fingervision.frames.spoken_damage import listening
+
+GIVES_UP = "error reading header"
+"""What FFmpeg's reader of MP4 says when it gives up (libavformat/mov.c, mov_read_header)."""
+MOST_ENTRIES = 4
+"""A table of so few rows belongs to a constant rate. Longer ones are not searched for one byte that would explain a
+difference: among so many there always is one."""
+BYTE_VALUES = 256
+MOST_PICTURES = 10_000_000
+"""More than a day at 100 Hz: a table that announces more is damaged, and not written out."""
+NO_SCALE = (
+    "The file states durations of its pictures that contradict one another, or a table of times that cannot be read: "
+    "its table of contents is damaged, so that no frame's time is known."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Track:
+    """What the table of contents states of one video track.
+
+    Parameters
+    ----------
+    scale, ticks : int
+        Ticks a second of the track, and how many it lasts.
+    steps : tuple of (int, int)
+        Numbers of pictures with their durations in ticks.
+    sizes, offset_count : int or None
+        Of how many pictures there are sizes, and offsets of presentation.
+    presented : int
+        Ticks from the first presentation to the end of the last.
+    shown : int
+        Duration of the edit list, in ticks of the film; 0 where there is none.
+    empty : int
+        Of that, in which nothing is shown.
+    skipped : int
+        Ticks of the track, from its first picture, that are not shown.
+    """
+
+    scale: int
+    ticks: int
+    steps: tuple[tuple[int, int], ...]
+    sizes: int | None
+    offset_count: int | None
+    presented: int
+    shown: int
+    empty: int
+    skipped: int
+
+
+def states_another_duration(path: Path) -> bool:
+    """Whether the stated times of a file's pictures contradict one another.
+
+    Parameters
+    ----------
+    path : Path
+        An MP4 or QuickTime file.
+    """
+    try:
+        if _is_unread(path):
+            return True
+        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            found = list(boxes(content, 0, len(content)))
+            if any(name in (b"moof", b"mvex") for name, _, _ in found):
+                return False
+            films = [numbers(content, begin, end) for name, begin, end in found if name == b"mvhd"]
+            tracks = [each for each in _tracks(content, found) if each is not None]
+    except (OSError, ValueError):
+        return False
+    except struct.error:
+        return True  # a table ends before its last row, or states what cannot be
+    film_scale = films[0][0] if films else 0
+    return any(_contradicts(track, film_scale) for track in tracks)
+
+
+def _is_unread(path: Path) -> bool:
+    """Whether FFmpeg gives up within the table of contents, and goes on with the half of it."""
+    with listening("") as heard, suppress(av.FFmpegError, IndexError), av.open(f"file:{path}"):
+        return any(GIVES_UP in words for _, _, words in heard.log)
+    return False
+
+
+def _contradicts(track: _Track, film_scale: int) -> bool:
+    pictures = sum(count for count, _ in track.steps)
+    if any(other is not None and other != pictures for other in (track.sizes, track.offset_count)):
+        return True
+    if not track.steps or not track.ticks:
+        return False
+    if track.scale < 1:
+        return True
+    longest = max(ticks for _, ticks in track.steps)
+    total = sum(count * ticks for count, ticks in track.steps)
+    # Programs state the sum of the durations, or from the first presentation to the last; some a picture more.
+    more = {total + ticks for _, ticks in track.steps}
+    departures = [abs(track.ticks - sound) for sound in (total, track.presented, *more)]
+    if min(departures) and (_is_explained(track) or (min(departures) > longest and _is_another(track.ticks, total))):
+        return True
+    if not track.shown or film_scale < 1:
+        return False
+    shown_s = (track.shown - track.empty) / film_scale
+    there_s = (track.ticks - track.skipped) / track.scale
+    slack_s = longest / track.scale + 1.0 / film_scale
+    if shown_s > there_s + slack_s:
+        return True
+    # A film that was cut: or one byte of the ticks a second is another.
+    is_cut = there_s > shown_s + slack_s
+    return is_cut and any(
+        abs(ticks - track.skipped - scale * shown_s) <= 1.0 + scale / film_scale
+        for scale in _coarse_neighbours(track.scale)
+        for ticks in (track.ticks, total, track.presented)
+    )
+
+
+def _is_explained(track: _Track) -> bool:
+    """Whether one byte that is another, in the durations of a constant rate or in the whole, makes them agree."""
+    if len(track.steps) > MOST_ENTRIES:
+        return False
+    total = sum(count * step for count, step in track.steps)
+    return total in _neighbours(track.ticks) or any(
+        track.ticks - total - count * (other - step) in (0, other)
+        for count, step in track.steps
+        for other in _neighbours(step)
+    )
+
+
+def _is_another(ticks: int, total: int) -> bool:
+    """Whether one is more than twice the other."""
+    return ticks > 2 * total or total > 2 * ticks
+
+
+def _neighbours(number: int) -> Iterator[int]:
+    """Numbers of four bytes, of which one is another."""
+    for shift in (0, 8, 16, 24):
+        rest = number & ~(0xFF << shift)
+        yield from (rest | value << shift for value in range(BYTE_VALUES))
+
+
+def _coarse_neighbours(number: int) -> Iterator[int]:
+    """As above, but of the last byte one bit only: a cut of less than two per cent always has such a neighbour."""
+    yield from (other for other in _neighbours(number) if other & 0xFF == number & 0xFF)
+    yield from (number ^ (1 << bit) for bit in range(8))
+
+
+def _tracks(content: mmap.mmap, found: list[tuple[bytes, int, int]]) -> Iterator[_Track | None]:
+    for name, begin, end in found:
+        if name != b"trak":
+            continue
+        inner = {each: (first, last) for each, first, last in found if begin <= first and last <= end}
+        if b"vmhd" in inner:
+            yield _track(content, inner)
+
+
+def _track(content: mmap.mmap, inner: dict[bytes, tuple[int, int]]) -> _Track | None:
+    if not {b"mdhd", b"stts"} <= inner.keys():
+        return None
+    scale, ticks = numbers(content, *inner[b"mdhd"])
+    steps = tuple(rows(content, inner[b"stts"], ">II"))
+    offsets = tuple(rows(content, inner[b"ctts"], ">Ii")) if b"ctts" in inner else None
+    shown_parts = list(edits(content, inner[b"elst"])) if b"elst" in inner else []
+    if b"edts" in inner and b"elst" not in inner:
+        raise struct.error("an edit list without its list")
+    sizes = None
+    if b"stsz" in inner:
+        begin, end = inner[b"stsz"]
+        _, same, sizes = struct.unpack_from(">III", content[begin:end])
+        listed = 0 if same else sizes
+        if begin + 12 + 4 * listed > end:
+            raise struct.error("fewer sizes than announced")
+        stated = (size for (size,) in struct.iter_unpack(">I", content[begin + 12 : begin + 12 + 4 * listed]))
+        if max(stated, default=same) > len(content):
+            raise struct.error("a picture larger than the file")
+    shown = sum(duration for duration, _ in shown_parts)
+    empty = sum(duration for duration, at in shown_parts if at < 0)
+    first, last = _presented(steps, offsets or ())
+    skipped = min((at for _, at in shown_parts if at >= 0), default=first) - first
+    counted = None if offsets is None else sum(count for count, _ in offsets)
+    return _Track(scale, ticks, steps, sizes, counted, last - first, shown, empty, skipped)
+
+
+def _presented(steps: tuple[tuple[int, int], ...], offsets: tuple[tuple[int, int], ...]) -> tuple[int, int]:
+    """First tick of presentation, and the end of the last."""
+    if sum(count for count, _ in steps) > MOST_PICTURES:
+        return 0, sum(count * ticks for count, ticks in steps)
+    durations = [ticks for count, ticks in steps for _ in range(count)]
+    moved = chain((offset for count, offset in offsets for _ in range(count)), repeat(0))
+    coded = accumulate(durations, initial=0)
+    begins = [at + offset for at, offset in zip(coded, moved, strict=False)][: len(durations)]
+    ends = (at + ticks for at, ticks in zip(begins, durations, strict=True))
+    return min(begins, default=0), max(ends, default=0)

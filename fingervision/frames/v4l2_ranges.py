@@ -1,0 +1,68 @@
+"""Limits of a V4L2 camera's settings, asked of the driver (Linux).
+
+Source: `struct v4l2_queryctrl` and `VIDIOC_QUERYCTRL` in linux/videodev2.h; numbers of the controls in
+linux/v4l2-controls.h.
+"""
+
+import os
+import struct
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+QUERY = 0xC0445624  # _IOWR('V', 36, 68 bytes)
+LAYOUT = struct.Struct("II32siiiiI8x")
+DISABLED = 0x0001
+NUMBERS: Mapping[int, int] = {
+    cv2.CAP_PROP_EXPOSURE: 0x009A0902,
+    cv2.CAP_PROP_GAIN: 0x00980913,
+    cv2.CAP_PROP_FOCUS: 0x009A090A,
+    cv2.CAP_PROP_TEMPERATURE: 0x0098091A,
+}
+"""V4L2's controls by OpenCV's properties."""
+
+Ioctl = Callable[[int, int, bytes], Any]
+
+
+def ranges(name: str, ioctl: Ioctl | None = None) -> dict[int, tuple[int, int]]:
+    """Least and greatest value of each setting, in the driver's units, by OpenCV's property.
+
+    Parameters
+    ----------
+    name : str
+        Number or device.
+    ioctl : callable, optional
+        The system's, unless another is given.
+
+    Returns
+    -------
+    dict of int to (int, int)
+        Empty where the driver does not say.
+    """
+    if ioctl is None:
+        if sys.platform != "linux":
+            return {}
+        import fcntl
+
+        ioctl = fcntl.ioctl
+    path = Path(f"/dev/video{name}" if name.isdigit() else name)
+    try:
+        device = os.open(path, os.O_RDWR | os.O_NONBLOCK)
+    except OSError:
+        return {}
+    found = {}
+    try:
+        for what, number in NUMBERS.items():
+            try:
+                answer = ioctl(device, QUERY, LAYOUT.pack(number, 0, b"", 0, 0, 0, 0, 0))
+            except OSError:
+                continue  # the camera has no such setting
+            _, _, _, least, greatest, _, _, flags = LAYOUT.unpack(answer)
+            if not flags & DISABLED and least < greatest:
+                found[what] = (least, greatest)
+    finally:
+        os.close(device)
+    return found

@@ -1,0 +1,98 @@
+"""Changes of a camera's settings while it runs, handed to the thread that reads it."""
+
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from threading import Event, Lock
+
+from fingervision.domain.errors import DeviceError, FingervisionError, StateError
+from fingervision.frames.controls import CameraControl, adjust, controls_of
+
+ANSWERED_WITHIN_S = 3.0
+"""A change waits for the next frame, and for cameras that start anew for another frame rate."""
+
+
+@dataclass(slots=True, eq=False)
+class _Wanted:
+    name: str
+    value: float
+    done: Event = field(default_factory=Event)
+    is_void: bool = False
+    found: tuple[CameraControl, CameraControl] | None = None
+    failure: FingervisionError | None = None
+
+
+class Adjustments:
+    """Settings of the camera of one live view; any thread asks, the reading thread acts between two frames."""
+
+    def __init__(self) -> None:
+        self.controls: tuple[CameraControl, ...] = ()
+        """What may be set, as it was read last."""
+        self._chosen: dict[str, float] = {}
+        self._wanted: SimpleQueue[_Wanted] = SimpleQueue()
+        self._lock = Lock()
+
+    def ask(self, name: str, value: float) -> tuple[CameraControl, CameraControl]:
+        """Ask for another value and wait until the camera has taken it; gives the control before and after.
+
+        Raises
+        ------
+        DeviceError
+            The camera refuses, or sends no frame any more.
+        StateError
+            The source has nothing that can be set.
+        UsageError
+            It has no such control, or no such value.
+        """
+        if not self.controls:
+            raise StateError("This source has no settings that can be changed while it runs.")
+        wanted = _Wanted(name, value)
+        self._wanted.put(wanted)
+        if not wanted.done.wait(ANSWERED_WITHIN_S):
+            with self._lock:
+                if not wanted.done.is_set():
+                    wanted.is_void = True
+                    raise DeviceError(f"The camera does not answer, so its {name} stays: is it plugged in?")
+        if wanted.failure is not None:
+            raise wanted.failure
+        assert wanted.found is not None  # noqa: S101 - what is done has a result or a failure
+        return wanted.found
+
+    def begin(self, source: object) -> list[str]:
+        """Take over a source that was opened (again); what was chosen before is asked anew.
+
+        Returns
+        -------
+        list of str
+            A sentence for each value that it does not take again.
+        """
+        said = []
+        self.controls = controls_of(source)
+        now = {each.name: each.value for each in self.controls}
+        for name, value in self._chosen.items():
+            if now.get(name) == value:
+                continue
+            try:
+                adjust(source, name, value)
+            except FingervisionError as error:
+                said.append(str(error))
+        if self._chosen:
+            self.controls = controls_of(source)
+        return said
+
+    def act(self, source: object) -> None:
+        """Do what was asked; called by the thread that reads the source, between two frames."""
+        while True:
+            try:
+                wanted = self._wanted.get_nowait()
+            except Empty:
+                return
+            with self._lock:
+                if wanted.is_void:
+                    continue
+                try:
+                    wanted.found = adjust(source, wanted.name, wanted.value)
+                    self._chosen[wanted.name] = wanted.found[1].value
+                except FingervisionError as error:
+                    wanted.failure = error
+                self.controls = controls_of(source)
+                wanted.done.set()
