@@ -104,10 +104,12 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     both = (residual_mm, found.residual[:n][kept])
     between = max(_share_near(values, float(np.mean(values))) for values in both)
     together = min(_share_near(values, float(np.median(values))) for values in both)
-    if together > SHARES[1]:
+    if between < SHARES[0]:
+        above = residual_mm > np.mean(residual_mm)
+        apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
+        words = f"what is left falls into two groups about {apart_mm:.2g} mm apart"
+    elif together > SHARES[1]:
         words = f"{100.0 * together:.0f} % of the rows lie together, and the others off them by {sigma:.2g} mm and more"
-    elif between < SHARES[0]:
-        words = f"what is left falls into two groups about {2.0 * sigma:.2g} mm apart"
     else:
         return None
     return Finding(
