@@ -38,6 +38,9 @@ Student's with three degrees of freedom 31 %, a sinusoid 11 %."""
 SHARES = (0.05, 0.4)
 """Shares of values there below which they form two groups, and above which most of them repeat far better than the
 rest: beyond what any one noise of the above has."""
+STRETCH_SIGMAS = 3.0
+"""Standard deviations, 1 / sqrt(n) each (Bartlett 1946), by which neighbours must be alike for rows to lie in stretches:
+a servo at rest repeats far better than on its way, and nothing is wrong with it."""
 FEWEST_VALUES = 30
 """Values from which such a share is told from 20 %: 40 % of 30 are 2.8 standard deviations more."""
 
@@ -104,6 +107,8 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     both = (residual_mm, found.residual[:n][kept])
     between = max(_share_near(values, float(np.mean(values))) for values in both)
     together = min(_share_near(values, float(np.median(values))) for values in both)
+    if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
+        return None
     if between < SHARES[0]:
         above = residual_mm > np.mean(residual_mm)
         apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
@@ -117,6 +122,14 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
         "named.",
         blocks=True,
     )
+
+
+def _in_stretches(values: Array) -> bool:
+    """Whether neighbouring rows are alike in lying near the median: a stage that moves and rests, and no wrong rows."""
+    near = (np.abs(values - np.median(values)) < NARROW * np.std(values)).astype(np.float64)
+    near -= near.mean()
+    power = float(near @ near)
+    return power > 0.0 and float(near[:-1] @ near[1:]) / power > STRETCH_SIGMAS / float(np.sqrt(near.size))
 
 
 def _share_near(values: Array, middle: float) -> float:
