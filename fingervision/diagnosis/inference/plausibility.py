@@ -39,7 +39,7 @@ SHARES = (0.05, 0.4)
 """Shares of values there below which they form two groups, and above which most of them repeat far better than the
 rest: beyond what any one noise of the above has."""
 STRETCH_SIGMAS = 3.0
-"""Standard deviations, 1 / sqrt(n) each (Bartlett 1946), by which neighbours must be alike for rows to lie in stretches:
+"""Standard deviations, each 1 / sqrt(n), by which neighbours must be alike for rows to lie in stretches:
 a servo at rest repeats far better than on its way, and nothing is wrong with it."""
 FEWEST_VALUES = 30
 """Values from which such a share is told from 20 %: 40 % of 30 are 2.8 standard deviations more."""
