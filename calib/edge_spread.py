@@ -109,7 +109,7 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
     Raises
     ------
     CalibrationError
-        There is no edge there, or no room for one.
+        The strip shows no edge, or is too short to fit one.
     """
     cosine = 1.0 / np.hypot(1.0, coarse.slope)
     profile = (

@@ -86,7 +86,7 @@ def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
     Raises
     ------
     CalibrationError
-        They move.
+        The spread of the readings is much larger than their scatter from one to the next: the gap moved.
     """
     values = np.asarray(readings_mm, dtype=np.float64)
     if values.size < FEWEST_TO_TELL:
@@ -115,7 +115,8 @@ def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
     Raises
     ------
     CalibrationError
-        There is nothing to compare.
+        The recordings differ in parts or readings, a reading is missing, or there are fewer than two recordings or
+        readings.
     """
     lengths = {len(cell) for recording in readings_mm for cell in recording}
     if len(lengths) != 1 or len({len(recording) for recording in readings_mm}) != 1:

@@ -92,7 +92,7 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
     Raises
     ------
     CalibrationError
-        There are fewer than three parallel lines, or they are too near to each other.
+        The picture shows fewer than three parallel lines, or the lines are too close together.
     """
     x0, y0, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
     if x0 < 0 or y0 < 0 or width < 1 or height < 1 or x0 + width > grey.shape[1] or y0 + height > grey.shape[0]:

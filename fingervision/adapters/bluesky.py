@@ -116,7 +116,9 @@ class StageDevice:
     def kickoff(self) -> ThreadStatus:
         """Begin to fly."""
         if self._flight is None:
-            raise StateError(f"{self.name} must be prepared with (to_mm, speed_mm_s) before it flies.")
+            raise StateError(
+                f"{self.name} must be prepared with (to_mm, speed_mm_s) before kickoff (Bluesky's fly scan)."
+            )
         self._flown = []
         self._consumer.readings()
         self._actuator.move(*map(float, self._flight))
@@ -269,8 +271,9 @@ class GapDevice:
         while any(one.clock.joined() is None for one in instruments):
             if self._clock.now_s() > until_s:
                 raise DeviceError(
-                    f"The clocks of stage and force sensor must be joined to the bed's within {JOINED_WITHIN_S:g} s, "
-                    "but are not: see that they answer."
+                    "The clocks of stage and force sensor must be joined to the test bed's within "
+                    f"{JOINED_WITHIN_S:g} s, "
+                    "but are not: check that both devices respond."
                 )
             self._clock.wait_until(self._clock.now_s() + POLL_S)
             for one in instruments:

@@ -106,7 +106,8 @@ def run_steps(steps: Sequence[Mapping[str, Any]], stage: StageDevice, gap: GapDe
                 yield from bps.sleep(float(step["seconds"]))
             else:
                 raise DataError(
-                    f"A step must be a triangle, move or hold here, but is {kind!r}: `fingervision bed run` runs it."
+                    f"Under Bluesky a recipe step must be triangle, move or hold, but is {kind!r}: run this "
+                    "recipe with `fingervision bed run`."
                 )
 
     def flown() -> Iterator[Any]:

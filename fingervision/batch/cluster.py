@@ -48,7 +48,7 @@ def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
     except ImportError:
         raise MissingLibraryError("Dask", "cluster", "--scheduler") from None
     if not scheduler.startswith(("tcp://", "tls://")) or not scheduler.rpartition(":")[2].isdigit():
-        raise UsageError(f"--scheduler must be like tcp://host:8786, but is {scheduler}.")
+        raise UsageError(f"--scheduler must be an address such as tcp://host:8786, but is {scheduler}.")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in a sentence
     try:
         client = Client(scheduler, timeout=patience_s, set_as_default=False)
@@ -121,7 +121,8 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
             except Exception as error:
                 if client.status != "running" or future.status in ("cancelled", "lost"):
                     raise ProcessError(
-                        "The scheduler went away; what is done is kept: start it again, and call again."
+                        "The connection to the scheduler was lost; finished results are kept: start the "
+                        "scheduler again, then repeat this command."
                     ) from error
                 outcome = failure(tasks[number], f"{tasks[number].input} could not be done on its worker ({error}).")
             following = next(numbers, None)

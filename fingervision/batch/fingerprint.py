@@ -25,7 +25,7 @@ def stamp_of(path: Path) -> str:
     Raises
     ------
     OSError
-        It cannot be read.
+        The file cannot be read.
     """
     found = hashlib.sha256()
     for file in files_of(path):
@@ -40,7 +40,7 @@ def is_settled(path: Path) -> bool:
     Raises
     ------
     OSError
-        It cannot be read.
+        The file cannot be read.
     """
     return all(time_ns() - file.stat().st_mtime_ns > SETTLED_NS for file in files_of(path))
 
@@ -51,7 +51,7 @@ def content_hash(path: Path) -> str:
     Raises
     ------
     OSError
-        It cannot be read.
+        The file cannot be read.
     """
     files = files_of(path)
     if files == [path]:

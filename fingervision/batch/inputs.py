@@ -42,8 +42,7 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
     if not matched:
         words = ", ".join(names)
         raise InputFileError(
-            f"There must be something to work on, but nothing matches {words}: check the path, and put patterns "
-            "in quotes ('recordings/**/*.mp4')."
+            f"No file matches {words}: check the path, and put patterns in quotes ('recordings/**/*.mp4')."
         )
     folders = {path for path in found if Path(path).is_dir()}
     return tuple(

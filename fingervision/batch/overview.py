@@ -33,7 +33,7 @@ def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None
     Raises
     ------
     OSError
-        They cannot be written; older ones stay.
+        The overview files cannot be written; the earlier ones are kept.
     """
     reduction = reduction_of(command)
     table = table_text(out, reduction, outcomes)

@@ -80,7 +80,7 @@ def write_record(folder: Path, place: Path, record: Record) -> None:
     Raises
     ------
     OSError
-        It cannot be written.
+        The record cannot be written.
     """
     held = {
         "schema": SCHEMA,
@@ -107,7 +107,7 @@ def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
     Raises
     ------
     OSError
-        One cannot be read.
+        A table cannot be read.
     """
     found = {}
     for path in sorted(folder.iterdir()):
@@ -140,7 +140,7 @@ def replace_text(path: Path, text: str) -> None:
     Raises
     ------
     OSError
-        It cannot be written; the older one is still there.
+        The file cannot be written; its earlier version is kept.
     """
     part = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
     try:
@@ -166,7 +166,7 @@ def publish(part: Path, folder: Path, record: Record) -> None:
     Raises
     ------
     OSError
-        It cannot be renamed; the part is still there.
+        The folder cannot be renamed; the unfinished folder is kept.
     """
     for _ in range(3):
         with suppress(OSError):

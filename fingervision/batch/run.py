@@ -188,7 +188,7 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
         remove_left_parts(plan.job.out)
     if stopped:
         kept = sum(outcome.folder is not None for outcome in outcomes.values())
-        advice = "make room and " if "full" in stopped else ""
+        advice = "free disk space and " if "full" in stopped else ""
         stopped += f"; {kept} of {len(plan.tasks)} are done and kept: {advice}call again, and it goes on from there."
     every = tuple(
         outcomes.get(number, failure(task, "It was not reached: call again.")) for number, task in enumerate(plan.tasks)
@@ -199,7 +199,7 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
     except OSError as error:
         raise OutputError(
             f"{stopped or 'All results are there'} The overview in {plan.job.out} could not be written "
-            f"({error.strerror}): make room and call again."
+            f"({error.strerror}): free disk space and repeat this command."
         ) from error
     return batch
 
@@ -235,7 +235,8 @@ def _claim(job: Job) -> None:
         remove_left_parts(job.out)
     except OSError as error:
         raise OutputError(
-            f"The folder {job.out} cannot be written ({error.strerror}): make room or name another with --out."
+            f"The folder {job.out} cannot be written ({error.strerror}): free disk space or name another "
+            "folder with --out."
         ) from error
 
 

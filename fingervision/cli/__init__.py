@@ -116,6 +116,7 @@ def _give_up_output(error: OSError) -> NoReturn:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno != errno.EPIPE:
         click.echo(
-            f"fingervision: Standard output could not be written to its end ({error.strerror}): make room.", err=True
+            f"fingervision: Standard output could not be written to its end ({error.strerror}): free disk space.",
+            err=True,
         )
     sys.exit(ExitCode.COULD_NOT)

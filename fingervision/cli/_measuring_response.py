@@ -35,7 +35,7 @@ def measure_response(
     if edges and densities is not None:
         raise UsageError("--edges and --densities are two ways to measure a response, but both were given: choose one.")
     if roi is not None and densities is None:
-        raise UsageError("--roi says where the fields of a wedge lie, but no --densities were given: state them.")
+        raise UsageError("--roi gives the areas of a grey wedge's fields, but no --densities were given: state them.")
     if edges or densities is not None:
         exposed = [item for item in items if "=" in item and not Path(item).exists()]
         if exposed:
@@ -46,7 +46,7 @@ def measure_response(
             found = response_from_edges(pictures, top, out.name)
         else:
             if len(pictures) != 1:
-                raise UsageError(f"A wedge is one picture, but {len(pictures)} were given: name one.")
+                raise UsageError(f"A grey wedge is measured in one picture, but {len(pictures)} were given: name one.")
             found = response_from_wedge(pictures[0], _densities(densities), top, out.name, region_from(roi))
     else:
         named = named_references(items, "bar", "EXPOSURE with a positive exposure", "e20.png=2")

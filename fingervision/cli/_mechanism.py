@@ -62,7 +62,7 @@ def predict(
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     if kind not in (*_KINDS, "stiffness_matrix", "all"):
-        raise UsageError(f"A mechanism drawn by bodies is answered by {', '.join(_KINDS)}, but --kind is {kind}.")
+        raise UsageError(f"A mechanism.toml is computed by the kinds {', '.join(_KINDS)}, but --kind asks for {kind}.")
     wanted = _KINDS if kind == "all" else (kind,)
     models: dict[str, MechanismModel] = {}
     refusals: dict[str, FingervisionError] = {}
@@ -82,7 +82,7 @@ def predict(
     if not models:
         raise next(iter(refusals.values()))
     for name, refusal in refusals.items():
-        click.echo(f"{name} has no answer: {refusal}", err=True)
+        click.echo(f"{name} could not be computed: {refusal}", err=True)
     chief = next(iter(models))
     at_yield_mm = table[chief]["input_at_yield_mm"]
     if drive is None:

@@ -65,7 +65,10 @@ def answer_frequencies(
         elif not as_json:
             click.echo(f"{kind} has no masses in the plane: no frequency response.")
     if not found:
-        raise UsageError("--frequency must have a kind with masses, lumped or finite_element, but has none.")
+        raise UsageError(
+            "--frequency needs a kind of model that has masses, lumped or finite_element, but none is chosen "
+            "with --kind."
+        )
     write_frequencies(found, ("gap_mm",), out / "frequency.csv")
     draw_frequencies(found, "gap_mm", f"{name}, damping {damping}", out / "frequency.png")
     if not as_json:
@@ -167,7 +170,10 @@ def mechanism_frequencies(model: MechanismPlate, band: Band, damping: str, out: 
     name = model.mechanism.name
     reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
     if not reduced.observed:
-        raise UsageError(f"{name} must have a [[probe]] or a [[pair]] to answer by frequency, but has none.")
+        raise UsageError(
+            f"{name} must have a [[probe]] or a [[pair]] as the output of the frequency response, but has "
+            "none: add one point ([[probe]]) or the distance of two ([[pair]])."
+        )
     answer = respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
     columns = tuple(answer.per_input)
     main = main_column(reduced)

@@ -31,7 +31,7 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
     """
     if width_mm is None:
         if stiffness_n_mm is not None:
-            raise UsageError("--object-n-mm needs --object-mm: the width of what is that stiff.")
+            raise UsageError("--object-n-mm, the stiffness of the part, needs its width too: add --object-mm.")
         return None
     if not (isfinite(width_mm) and width_mm > 0.0):
         raise UsageError(f"--object-mm must be the positive width of a part, but is {width_mm:g}.")

@@ -207,7 +207,10 @@ def mechanism_motion(
     name = model.mechanism.name
     reduced = model.modal_model(MODES)
     if not reduced.observed:
-        raise UsageError(f"{name} must have a [[probe]] or a [[pair]] to follow in time, but has none.")
+        raise UsageError(
+            f"{name} must have a [[probe]] or a [[pair]] as the output of the response in time, but has none: "
+            "add one point ([[probe]]) or the distance of two ([[pair]])."
+        )
     motion = modal_motion(reduced, drive, parse_damping(damping))
     if static is not None:
         *lengths, force = static(drive.input_mm).T

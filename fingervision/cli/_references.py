@@ -40,7 +40,7 @@ def region_from(roi: str | None) -> tuple[int, int, int, int] | None:
     Raises
     ------
     UsageError
-        It is not four whole numbers.
+        The region is not four whole numbers.
     """
     if roi is None:
         return None

@@ -85,7 +85,7 @@ def region_of(words: str | None) -> "Region | None":
     Raises
     ------
     UsageError
-        It is not four whole numbers.
+        The region is not four whole numbers.
     """
     from fingervision.cli._references import region_from
     from fingervision.domain.region import Region

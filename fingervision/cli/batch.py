@@ -181,7 +181,9 @@ def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> Non
         try:
             ended = ask(name, (*arguments, "--out", str(Path(nowhere) / "out"), "--", str(Path(nowhere) / "nothing")))
         except KeyboardInterrupt:
-            raise StateError("Stopped by the user before any work: call again.") from None
+            raise StateError(
+                "Stopped by the user before the first input was measured: repeat the command to start."
+            ) from None
     if nowhere not in ended.words:
         kind = UsageError if ended.exit_code == ExitCode.WRONG_USAGE else FingervisionError
         raise kind(ended.words)

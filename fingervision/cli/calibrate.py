@@ -270,13 +270,13 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
         from fingervision.storage.gap_readings import read_gap_readings
 
         if len({table.resolve() for table in tables}) < len(tables):
-            raise UsageError("Every table may be named once, but one is named twice: leave it out.")
+            raise UsageError("Each table may be named only once, but one is named twice: leave out the second.")
         recordings = [read_gap_readings(table, by_input) for table in tables]
         parts = [part for part in recordings[0] if all(len(each.get(part, ())) >= 2 for each in recordings)]
         if not parts:
             raise DataError(
                 "The recordings must share at least one part with two readings in each, but share none: "
-                "record the same thing in all of them."
+                "record the same reference part in all of them."
             )
         for table, each in zip(tables, recordings, strict=True):
             for part in parts:

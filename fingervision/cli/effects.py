@@ -28,7 +28,7 @@ def command(name: str | None, figure: Path | None) -> None:
 
     if name is None:
         if figure is not None:
-            raise UsageError("--figure must come with the name of an effect, but none is given: add one.")
+            raise UsageError("--figure needs the name of an effect, but none is given: add the name.")
         for effect in catalogue().values():
             origin = origin_of(effect.name)
             click.echo(

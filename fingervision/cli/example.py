@@ -26,7 +26,7 @@ def command(name: str | None, out: Path | None) -> None:
 
     if name is None:
         if out is not None:
-            raise UsageError("--out must come with the name of an example, but none is given: add one.")
+            raise UsageError("--out needs the name of an example, but none is given: add the name.")
         for each, case in CASES.items():
             click.echo(f"{each:10} {case.words}")
         return

@@ -65,7 +65,7 @@ def command(
 
     if not is_recording(recording):
         raise UsageError(
-            "Gauges are drawn on a recording that is there (a video, images, a run's folder), but "
+            "Gauges are drawn on an existing recording (a video, images, a run's folder), but "
             f"{recording} is none: name another, or draw them on a camera's picture with "
             "`fingervision live CAMERA --gauges FILE`."
         )

@@ -129,13 +129,20 @@ def command(
         _list()
         return
     if bed_name is not None and source not in (None, "simulated", bed_name):
-        raise UsageError(f"With --bed the bed's own camera is the source, but {source} is named too: leave it out.")
+        raise UsageError(
+            f"With --bed the test bed's own camera is the source, but {source} is named too: leave it out."
+        )
     if bed_name is None and (hide or allow_motion):
-        raise UsageError("--hide and --allow-motion are for a bed, but there is none: name it with --bed.")
+        raise UsageError("--hide and --allow-motion are for a test bed, but none is named: name it with --bed.")
     if bed_name is not None and (no_page or drive is not None):
-        raise UsageError("--bed needs the page, and its stage gives the input: leave out --no-page and --drive.")
+        raise UsageError(
+            "--bed cannot be combined with --no-page or --drive: the test bed is operated from the browser "
+            "page, and its stage supplies the input. Leave both options out."
+        )
     if gauges is not None and no_page:
-        raise UsageError("--gauges are shown in the page: leave out --no-page, or use `fingervision measure --gauges`.")
+        raise UsageError(
+            "--gauges are shown on the browser page: leave out --no-page, or use `fingervision measure --gauges`."
+        )
     if drive_offset_s is not None and drive is None:
         raise UsageError("--drive-offset-s needs a --drive.")
     if source is None and bed_name is None:
@@ -151,7 +158,8 @@ def command(
     choices = choices_of(source, calibration, px_per_mm, below_tip_mm, tips, roi)
     if no_page and choices.scale is None:
         raise UsageError(
-            "Without a page the scale must be given, but is not: add --calibration FILE (made by `fingervision "
+            "Without the browser page the scale must be given, but is not: add --calibration FILE (made by "
+            "`fingervision "
             "calibrate`) or --px-per-mm S."
         )
     way = access(host, port, password_file, tls_cert, tls_key)

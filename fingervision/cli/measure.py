@@ -140,7 +140,10 @@ def command(
     from fingervision.interface.measuring_task import measuring_task, scale_of
 
     if points and mechanism is None:
-        raise UsageError("--at says where a drawing lies, but there is none: add --mechanism FILE, or leave --at out.")
+        raise UsageError(
+            "--at states where the drawing of a mechanism lies in the picture, but no drawing is given: add "
+            "--mechanism FILE, or leave --at out."
+        )
     task = measuring_task(
         scale=scale_of(calibration, px_per_mm),
         below_tip_mm=below_tip_mm,

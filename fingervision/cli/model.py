@@ -113,7 +113,7 @@ def command(
         from fingervision.cli._mechanism import predict
 
         if object_mm is not None or object_n_mm is not None:
-            raise UsageError("--object-mm is known for grippers alone; leave it out for a mechanism drawn by bodies.")
+            raise UsageError("--object-mm works for a gripper.toml only; leave it out for a mechanism.toml.")
         predict(
             gripper_toml, kind, drive, columns, out, asked, vary,
             large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json,
@@ -161,7 +161,7 @@ def command(
             if kind != "all":
                 raise
             refusals[name] = error
-            click.echo(f"{name} has no answer: {error}", err=True)
+            click.echo(f"{name} could not be computed: {error}", err=True)
             continue
         inputs, models[name] = given, model
         rows[name] = {**row, "seconds": round(time.perf_counter() - began, 3)}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-OK, COVERED, OUT_OF_VIEW, DAMAGED = "ok", "covered", "out_of_view", "damaged"
+OK, COVERED, OUT_OF_VIEW, NOT_FOUND, DAMAGED = "ok", "covered", "out_of_view", "not_found", "damaged"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -16,7 +16,9 @@ class SeenPose:
     Parameters
     ----------
     status : str
-        `ok`; `covered`: too little of its outline is seen; `out_of_view`; `damaged`: there is no picture.
+        `ok`; `covered`: too little of its outline is seen; `out_of_view`; `not_found`: what was seen in its place is
+        not joined to the bodies that its flexures join it to, so that something like it was taken for it; `damaged`:
+        there is no picture.
     x_mm, y_mm, angle_mrad : float or None
         Counted from the drawing as it was laid on the first frame; a hinge has an angle alone.
     covariance : ndarray of float, shape (3, 3), or None

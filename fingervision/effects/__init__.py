@@ -59,9 +59,9 @@ def register(effect: Effect) -> Effect:
     Raises
     ------
     PluginShapeError
-        It is no effect, or does not answer as one.
+        The object is not an effect, or its function returns an invalid response.
     PluginNameError
-        Its name is that of another effect.
+        Another effect has the same name.
     """
     ((name, checked),) = REGISTRY.checked(effect, f"The effect {getattr(effect, 'name', effect)!s}", SESSION).items()
     REGISTRY.add(name, checked)

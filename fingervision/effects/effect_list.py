@@ -44,7 +44,8 @@ class EffectList(ModuleType):
         Raises
         ------
         UnknownNameError
-            There is none; with the nearest. It is a KeyError too.
+            The catalogue has no effect of that name; the message suggests the nearest name. The error is a KeyError
+            too.
         """
         known = self._known()
         if name not in known:

@@ -30,7 +30,7 @@ class EffectAnswerError(FingervisionError):
     """
 
     def __init__(self, name: str, words: str) -> None:
-        super().__init__(f"The effect {name} {words}: mend it, or leave it out with --without {name}.")
+        super().__init__(f"The effect {name} {words}: correct it, or leave it out with --without {name}.")
         self.name, self.words = name, words
 
 
@@ -40,7 +40,7 @@ def effects_in(held: object) -> dict[str, Effect]:
     Raises
     ------
     MisfitError
-        One of them is no effect, or does not answer as one.
+        An object is not an effect, or its function returns an invalid response.
     """
     found: list[object] = [held]
     if isinstance(held, ModuleType):
@@ -54,7 +54,7 @@ def effects_in(held: object) -> dict[str, Effect]:
     for thing in found:
         effect = try_effect(thing)
         if effect.name in checked:
-            raise MisfitError(f"must name each effect once, but has two effects {effect.name}")
+            raise MisfitError(f"must give each effect a name of its own, but has two effects {effect.name}")
         checked[effect.name] = guarded(effect)
     return checked
 
@@ -93,7 +93,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
     try:
         _answer(effect, history, values)
     except EffectAnswerError as error:
-        raise MisfitError(str(error).split(f"{name} ", 1)[1].split(": mend it")[0]) from error
+        raise MisfitError(str(error).split(f"{name} ", 1)[1].split(": correct it")[0]) from error
     return effect
 
 

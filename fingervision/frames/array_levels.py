@@ -37,9 +37,9 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
     Raises
     ------
     ArgumentTypeError
-        It is no array, or one of numbers that are no levels.
+        The argument is not an array, or its numbers cannot be grey levels.
     ArgumentError
-        Its shape is that of no picture.
+        The array's shape is not that of a picture.
     """
     if not isinstance(pictures, np.ndarray):
         advice = "numpy.asarray(...) makes an array of it" if hasattr(pictures, "__array__") else ""

@@ -36,9 +36,10 @@ class ArrayFrames:
     Raises
     ------
     ArgumentTypeError
-        It is no numeric numpy array.
+        The argument is not a numeric numpy array.
     ArgumentError
-        Its shape, type or levels cannot be a picture's, or the times do not fit.
+        The array's shape, type or levels cannot be those of pictures, or the number of times differs from the number
+        of pictures.
     """
 
     pictures: NDArray[np.generic] = field(repr=False)

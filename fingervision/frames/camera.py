@@ -40,7 +40,7 @@ def open_frames(name: str, wish: Wish) -> "CameraFrames":
     Raises
     ------
     DeviceError
-        There is no such camera, somebody else has it, or it gives no picture.
+        The camera does not exist, is in use by another program, or delivers no picture.
     """
     return CameraFrames(name, wish)
 
@@ -116,7 +116,7 @@ class CameraFrames:
                 if not read or pixels is None:
                     failed += 1
                     if failed >= FAILED_READS:
-                        raise DeviceError(f"The camera {self.name} gives no pictures any more: is it plugged in?")
+                        raise DeviceError(f"The camera {self.name} has stopped sending pictures: is it plugged in?")
                     continue
                 failed = 0
                 arrived_s = monotonic()

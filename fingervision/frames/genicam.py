@@ -54,7 +54,7 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
     InputFileError
         The producer's file is not there.
     DeviceError
-        There is no such camera, somebody else has it, or it gives no grey levels.
+        The camera does not exist, is in use by another program, or delivers no grey levels.
     """
     return GenicamFrames(name, wish)
 
@@ -122,7 +122,7 @@ class GenicamFrames:
         Raises
         ------
         DeviceError
-            It sends nothing any more.
+            The camera has stopped sending pictures.
         """
         try:
             for index in count():
@@ -168,11 +168,11 @@ class GenicamFrames:
             try:
                 buffer = self._camera.try_fetch(timeout=ASKED_EVERY_S)
             except Exception as error:
-                raise DeviceError(f"The camera {self.name} cannot be read any more ({_said(error)}).") from error
+                raise DeviceError(f"The camera {self.name} can no longer be read ({_said(error)}).") from error
             if buffer is not None:
                 return buffer
             if monotonic() - silent_since_s > SILENT_S:
-                raise DeviceError(f"The camera {self.name} sends nothing any more: is it plugged in?")
+                raise DeviceError(f"The camera {self.name} has stopped sending pictures: is it plugged in?")
         return None
 
     def _item(self, buffer: Any, index: int, arrived_s: float) -> Frame | LostFrame:
@@ -256,7 +256,7 @@ def _connected(name: str) -> tuple[Any, Any]:
         harvester.reset()
         which = f"with the serial number {serial} " if serial else ""
         there = f"those found: {', '.join(found)}" if found else "none was found"
-        raise DeviceError(f"{file} must show a camera {which}but does not ({there}): is it plugged in?")
+        raise DeviceError(f"{file} must list a camera {which}but does not ({there}): is it plugged in?")
     try:
         return harvester, harvester.create({"serial_number": serial} if serial else 0)
     except Exception as error:

@@ -55,17 +55,18 @@ def read_image(file: Path) -> Pixels:
     if content.startswith(PNG_SIGNATURE):
         _check_png(file.name, content)
     elif content.startswith(JPEG_START) and JPEG_END not in content[-4096:]:
-        raise UnreadableImageError(f"{file.name} ends before its picture does.")
+        raise UnreadableImageError(f"{file.name} is cut off: the file ends before its picture is complete.")
     elif content.startswith(TIFF_STARTS) and cv2.imcount(str(file)) > 1:
         raise UnreadableImageError(f"{file.name} holds several pictures: save each of them as a file of its own.")
     width_px, height_px = _stated_size_px(content)
     if width_px * height_px > MOST_PIXELS:
         raise UnreadableImageError(
-            f"{file.name} states {width_px}x{height_px} pixels, more than {MOST_PIXELS // 10**6} million: cut it."
+            f"{file.name} states {width_px}x{height_px} pixels, which is more than {MOST_PIXELS // 10**6} "
+            "million: crop the picture."
         )
     pixels = _decoded(content)
     if pixels is None:
-        raise UnreadableImageError(f"{file.name} is damaged or no image.")
+        raise UnreadableImageError(f"{file.name} is damaged, or is not an image.")
     if pixels.dtype not in (np.uint8, np.uint16):
         raise UnreadableImageError(f"{file.name} must have levels of 8 or 16 bits, but they are {pixels.dtype}.")
     if pixels.ndim == 2:
@@ -103,11 +104,11 @@ def _check_png(name: str, content: bytes) -> None:
     place = len(PNG_SIGNATURE)
     while True:
         if place + 12 > len(content):
-            raise UnreadableImageError(f"{name} ends before its picture does.")
+            raise UnreadableImageError(f"{name} is cut off: the file ends before its picture is complete.")
         (length,) = struct.unpack_from(">I", content, place)
         end = place + 8 + length
         if end + 4 > len(content):
-            raise UnreadableImageError(f"{name} ends before its picture does.")
+            raise UnreadableImageError(f"{name} is cut off: the file ends before its picture is complete.")
         kind = content[place + 4 : place + 8]
         (stated,) = struct.unpack_from(">I", content, end)
         if zlib.crc32(memoryview(content)[place + 4 : end]) != stated:

@@ -28,7 +28,7 @@ def open_frames(name: str, wish: Wish) -> "ImageFolder":
     Raises
     ------
     DataError, InputFileError
-        There are no images, or none can be read, or their times make no sense.
+        The folder has no images, none of them can be read, or their times are invalid.
     UsageError
         The rate is not positive, or the images have times already.
     """
@@ -59,7 +59,7 @@ class ImageFolder:
         times_s = times_of(files)
         if times_s is not None and self.rate_hz is not None:
             raise UsageError(
-                f"The images have their times in {files[0].parent / TIMES_FILE}: leave out --rate-hz, "
+                f"The times of the images are read from {files[0].parent / TIMES_FILE}: leave out --rate-hz, "
                 "or remove that file."
             )
         height_px, width_px = _first_readable(self.name, files)

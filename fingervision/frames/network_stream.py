@@ -94,7 +94,7 @@ class NetworkStream:
         except (av.FFmpegError, OSError, ValueError) as error:
             raise DeviceError(
                 f"The stream {self.name} must answer with a video, but does not ({_reason(error)}): check the address, "
-                "and that the camera is on and nobody else has it."
+                "that the camera is switched on, and that no other program uses it."
             ) from error
         if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
             self._container.close()

@@ -32,7 +32,7 @@ class RenderedFrames:
     Raises
     ------
     FingervisionError
-        There is no scene, or the frames are not of one size.
+        No scene is given, or the scenes differ in frame size.
     """
 
     scenes: "Sequence[Scene]"

@@ -176,7 +176,9 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
     claims = [entry for entry in claims if not getattr(entry.value, "TAKES_THE_REST", False)] or claims
     if len(claims) > 1:
         who = " and ".join(f"{entry.name} ({entry.origin})" for entry in claims)
-        raise UsageError(f"One kind of source must open {name}, but {who} would: rename it, or remove one of them.")
+        raise UsageError(
+            f"Only one kind of source may accept {name}, but {who} would: rename it, or remove one of them."
+        )
     if claims:
         return _opened(claims[0], name, wish or Wish())
     raise InputFileError(f"There is no recording {name}: give a video file, a folder of images, or a glob in quotes.")
@@ -206,7 +208,7 @@ def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
         raise PluginShapeError(f"{who} could not open {name} ({said}): {entry.origin.remedy}.") from error
     if not (described and hasattr(source, "__iter__")):
         raise PluginShapeError(
-            f"{who} must give a source with a Description whose frames can be read in turn, but gave a "
+            f"{who} must give a frame source (an object with a Description, over which one can iterate), but gave a "
             f"{type(source).__name__} without: {entry.origin.remedy}."
         )
     return source

@@ -66,7 +66,7 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, is no video, or has no picture in it.
+        The file cannot be read, is not a video, or contains no picture.
     UsageError
         A rate is given for what has its own times.
     """
@@ -94,7 +94,8 @@ class VideoFile:
             codec = stream.codec_context
             if codec.width < 1 or codec.height < 1:
                 raise DataError(
-                    f"{self.name} has no pictures in its video: it is empty or was cut off at once; record it again."
+                    f"{self.name} has no pictures in its video: it is empty or was cut off at its start; "
+                    "record it again."
                 )
             rate = float(stream.average_rate) if stream.average_rate else None
             length_s = float(container.duration / av.time_base) if container.duration else None

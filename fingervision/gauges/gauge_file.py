@@ -131,20 +131,21 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
     Raises
     ------
     DataError
-        One does; the sentence names it.
+        A gauge lies outside the picture or is larger than it; the message names the gauge.
     """
     for gauge in gauges:
         x, y = gauge.spec.middle_px
         if not (-0.5 <= x <= width_px - 0.5 and -0.5 <= y <= height_px - 0.5):
             raise DataError(
-                f"The gauge {gauge.name!r} must have its middle inside the frame of {width_px}x{height_px} pixels, but "
-                f"x_px = {x:g}, y_px = {y:g}: move it there."
+                f"The gauge {gauge.name!r} must have its centre inside the picture of {width_px}x{height_px} "
+                "pixels, but "
+                f"x_px = {x:g}, y_px = {y:g}: move the gauge into the picture."
             )
         largest = (width_px**2 + height_px**2) ** 0.5
         for key in SIZES:
             size = getattr(gauge.spec, key, 0.0)
             if size > largest:
                 raise DataError(
-                    f"The gauge {gauge.name!r} must be smaller than the frame of {width_px}x{height_px} pixels, but "
-                    f"its {key} is {size:g}: lower it."
+                    f"The gauge {gauge.name!r} must be smaller than the picture of {width_px}x{height_px} pixels, but "
+                    f"its {key} is {size:g}: make it smaller."
                 )

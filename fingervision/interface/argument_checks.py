@@ -14,7 +14,7 @@ def number(argument: str, value: object) -> float:
     Raises
     ------
     ArgumentTypeError
-        It is none.
+        The argument is not a number.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ArgumentTypeError(argument, "be a number", f"is {value!r}")
@@ -27,9 +27,9 @@ def whole_number(argument: str, value: object, least: int) -> int:
     Raises
     ------
     ArgumentTypeError
-        It is none.
+        The argument is not a whole number.
     ArgumentError
-        It is too small.
+        The number is below `least`.
     """
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise ArgumentTypeError(argument, f"be a whole number from {least}", f"is {value!r}")
@@ -44,9 +44,9 @@ def one_of(argument: str, value: object, words: Iterable[str]) -> str:
     Raises
     ------
     ArgumentTypeError
-        It is no text.
+        The argument is not a text.
     UnknownNameError
-        It is none of them; with the nearest.
+        The argument is none of the allowed words; the message suggests the nearest.
     """
     known = tuple(words)
     if isinstance(value, str) and value in known:
@@ -63,9 +63,9 @@ def path_of(argument: str, value: object, what: str) -> Path:
     Raises
     ------
     ArgumentTypeError
-        It is no name.
+        The argument is not the name of a file or folder.
     ArgumentError
-        It is empty.
+        The name is empty.
     """
     from fingervision.frames.array_levels import what_it_is
 
@@ -85,7 +85,7 @@ def region_of(roi: object) -> tuple[int, int, int, int] | None:
     Raises
     ------
     UsageError
-        It is not four whole numbers.
+        The region is not four whole numbers.
     """
     if roi is None:
         return None

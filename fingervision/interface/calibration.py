@@ -63,7 +63,7 @@ class Calibration:
         Raises
         ------
         DataError, InputFileError
-            There is no such file, or it is no calibration.
+            The file does not exist, or is not a calibration.
         """
         name = path_of("path", path, "a calibration file")
         return cls(read_calibration(name), name)
@@ -82,7 +82,7 @@ class Calibration:
         Raises
         ------
         OutputError
-            It cannot be written, or another file stands there.
+            The calibration cannot be written, or the path is that of another kind of file.
         """
         out = path_of("path", path, "a calibration file")
         refuse_foreign(out)
@@ -97,7 +97,7 @@ class Calibration:
         Raises
         ------
         OutputError
-            One cannot be written.
+            A picture cannot be written.
         """
         for name, picture in self.pictures.items():
             write_picture(path, name, picture)

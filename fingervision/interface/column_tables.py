@@ -25,7 +25,7 @@ def drive_from_columns(table: Any) -> DriveHistory:
     Raises
     ------
     ArgumentTypeError
-        It holds no columns.
+        The argument has no columns.
     ArgumentError
         A column is missing, or holds what is no number.
     DataError
@@ -50,7 +50,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     Raises
     ------
     ArgumentTypeError
-        It holds no columns.
+        The argument has no columns.
     ArgumentError
         A column is missing, or holds what is no number.
     DataError
@@ -93,7 +93,7 @@ def columns_of(argument: str, table: Any, must: str) -> dict[str, list[Any]]:
     Raises
     ------
     ArgumentTypeError
-        It is neither.
+        The argument is neither a DataFrame nor a mapping.
     ArgumentError
         Columns are of different lengths.
     """

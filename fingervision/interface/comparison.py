@@ -124,7 +124,7 @@ class Comparison:
         UsageError
             The folder holds the results of another table.
         OutputError
-            It cannot be written.
+            The folder or a file in it cannot be written.
         """
         return save_results(self, folder)
 

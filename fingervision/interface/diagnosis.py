@@ -122,7 +122,7 @@ class Diagnosis:
         UsageError
             The folder holds the results of another table.
         OutputError
-            It cannot be written.
+            The folder or a file in it cannot be written.
         """
         return save_results(self, folder)
 

@@ -163,11 +163,11 @@ def copy_example(name: str, folder: Path) -> Case:
     Raises
     ------
     UnknownNameError
-        There is no such case.
+        No example has that name.
     UsageError
         The folder is there already, and not empty.
     OutputError
-        It cannot be written.
+        The folder or a file in it cannot be written.
     """
     if name not in CASES:
         raise UnknownNameError("name", name, CASES, "one of the examples", "`fingervision example` lists them")

@@ -40,11 +40,11 @@ def recording_of(
     Raises
     ------
     ArgumentTypeError
-        It holds no pictures.
+        The array holds no pictures.
     UsageError
         An argument that this source has no use for.
     DataError, DeviceError, InputFileError
-        It cannot be read.
+        The file cannot be read.
     """
     if rate_hz is not None:
         rate_hz = number("rate_hz", rate_hz)
@@ -54,9 +54,11 @@ def recording_of(
         pictures = ArrayFrames(source, rate_hz, times_s, stored)
         return lambda: pictures
     if times_s is not None:
-        raise UsageError("times_s is for arrays alone; a folder of images takes a times.csv: leave it out.")
+        raise UsageError(
+            "times_s is for arrays only: leave it out, and put the times of a folder of images into its times.csv."
+        )
     if stored is not Coding.LOSSLESS:
-        raise UsageError("coding is for arrays alone, and a file says it of itself: leave it out.")
+        raise UsageError("coding is for arrays only, since a file states its own coding: leave it out.")
     if isinstance(source, bool) or not isinstance(source, str | os.PathLike | int | np.integer):
         if hasattr(source, "description") and hasattr(source, "__iter__"):
             given: FrameSource = source

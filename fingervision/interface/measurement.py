@@ -173,7 +173,7 @@ class Measurement:
         UsageError
             The measurement has no drive.
         DataError, NoCalibrationError
-            There are too few such frames, or they do not move.
+            Too few frames have both a gap and an input, or the input does not change.
         """
         from fingervision.interface.measurement_tables import measured_table
 
@@ -210,7 +210,7 @@ class Measurement:
         Raises
         ------
         UsageError
-            There is no such frame, or it could not be read.
+            The recording has no frame of that number, or the frame could not be read.
         """
         from fingervision.interface.measurement_pictures import marked_picture
 
@@ -285,7 +285,7 @@ class Measurement:
         UsageError
             The folder holds the results of another recording, or there is no such frame.
         OutputError
-            It cannot be written.
+            The file or folder cannot be written.
         """
         from fingervision.measuring.save import save_measured
 

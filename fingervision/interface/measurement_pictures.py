@@ -32,7 +32,7 @@ def marked_picture(found: MeasuredInMemory, again: Opener, frame: int) -> NDArra
     Raises
     ------
     UsageError
-        There is no such frame, or it could not be read.
+        The recording has no frame of that number, or the frame could not be read.
     """
     first = found.first_frame
     seen = first if first is not None and first.index == frame else None

@@ -39,7 +39,10 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     """
     task, clock = found.task, found.clock
     if task.drive is None:
-        raise UsageError("measured must have a drive, but was measured without: give fingervision.measure one.")
+        raise UsageError(
+            "The measurement must include a drive (the stage's record), but was made without: call "
+            "fingervision.measure with drive=."
+        )
     if found.refusal is not None:
         raise found.refusal
     known = columns_of(found)

@@ -41,7 +41,7 @@ def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
     Raises
     ------
     UsageError
-        Both are given, or neither, or no camera has such a scale.
+        Both a calibration and a scale are given, or neither, or the scale is outside the range of real cameras.
     DataError, InputFileError
         The calibration cannot be read.
     """
@@ -139,7 +139,7 @@ def range_of(frames: Any) -> tuple[tuple[int, int] | None, Any]:
     Raises
     ------
     UsageError
-        It is neither.
+        The argument is neither a range nor a number of frames.
     """
     if frames is None or isinstance(frames, int | np.integer):
         return None, frames

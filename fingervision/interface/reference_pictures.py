@@ -58,7 +58,7 @@ def references_of(pictures: Any, kind: str) -> list[Reference]:
     Raises
     ------
     ArgumentTypeError, ArgumentError
-        It is something else, or a size is not positive.
+        The argument does not pair pictures with sizes, or a size is not positive.
     """
     if isinstance(pictures, Mapping):
         items: list[Any] = [(source, value) for source, value in pictures.items()]
@@ -91,7 +91,7 @@ def known_sizes(references: Sequence[Reference], u_size_mm: float) -> list[Known
     Raises
     ------
     DataError, InputFileError, UsageError
-        One cannot be read, or is of another size.
+        A picture cannot be read, or differs in size from the others.
     """
     u_mm = number("u_size_mm", u_size_mm)
     named = read_pictures([each.source for each in references])
@@ -108,7 +108,7 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
     UsageError
         A file is named twice, or what is no picture.
     DataError, InputFileError
-        One cannot be read, or is of another size.
+        A picture cannot be read, or differs in size from the others.
     """
     paths = [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
     seen: dict[Path, Path] = {}
@@ -123,8 +123,8 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
         if grey.shape != first.shape:
             (height, width), (first_height, first_width) = grey.shape, first.shape
             raise DataError(
-                f"All pictures must be of one size, but {name} is {width}x{height} and {first_name} is "
-                f"{first_width}x{first_height}: take all of them with the camera set alike."
+                f"All pictures must have the same size, but {name} is {width}x{height} and {first_name} is "
+                f"{first_width}x{first_height}: take all of them with the same camera settings."
             )
     return pictures
 

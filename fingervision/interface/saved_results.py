@@ -38,7 +38,7 @@ def save_results(results: Results, folder: "str | os.PathLike[str]") -> Path:
     UsageError
         The folder holds the results of another table.
     OutputError
-        It cannot be written.
+        The file or folder cannot be written.
     """
     out = own_folder(path_of("folder", folder, "a folder"), results.measured, named=True)
     results.write(out)

@@ -155,7 +155,7 @@ class Simulation:
         Raises
         ------
         OutputError
-            It cannot be written.
+            The file or folder cannot be written.
         """
         import csv
 

@@ -74,7 +74,7 @@ def read_table(
     OpenQuestionError
         The table can be read in more than one way; the sentence says how to settle it.
     DataError, InputFileError
-        It cannot be read, or not be worked with.
+        The table cannot be read, or its content cannot be used.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def read_model(
     Raises
     ------
     DataError, InputFileError, ModelError, UsageError
-        It cannot be read.
+        The file cannot be read.
 
     Examples
     --------
@@ -145,9 +145,9 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
     Raises
     ------
     ArgumentTypeError
-        It holds no table.
+        The argument holds no table.
     DataError, InputFileError, OpenQuestionError
-        It cannot be read, or not be worked with.
+        The table cannot be read, or its content cannot be used.
     """
     if isinstance(measured, str | os.PathLike):
         path = path_of("measured", measured, "a measured table's file")
@@ -167,9 +167,9 @@ def model_given(model: Any, kind: str, columns: Any = None) -> Given:
     Raises
     ------
     ArgumentTypeError
-        It is no model.
+        The argument is not a model.
     DataError, InputFileError, ModelError, UsageError
-        It cannot be read.
+        The file cannot be read.
     """
     if isinstance(model, str | os.PathLike):
         path = path_of("model", model, "a model's file")
@@ -192,7 +192,7 @@ def models_given(model: Any, kind: str, columns: Any = None) -> dict[str, Given]
     Raises
     ------
     UsageError
-        There is none, or the same one twice.
+        No model is given, or the same model is given twice.
     """
     if isinstance(model, Mapping) and "input_mm" not in model:
         named = {str(name): model_given(each, kind, columns) for name, each in model.items()}
@@ -219,7 +219,7 @@ def told_apart(paths: list[Path]) -> list[str]:
         names = [Path(*path.parts[-parts:]).as_posix() for path in paths]
         if len(set(names)) == len(names):
             return names
-    raise UsageError("--model names the same file twice: each model counts once.")
+    raise UsageError("--model names the same file twice: name each model only once.")
 
 
 def effect_names(argument: str, names: Any) -> frozenset[str]:

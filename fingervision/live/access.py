@@ -58,7 +58,7 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
     Raises
     ------
     UsageError
-        It would be reached from beyond this machine without a password, or only half of what TLS needs is there.
+        Other machines could connect without a password, or only one of the certificate and its key is given for TLS.
     DataError, InputFileError
         A file cannot be read, or the password is too short.
     """
@@ -71,7 +71,7 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
         _check_pair(certificate, key)
     if password_file is None and host not in LOOPBACK_NAMES:
         raise UsageError(
-            f"--host {host} lets other machines in, which needs a password: write one of at least {LEAST_LETTERS} "
+            f"--host {host} lets other machines connect, which needs a password: write one of at least {LEAST_LETTERS} "
             "letters into a file and name it with --password-file."
         )
     return Access(host, port, "" if password_file is None else _password(password_file), certificate, key)

@@ -17,9 +17,9 @@ def opened(name: str, wish: Wish) -> Capture:
     Raises
     ------
     DataError, DeviceError, InputFileError
-        It cannot be opened.
+        The source cannot be opened.
     UsageError
-        It is asked for what only a camera of this machine can do.
+        Camera settings are given for a source that is not a camera of this machine.
     """
     if wish.camera != CameraWish() and not camera.accepts(name):
         raise UsageError(

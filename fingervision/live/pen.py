@@ -24,7 +24,7 @@ class Pen:
         Raises
         ------
         StateError
-            Another page has it.
+            Another page has write access.
         """
         if not self.may_write(page):
             raise StateError(HELD)

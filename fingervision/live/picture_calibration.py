@@ -35,7 +35,7 @@ def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_m
     Raises
     ------
     NoCalibrationError
-        There is no such reference there.
+        The part of the picture shows no reference of that kind.
     """
     try:
         picture = KnownSize(NAME, kind, size_mm, u_size_mm, to_grey(frame.pixels).copy())

@@ -125,11 +125,11 @@ def _new_folder(out: Path) -> Path:
             continue
         except OSError as error:
             raise OutputError(
-                f"The folder {out} cannot be written ({error.strerror}): name another with --out."
+                f"The folder {out} cannot be written ({error.strerror}): name another folder with --out."
             ) from error
         return path
     raise OutputError(
-        f"The folder {out} has no free name for a run of this second: try again, or name another with --out."
+        f"The folder {out} has no free name for a run of this second: try again, or name another folder with --out."
     )
 
 

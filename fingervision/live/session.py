@@ -153,11 +153,13 @@ class Session:
         Raises
         ------
         StateError
-            It cannot be meant for these frames, or would change a recording under way.
+            The choice does not fit the source's frames, or would change a recording in progress.
         """
         with self._lock:
             if MOVES_ZERO & set(changes) and (self._recorder is not None or self._beginning):
-                raise StateError("While a run is recorded the measurement stays as it is: stop recording first.")
+                raise StateError(
+                    "The settings of the measurement cannot be changed while a run is recorded: stop recording first."
+                )
             chosen, unzeroed = self.choices.changed(**changes)
             chosen.check(self.description)
             self.choices = chosen
@@ -170,7 +172,7 @@ class Session:
         Raises
         ------
         StateError
-            There is one already, the source has ended, or the scale is not known.
+            A recording is in progress already, the source has ended, or the scale is not known.
         OutputError
             The folder cannot be written.
         """
@@ -183,7 +185,7 @@ class Session:
             if self._beginning:
                 raise StateError("A recording is being begun already.")
             if task is None:
-                raise StateError("The scale is not known: give it before recording, so that the run has gaps.")
+                raise StateError("The scale is not known: give the scale before recording, so that the run has gaps.")
             if not self.description.has_times:
                 raise StateError("These images have no times, which a recording needs: give --rate-hz.")
             self._beginning = True
@@ -203,7 +205,7 @@ class Session:
         Raises
         ------
         StateError
-            There is none, or it could not be written to its end.
+            No recording is in progress, or its file could not be completed.
         """
         with self._lock:
             recorder, self._recorder = self._recorder, None

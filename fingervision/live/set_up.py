@@ -33,7 +33,9 @@ class SetUp:
 
     def __init__(self, view: View) -> None:
         if view.choices.task is None:
-            raise StateError("The set-up is judged in micrometres: give the scale first.")
+            raise StateError(
+                "The set-up is judged by errors in micrometres, which need the scale: give the scale first."
+            )
         self.findings: list[dict[str, Any]] | None = None
         self.words = "Looking at the picture for three seconds."
         self._view = view
@@ -52,7 +54,7 @@ class SetUp:
             frames = self._frames()
             task = self._view.choices.task
             if task is None or len(frames) < FEWEST_FRAMES:
-                self.words = f"Only {len(frames)} pictures came in {LOOKS_FOR_S:g} s: mend the source first."
+                self.words = f"Only {len(frames)} pictures came in {LOOKS_FOR_S:g} s: check the camera or stream first."
                 return
             self.words = f"Judging {len(frames)} pictures."
             settings, _ = task.settings_for(self._view.description.files)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calib.limits import rectangular
 from calib.measured_scale import Calibration
-from fingervision.domain.body_poses import COVERED, DAMAGED, OK, OUT_OF_VIEW, FramePoses, SeenPose
+from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK, OUT_OF_VIEW, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.gauges.picture import Picture, picture_of
@@ -26,6 +26,7 @@ from fingervision.measuring.drawing_placement import (
     refined,
 )
 from fingervision.measuring.flat_picture import flat_map_of
+from fingervision.measuring.joined_bodies import Joint, torn_off
 from fingervision.measuring.pose_uncertainty import SharedErrors, SharedPose, in_drawing
 from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
@@ -91,6 +92,8 @@ class BodyTracker:
         self.mechanism, self.scale, self._points = mechanism, scale, tuple(points)
         self.settings = Settings(below_tip_px=1.0) if settings is None else settings
         self.outlines = outlines_of(mechanism)
+        self._joints = [Joint(flexure, (self._joined(flexure.name, -1.0).body, self._joined(flexure.name, 1.0).body))
+                        for flexure in mechanism.flexures]  # fmt: skip
         self.placed: Placed | None = None
 
     def poses(self, frames: Iterable[Frame | LostFrame]) -> Iterator[FramePoses]:
@@ -146,7 +149,8 @@ class BodyTracker:
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
-                f"The edges of {self.mechanism.name} must be seen where it is laid on frame {index}, but are not: "
+                f"The edges of {self.mechanism.name} must be visible where it was placed on frame {index}, "
+                "but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )
         notes = placed.notes if laid.by_fixed else (*placed.notes, LAID_BY_ALL)
@@ -209,8 +213,8 @@ class BodyTracker:
 
     def _seen(self, grey: Array, view: EdgeView) -> dict[str, SeenPose]:
         if self.placed is None:
-            raise AssertionError("no drawing was laid")
-        place, pyramid = self.placed.place, list[Array]()
+            raise AssertionError("no drawing was placed on the picture")
+        place, pyramid, before = self.placed.place, list[Array](), list(self._last)
         found: dict[str, SeenPose] = {}
         shared: dict[str, SharedPose] = {}
         for number, outline in enumerate(self.outlines):
@@ -232,6 +236,10 @@ class BodyTracker:
             random = into @ fit.covariance @ into.T
             whole = random + into @ shared[name].covariance @ into.T
             found[name] = SeenPose(OK, float(pose[0]), float(pose[1]), float(pose[2]), whole, random)
+        for name in torn_off(self._joints, found):
+            # Something like it was taken for it: the next frame is searched from where it was seen last.
+            number = next(k for k, outline in enumerate(self.outlines) if outline.body.name == name)
+            found[name], self._last[number] = SeenPose(NOT_FOUND), before[number]
         return found | self._hinges(found, shared)
 
     def _why(self, grey: Array, chunks: Chunks, about: Array, last: tuple[Array, float], flat: FlatMap | None) -> str:
@@ -244,8 +252,8 @@ class BodyTracker:
     def _hinges(self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose]) -> dict[str, SeenPose]:
         """Angles of hinges: rotation of the body beyond a hinge against the body before it."""
         found = {}
-        for flexure in self.mechanism.flexures:
-            first, last = (self._joined(flexure.name, side).body.name for side in (-1.0, 1.0))
+        for joint in self._joints:
+            flexure, (first, last) = joint.flexure, (body.name for body in joint.bodies)
             seen = [poses[first], poses[last]]
             lost = [pose.status for pose in seen if pose.status != OK]
             if lost:

@@ -81,7 +81,7 @@ def parse_point(text: str) -> GivenPoint:
     Raises
     ------
     UsageError
-        It is no such thing.
+        The text does not state a point in pixels and in millimetres.
     """
     try:
         (x_px, y_px), (x_mm, y_mm) = (tuple(map(float, half.split(","))) for half in text.split("="))
@@ -99,7 +99,7 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
     Raises
     ------
     UsageError
-        There are too few, or they are of another scale.
+        Too few points are given, or their distances contradict the scale.
     """
     if len(points) < 2:
         raise UsageError(f"--at must be given for at least two points of the drawing, but is given for {len(points)}.")
@@ -132,7 +132,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     Raises
     ------
     DataError
-        It fits nowhere, or in several ways.
+        The drawing fits the picture nowhere, or equally well in several ways.
     """
     height, width = grey.shape
     step = max(1, max(width, height) // GRID)
@@ -163,8 +163,9 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     if not best or best[0][0] < LEAST_OVERLAP:
         share = best[0][0] if best else 0.0
         raise DataError(
-            f"The drawing {mechanism.name} must cover what the picture shows, but at best {100.0 * share:.0f} % of "
-            "both is common: show the whole mechanism, check the scale, or give --at X,Y=XMM,YMM for three points."
+            f"The drawing {mechanism.name} must cover the mechanism that the picture shows, but at best only "
+            f"{100.0 * share:.0f} % of the two areas overlap: show the whole mechanism, check the scale, or give "
+            "--at X,Y=XMM,YMM for three points."
         )
     top = best[0]
     others = [entry for entry in best[1:] if entry[0] > top[0] - AS_GOOD]

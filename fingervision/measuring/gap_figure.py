@@ -42,7 +42,8 @@ def draw_gap(
     except OSError as error:
         part.unlink(missing_ok=True)
         raise OutputError(
-            f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
+            f"{path} could not be written ({error.strerror}): free disk space or name another folder with "
+            "--out, and measure again."
         ) from error
 
 

@@ -155,6 +155,7 @@ def refuse_camera(source: FrameSource) -> None:
     """
     if hasattr(source, "received"):
         raise UsageError(
-            f"measure needs a recording, which ends, but {source.description.name} is a camera, which does not: record "
+            f"`fingervision measure` needs a recording, which has an end, but {source.description.name} is a "
+            "camera, which does not: record "
             f"it with `fingervision live {source.description.name} --no-page --out runs`."
         )

@@ -38,7 +38,7 @@ class OverlayVideo:
     Raises
     ------
     FingervisionError
-        It cannot be written; also from `add` and on leaving.
+        The video cannot be written; also raised by `add` and at the end of the `with` block.
     """
 
     def __init__(self, path: Path, description: Description) -> None:
@@ -99,7 +99,8 @@ class OverlayVideo:
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)
         return OutputError(
-            f"{self._path} could not be written ({why}): make room, name another --out, or leave out --overlay."
+            f"{self._path} could not be written ({why}): free disk space, name another folder with --out, or "
+            "leave out --overlay."
         )
 
 

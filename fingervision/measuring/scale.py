@@ -20,7 +20,7 @@ def check_px_per_mm(px_per_mm: float) -> None:
     Raises
     ------
     UsageError
-        It lies beyond the bounds.
+        The scale lies outside the bounds.
     """
     if not LEAST_PX_PER_MM <= px_per_mm <= MOST_PX_PER_MM:
         raise UsageError(

@@ -48,6 +48,6 @@ def write_steps(
     except OSError as error:
         raise OutputError(
             f"The pictures of the steps could not be written to {folder} ({error.strerror}): "
-            "make room or name another --out, and measure again."
+            "free disk space or name another folder with --out, and measure again."
         ) from error
     return tuple(written)

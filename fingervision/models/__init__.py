@@ -1,1 +1,1 @@
-"""Gripper models, one per file: input displacement in, gap out."""
+"""Models of the gripper, one kind per module: each predicts the gap from the input displacement."""

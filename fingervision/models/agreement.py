@@ -1,4 +1,7 @@
-"""Check where different kinds of model of one drawing disagree by more than their own errors, and which to trust."""
+"""Find quantities on which different kinds of model of one drawing disagree, and name the kind to trust.
+
+A disagreement is a difference larger than the stated model errors of the two kinds together plus 10 %.
+"""
 
 from collections.abc import Callable, Mapping
 from itertools import combinations
@@ -7,7 +10,8 @@ from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.kinds import by_trust, why_trusted
 
 _APART = 0.10
-"""Beyond the stated errors of both: what differs by more is no error of the kind but of its picture of the body."""
+"""Relative difference, beyond the sum of the two kinds' stated errors, from which two kinds are said to disagree: so
+large a difference is no longer model error, but a different idea of the body's geometry."""
 _Figure = Callable[[ModelFigures], float | None]
 _QUANTITIES: tuple[tuple[str, str, _Figure, Callable[[ModelFigures], float]], ...] = (
     ("gap per input", "", lambda f: f.gap_per_input, lambda f: f.slope_error),
@@ -18,17 +22,18 @@ _QUANTITIES: tuple[tuple[str, str, _Figure, Callable[[ModelFigures], float]], ..
 
 
 def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
-    """Compare slope, force and first mode of every pair of kinds.
+    """Compare the gap per input, the force per input and the first modes between every pair of kinds of model.
 
     Parameters
     ----------
     figures : mapping of str to ModelFigures
-        By kind.
+        Figures of each model, by the name of its kind.
 
     Returns
     -------
     list of str
-        One sentence for each quantity that differs; of several pairs the one that differs most.
+        One sentence for each quantity on which kinds disagree; if several pairs of kinds do, the pair with the largest
+        difference.
     """
     kinds = by_trust(figures)
     sentences = []

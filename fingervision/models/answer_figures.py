@@ -1,4 +1,4 @@
-"""Figures by which several models of one gripper are compared."""
+"""Characteristic numbers (slope, stiffness, stress, natural frequencies) by which models of a gripper are compared."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ class PeakStress:
     Parameters
     ----------
     mpa_per_mm : float
-        Stress per input.
+        Stress per millimetre of input.
     place_mm : (float, float)
-        Where.
+        Position of the largest stress (x, y).
     """
 
     mpa_per_mm: float
@@ -28,13 +28,13 @@ class LoadedState:
     Parameters
     ----------
     input_mm, gap_mm, force_n : float
-        Input, gap, force at the drive of both halves.
+        Input, gap, and force at the drive of both halves together.
     grip_n : float
-        Force of the symmetry plane on each finger; 0 where they do not touch.
+        Contact force of the symmetry plane on each finger; 0 where the fingers do not touch.
     stress_mpa : float
-        Largest stress on a notch: von Mises's, or the nominal one of a model made of bars.
+        Largest stress on a notch: the von Mises stress, or the nominal stress for a model made of bars.
     place_mm : (float, float)
-        Where, at rest.
+        Position of the largest stress at zero input (x, y).
     """
 
     input_mm: float
@@ -47,22 +47,24 @@ class LoadedState:
 
 @dataclass(frozen=True, slots=True)
 class ModelFigures:
-    """Figures of one model for the comparison table; None for a figure that the model cannot give.
+    """Characteristic numbers of one model for the comparison table; None for a number that the model cannot give.
 
     Parameters
     ----------
     gap_per_input : float
-        Millimetres of gap per millimetre of input, at rest.
+        Millimetres of gap per millimetre of input, at zero input.
     input_stiffness_n_mm : float
-        Force at the drive per input, both halves.
+        Force at the drive of both halves per millimetre of input.
     peak_stress : PeakStress or None
-        On the notches.
+        Largest stress on the notches.
     free_modes_hz, locked_modes_hz : tuple of float
-        First symmetric in-plane modes with the drive free along its axis, and held.
+        First natural frequencies of the symmetric in-plane modes, with the drive free along its axis, and with the
+        drive held.
     contact_input_mm : float or None
         Input at which the fingers first touch.
     swaying_modes_hz, out_of_plane_modes_hz : tuple of float
-        First antisymmetric in-plane modes, the drive free to go sideways; first modes out of the plane, drive held.
+        First natural frequencies of the antisymmetric in-plane modes, with the drive free to move sideways; first
+        natural frequencies out of the plane, with the drive held.
     sag_out_of_plane_mm : float or None
         Sag of the measuring point of a horizontal plate by its own weight, drive held.
     slope_error, force_error, mode_error, out_of_plane_error, sag_error, grip_error : float

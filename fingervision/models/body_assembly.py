@@ -1,4 +1,4 @@
-"""Assembly of a mechanism: its bodies cut from the drawing, meshed, condensed to frames, and joined by flexures."""
+"""Assembly of a mechanism: bodies cut from the drawing, meshed, condensed to coordinate frames, joined by flexures."""
 
 from dataclasses import dataclass
 
@@ -19,31 +19,31 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _NEAR = 1e-7
-"""Of the body's size: how near a node must be to a cut."""
+"""Largest distance of a node from a cut at which the node counts as lying on it, as a share of the body's size."""
 _OVER = 1.1
-"""Of a cut's height: nodes within it are the section's."""
+"""Height within which nodes on a cut belong to its section, as a multiple of the section's height."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyAssembly:
-    """The bodies, and which motions of their frames are fixed or driven.
+    """The meshed and condensed bodies, and which motions of their frames are fixed or driven.
 
     Parameters
     ----------
     plate : PlaneStressPlate
         All bodies, meshed.
     piece : ndarray of int
-        Body of every node of the plate.
+        Number of the body to which each node of the plate belongs.
     frames : tuple of Frame
-        Of all bodies.
+        Coordinate frames of all bodies; each has three motions (x, y, rotation).
     bodies, turning : tuple
-        Condensed, and the same in large rotation.
+        Condensed bodies for small motions, and the same bodies for large rotations.
     ends : tuple of (int, int)
-        Frames at both ends of every flexure.
+        Indices of the two frames that each flexure joins.
     held : tuple of int
-        Motions that supports hold, three to a frame.
+        Indices of the frame motions that supports fix; frame i has the motions 3 i to 3 i + 2.
     by_input : dict of int to float
-        Motions that the drive prescribes, by 1 mm of input.
+        Frame motions that the drive prescribes, per 1 mm of input.
     """
 
     plate: PlaneStressPlate
@@ -56,7 +56,7 @@ class BodyAssembly:
     by_input: dict[int, float]
 
     def field(self, moved: Array) -> tuple[Array, csr_matrix]:
-        """Displacement of every node of the bodies in the deformed shape, and its derivative by the frames' motions."""
+        """Displacement of every node of the bodies in the deformed shape; its derivative by the frames' motions."""
         plate = self.plate
         field = np.zeros(plate.unknowns)
         slopes = lil_matrix((plate.unknowns, moved.size))
@@ -92,7 +92,7 @@ class BodyAssembly:
         return float(x), float(y)
 
     def _interpolated(self, field: Array, point: tuple[float, float], own: NDArray[np.bool_]) -> Array:
-        """Quadratic interpolation between the nearest nodes of one body."""
+        """Interpolate a displacement field at a point, by a quadratic fitted to the 12 nearest nodes of one body."""
         plate = self.plate
         places = np.flatnonzero(own)
         x, y = plate.nodes_mm[:, places] - np.array(point)[:, None]
@@ -105,7 +105,7 @@ class BodyAssembly:
 
 
 class _Frames:
-    """Frames in the order in which they are found, each with its body and its free motions."""
+    """Collect the coordinate frames of all bodies, the body of each frame, and the fixed and driven motions."""
 
     def __init__(self, plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> None:
         self.plate, self.mechanism, self.size_mm = plate, mechanism, size_mm
@@ -117,15 +117,15 @@ class _Frames:
         self._taken: set[int] = set()
 
     def add(self, frame: Frame, body: int) -> int:
-        """Add a frame; return the index of the first of its three motions."""
+        """Add a frame to those of a body; return the index of the first of the frame's three motions."""
         self.found.append(frame)
         self.owner.append(body)
         return 3 * len(self.found) - 3
 
     def face(self, nodes: Indices, tied: tuple[str, ...]) -> list[tuple[int, bool]]:
-        """Add the frames of a face, one per body that it touches.
+        """Add the coordinate frames of a face, one for each body that the face touches.
 
-        Return their first motions, and whether the face cannot rotate.
+        Return, for each frame, the index of its first motion and whether the face's tied components prevent rotation.
         """
         added = []
         for body in np.unique(self.piece[nodes]).tolist():
@@ -134,7 +134,7 @@ class _Frames:
         return added
 
     def supports(self) -> None:
-        """Add the frames of fixed, driven and sliding faces."""
+        """Add the coordinate frames of fixed, driven and sliding faces, and note the fixed and driven motions."""
         mechanism = self.mechanism
         supports = supports_of(self.plate, mechanism, self.size_mm)
         for nodes in supports.fixed:
@@ -157,7 +157,7 @@ class _Frames:
                     self.face(nodes_on(self.plate, face, self.mechanism, self.size_mm), ())
 
     def cuts(self, span: FlexureSpan) -> tuple[int, int]:
-        """Add the frames at both ends of a flexure."""
+        """Add the coordinate frames of the two sections where a flexure is cut from the bodies that it joins."""
         angle = np.radians(span.flexure.axis_deg)
         axis = np.array([np.cos(angle), np.sin(angle)])
         ends = []
@@ -171,12 +171,12 @@ class _Frames:
 def assemble_bodies(
     plate: PlaneStressPlate, mechanism: Mechanism, spans: tuple[FlexureSpan, ...], size_mm: float
 ) -> BodyAssembly:
-    """Condense every body to its supports, its contact faces and the ends of its flexures.
+    """Condense every body to coordinate frames at its supports, contact faces and flexure ends.
 
     Raises
     ------
     ModelError
-        Where a face holds nothing or a body is joined to nothing.
+        If no node lies on a face, or a body is joined to nothing.
     """
     frames = _Frames(plate, mechanism, size_mm)
     frames.supports()
@@ -189,7 +189,7 @@ def assemble_bodies(
         nodes = np.flatnonzero(piece == body)
         if not own:
             x, y = plate.nodes_mm[:, nodes[0]]
-            raise ModelError(f"The body of {mechanism.name} at ({x:.4g}, {y:.4g}) mm is joined to nothing.")
+            raise ModelError(f"The body of {mechanism.name} at ({x:.4g}, {y:.4g}) mm is not joined to any other body.")
         unknowns = np.concatenate([plate.x_dofs[nodes], plate.y_dofs[nodes]])
         bodies.append(condensed(plate, unknowns, [frames.found[i] for i in own], own))
     turning = [CorotationalBody(np.array([frames.found[i].at_mm for i in body.frames]), body.stiffness_n_mm)

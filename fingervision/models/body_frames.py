@@ -1,4 +1,4 @@
-"""Frames that represent a few motions of a meshed body: at the cut where a beam begins, or at a face."""
+"""Coordinate frames by which a meshed body is condensed: each stands for the motion of a cut or of a face."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,21 +17,21 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _LEVER = 1e-6
-"""Of a face's extent: shorter arms across a tied component leave the face free to turn."""
+"""Lever arms across a tied component that are shorter than this share of the face's extent do not prevent rotation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A place with three motions (along x, along y, rotation), coupled to the nodes of a body.
+    """A coordinate frame with three motions (along x, along y, rotation), coupled to the nodes of a body.
 
     Parameters
     ----------
     at_mm : ndarray of float, shape (2,)
-        Where.
+        Position of the frame's origin.
     rows : sparse matrix, shape (k, unknowns of the plate)
-        Combinations of the body's displacements that the motion prescribes.
+        Linear combinations of the body's displacements that the frame's motion prescribes.
     motion : ndarray of float, shape (k, 3)
-        What each combination is by the motion.
+        Value of each combination per unit of each of the frame's three motions.
     """
 
     at_mm: Array
@@ -40,7 +40,7 @@ class Frame:
 
 
 def pieces_of(plate: PlaneStressPlate) -> Indices:
-    """Number the connected parts of a mesh; returned is the part of every node, in the order of `nodes_mm`."""
+    """Number the connected parts of a mesh; return the part's number for every node, in the order of `nodes_mm`."""
     dofs = plate.unknowns_of_triangles[:, :6]
     place_of = np.empty(plate.unknowns, dtype=np.int64)
     place_of[plate.x_dofs] = np.arange(plate.x_dofs.size)
@@ -52,27 +52,28 @@ def pieces_of(plate: PlaneStressPlate) -> Indices:
 
 
 def nodes_of(plate: PlaneStressPlate, frame: Frame) -> Indices:
-    """Nodes whose displacements are coupled to a frame."""
+    """Return the nodes whose displacements are coupled to a frame."""
     place_of = np.empty(plate.unknowns, dtype=np.int64)
     place_of[plate.x_dofs] = place_of[plate.y_dofs] = np.arange(plate.x_dofs.size)
     return np.asarray(place_of[np.unique(frame.rows.nonzero()[1])])
 
 
 def section_frame(plate: PlaneStressPlate, at_mm: Array, axis: Array, height_mm: float, near_mm: float) -> Frame:
-    """Frame of a cut perpendicular to an axis.
+    """Coordinate frame of a section cut perpendicular to an axis.
 
-    Its motion is the mean weighted by a beam's stress: uniform, linear and parabolic over the height.
+    The frame's motion is the mean of the section's displacements, weighted by the stresses of a beam: uniform for
+    tension, linear for bending and parabolic for shear over the height.
 
     Parameters
     ----------
     plate : PlaneStressPlate
-        The bodies.
+        The meshed bodies.
     at_mm : ndarray of float, shape (2,)
         Middle of the section.
     axis : ndarray of float, shape (2,)
         Unit vector of the beam's axis.
     height_mm, near_mm : float
-        Height of the section, and how near a node must be.
+        Height of the section, and the largest distance from the cut at which a node counts as lying on it.
     """
     normal = np.array([-axis[1], axis[0]])
     apart = plate.nodes_mm - at_mm[:, None]
@@ -107,18 +108,19 @@ def _row(plate: PlaneStressPlate, x_part: Array, y_part: Array) -> Array:
 
 
 def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], taken: set[int]) -> tuple[Frame, bool]:
-    """Frame of a face whose nodes follow one component, or both, of a rigid motion.
+    """Coordinate frame of a face whose nodes follow one component, or both components, of a rigid motion.
 
     Parameters
     ----------
     plate : PlaneStressPlate
         The bodies.
     nodes : ndarray of int
-        Of the face, all of one body.
+        Nodes of the face, all of one body.
     tied : sequence of str
-        Components that every node keeps: x, y or both; of the other only the mean is the frame's.
+        Components (x, y or both) in which every node follows the frame; in the remaining component only the nodes' mean
+        does.
     taken : set of int
-        Unknowns that another face keeps already; those of this one are added.
+        Unknowns that are already tied to another face; the unknowns of this face are added to the set.
 
     Returns
     -------

@@ -1,7 +1,8 @@
-"""Figures of changed drawings: a bar model computes the ratio by which the model's own figures change.
+"""Approximate a model's figures for drawings with changed dimensions, from the faster bar model.
 
-A meshed finger takes half a second, bars take a few milliseconds. If a figure is not finite or changes sign, or the bar
-model is wrong by more than half, the bar model's own figure is used.
+Each figure of the bar model is multiplied by a ratio: the figure of the accurate model over that of the bar model, both
+for the unchanged drawing. A model with a meshed finger takes half a second, a bar model a few milliseconds. If a figure
+is not finite, or the ratio is not between 1/2 and 2, the bar model's figure is used without a ratio.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,11 +11,12 @@ from math import isfinite
 Figures = Mapping[str, float | None]
 
 _MOST = 2.0
-"""Either way: a figure that differs so much is near zero or another thing, such as the place of a peak."""
+"""Largest ratio of two figures, or of their inverses, that is used: figures that differ by more are near zero or
+describe different things, such as a stress peak at another place."""
 
 
 def ratios(own: Figures, bars: Figures) -> dict[str, float]:
-    """Ratio of the model's own figures to those of the bar model, for the drawing; 1 where there is no ratio."""
+    """Ratio of each figure of the model to that of the bar model, for the unchanged drawing; 1 where none is usable."""
     return {name: _ratio(own[name], value) for name, value in bars.items()}
 
 
@@ -26,19 +28,19 @@ def _ratio(own: float | None, bars: float | None) -> float:
 
 
 def scaled(figures: Figures, by: Mapping[str, float]) -> dict[str, float | None]:
-    """Multiply figures by these ratios."""
+    """Multiply figures by the ratios of the same names; a figure without a ratio stays as it is."""
     return {name: None if value is None else by.get(name, 1.0) * value for name, value in figures.items()}
 
 
 def in_ratio(bars: Callable[[Mapping[str, float]], Figures], own: Figures) -> Callable[[Mapping[str, float]], Figures]:
-    """Compute figures of changed drawings from those of the bar model.
+    """Return a function that estimates the figures of changed drawings: those of the bar model times fixed ratios.
 
     Parameters
     ----------
     bars : callable
-        Changes of some numbers to figures by bars alone.
+        Maps changes of dimensions to the figures of the bar model.
     own : mapping of str to float or None
-        The model's own, of the drawing as it is.
+        Figures of the accurate model for the unchanged drawing.
     """
     by = ratios(own, bars({}))
     return lambda changes: scaled(bars(changes), by)

@@ -1,4 +1,4 @@
-"""Compliance of a tree of members: the sum of each member's compliance over the load paths that contain it."""
+"""Compliance of a tree of members: the sum of the members' compliances over the load paths that contain them."""
 
 from functools import cached_property
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class ComplianceChain:
-    """The tree of members, clamped at its root and free elsewhere.
+    """A tree of elastic members, clamped at its root and free elsewhere.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class ComplianceChain:
 
     @cached_property
     def _global(self) -> list[Array]:
-        """Compliance of every member at its end, in global axes: equation (5)."""
+        """Compliance of every member at its end, in global axes: equation (5) of Hricko and Havlik (2015)."""
         turned_all = []
         for member in self.skeleton.members:
             angle = np.arctan2(member.end_mm[1] - member.start_mm[1], member.end_mm[0] - member.start_mm[0])
@@ -34,7 +34,7 @@ class ComplianceChain:
         return turned_all
 
     def path(self, member: int) -> list[int]:
-        """Members from the clamp to the end of one."""
+        """List the members on the path from the clamp to the end of a given member."""
         path = []
         while member >= 0:
             path.append(member)
@@ -43,7 +43,7 @@ class ComplianceChain:
 
     @cached_property
     def _whole(self) -> Array:
-        """Motion of every member's end under a load at every other's, in blocks of 6, shape (6 members, 6 members)."""
+        """Motion of each member's end under loads at each member's end, in 6 by 6 blocks, shape (6 n, 6 n)."""
         members = self.skeleton.members
         paths = [set(self.path(place)) for place in range(len(members))]
         total = np.zeros((6 * len(members), 6 * len(members)))
@@ -58,12 +58,12 @@ class ComplianceChain:
         return total
 
     def flexibility(self, moved: int, loaded: int) -> Array:
-        """Motion of one member's end under a load at another's: the sum (12) over the members common to both paths.
+        """Motion of one member's end under a load at another's: sum (12) over the members common to both paths.
 
         Returns
         -------
         ndarray of float, shape (6, 6)
-            Its transpose is the flexibility with both exchanged (Maxwell and Betti).
+            The transpose is the flexibility with the two members exchanged (reciprocity theorem of Maxwell and Betti).
         """
         return self._whole[6 * moved : 6 * moved + 6, 6 * loaded : 6 * loaded + 6]
 

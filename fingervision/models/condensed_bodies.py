@@ -1,9 +1,9 @@
-"""Elastic bodies condensed to the frames that join them: a few nodes each, exact for loads applied at the frames.
+"""Elastic bodies condensed to their coordinate frames: a few unknowns each, exact for static loads at the frames.
 
 The bodies are the parts of the region that remain when the flexures are cut away. Each body is meshed with quadratic
 triangles, and its stiffness and mass are condensed statically to its frames (Guyan, AIAA Journal 3 (1965) 380). A frame
-is the mean motion of a cut, weighted by a beam's stress so that it fits the adjoining beam, or the nodes of a face that
-is fixed, slides or is driven.
+stands for the mean motion of a cut, weighted by a beam's stress so that it fits the adjoining beam, or for the motion
+of a face that is fixed, slides or is driven.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _ITERATIONS = 8
-"""The first modes of 2 n + 2 vectors are then within 1e-4 of the limit: each step leaves (w_n / w_(2n+2))^4 at most."""
+"""Iterations after which the first n modes, of the 2 n + 2 vectors iterated, have converged to 1e-4: each iteration
+reduces the error by a factor of at least (w_n / w_(2n+2))^4."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,13 +34,14 @@ class CondensedBody:
     Parameters
     ----------
     frames : tuple of int
-        Places of its frames, the first the one that its axes turn with.
+        Numbers of the body's frames; in large rotation the body's axes rotate with the first one.
     stiffness_n_mm, mass_t : ndarray of float, shape (3 m, 3 m)
-        Of small motions of its frames.
+        Stiffness and mass matrices for small motions of the body's frames.
     shapes_mm : ndarray of float, shape (unknowns of the plate, 3 m)
-        Displacements of the body by unit motions of its frames.
+        Displacements of the body for unit motions of its frames.
     solve_held : callable
-        Loads on the plate to displacements of this body, its frames held; shape (unknowns of the plate, k) each.
+        Maps loads on the plate to displacements of this body with its frames held; each of shape (unknowns of the
+        plate, k).
     """
 
     frames: tuple[int, ...]
@@ -50,7 +52,7 @@ class CondensedBody:
 
     @property
     def unknowns(self) -> Indices:
-        """Indices of the three motions (x, y, rotation) of each of its frames among those of all frames."""
+        """Indices of the three motions (x, y, rotation) of each frame of this body among the motions of all frames."""
         return np.asarray((3 * np.array(self.frames)[:, None] + np.arange(3)).ravel())
 
 
@@ -63,7 +65,7 @@ class OwnModes:
     squared : ndarray of float, shape (k,)
         Angular frequencies squared, in 1/s^2.
     coupling_t : ndarray of float, shape (3 m, k)
-        Mass that couples them with the motions of the frames.
+        Mass that couples the modes with the motions of the frames.
     """
 
     squared: Array
@@ -78,11 +80,11 @@ def condensed(
     Parameters
     ----------
     plate : PlaneStressPlate
-        All bodies.
+        The mesh of all bodies.
     unknowns : ndarray of int
-        Of this one.
+        Unknowns of the plate that belong to this body.
     frames, places : sequence
-        Its frames and their numbers.
+        The body's frames, and their numbers among all frames.
     """
     K, M = (matrix[unknowns][:, unknowns] for matrix in (plate.stiffness_n_mm, plate.mass_t))
     scale = float(K.diagonal().mean())
@@ -98,8 +100,8 @@ def condensed(
     except RuntimeError as error:
         x, y = frames[0].at_mm
         raise ModelError(
-            f"The body at ({x:.5g}, {y:.5g}) mm must be held apart by its faces and flexures, but two of them hold the "
-            "same nodes; check that no two faces or flexures lie on each other."
+            f"The body at ({x:.5g}, {y:.5g}) mm must have separate faces and flexures, but two of them share "
+            "mesh nodes; check that no two faces or flexures overlap."
         ) from error
     given = np.vstack([np.zeros((unknowns.size, motion.shape[1])), motion])
     moved = solver.solve(given)[: unknowns.size]

@@ -1,7 +1,7 @@
-"""Frictionless contact between two faces of a mechanism: gaps of nodes from segments, and their derivatives.
+"""Frictionless contact of two faces of a mechanism: gaps between nodes and segments, and their derivatives.
 
-Node to segment (Wriggers, Computational Contact Mechanics, chapter 9): the gap of every node of one face is its
-distance from the nearest straight segment of the other face, or from a rigid wall.
+The method is node-to-segment contact (Wriggers, Computational Contact Mechanics, chapter 9): the gap of a node of one
+face is its distance from the nearest straight segment of the other face, or from a rigid wall.
 """
 
 from collections.abc import Callable
@@ -21,10 +21,11 @@ Indices = NDArray[np.int64]
 Bend = Callable[[Array], csr_matrix]
 
 _OVERHANG = 0.05
-"""Of the other face's length: a node that lies farther beyond its end meets nothing. Corners that meet corners slide a
-little past each other, and would else lose hold; the face is then taken for that much longer."""
+"""Overhang, as a share of the other face's length, up to which a node beyond the end of that face can still touch it.
+Faces that meet corner to corner slide a little past each other and would otherwise lose contact; the other face is
+therefore extended by this share."""
 _PENETRATES = 1e-6
-"""Of the body's size: faces that overlap by more at rest are drawn wrongly."""
+"""Overlap of two faces at rest, as a share of the body's size, above which the drawing is refused as wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,11 +35,12 @@ class ContactPair:
     Parameters
     ----------
     name : str
-        For messages and results.
+        Name of the contact in messages and results.
     nodes : ndarray of int, shape (k,)
-        Nodes that may touch.
+        Indices of the nodes that may touch.
     segments : ndarray of int, shape (2, s)
-        Nodes at the ends of the other face's pieces, the void on their left; none where it is a wall.
+        Indices of the two end nodes of each segment of the other face, with the void to the segment's left; empty for a
+        wall.
     wall_mm : ndarray of float, shape (2, 2), or None
         Two points of a rigid wall, the void on its left.
     """
@@ -50,7 +52,7 @@ class ContactPair:
 
     @property
     def _is_end(self) -> NDArray[np.bool_]:
-        """Whether a segment's first and second node are an end of the face, shape (2, s)."""
+        """Whether the first and the second node of each segment are an end of the face, shape (2, s)."""
         if self.wall_mm is not None:
             return np.zeros((2, 1), dtype=bool)
         nodes, place, count = np.unique(self.segments, return_inverse=True, return_counts=True)
@@ -58,17 +60,17 @@ class ContactPair:
         return np.asarray(count[place].reshape(self.segments.shape) == 1)
 
     def gaps_mm(self, plate: PlaneStressPlate, moved: Array) -> tuple[Array, csr_matrix, Bend]:
-        """Gap of every node, infinite where it faces nothing, with its first and second derivatives.
+        """Gap of every node, infinite for a node that faces no segment, with its first and second derivatives.
 
         Returns
         -------
         ndarray of float, shape (k,)
-            Gaps.
+            Gap of each node (mm).
         sparse matrix, shape (k, unknowns)
-            Slopes.
+            First derivatives of the gaps by the displacements.
         callable
-            Forces on the nodes to the sum of these times the gaps' second derivatives, shape (unknowns, unknowns): the
-            other face turns its normal with it.
+            Maps forces on the nodes to the sum of force times second derivative of the gap, shape (unknowns, unknowns);
+            the second derivatives arise because the normal rotates with the other face.
         """
         at = plate.nodes_mm + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
         points = at[:, self.nodes]
@@ -98,7 +100,7 @@ class ContactPair:
         places = np.stack([self.nodes, *segments])
 
         def combined(weights: Array, direction: Array) -> csr_matrix:
-            """Weighted motions of a node and of its segment's ends along a direction, one row per node."""
+            """Weighted sums of the motions of a node and its segment's ends along a direction, one row per node."""
             values = weights[:, None, :] * direction[None]
             columns = np.stack([plate.x_dofs[places], plate.y_dofs[places]], axis=1)
             rows = np.broadcast_to(row, values.shape)
@@ -119,12 +121,12 @@ class ContactPair:
 
 
 def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism, size_mm: float) -> ContactPair:
-    """Find the nodes of a contact in the drawing.
+    """Find the nodes and segments of a contact that the drawing defines.
 
     Raises
     ------
     DataError
-        Where a face holds none, or the faces overlap at rest.
+        If a face has no node, or the faces overlap at rest, or a wall lies behind its face.
     """
     nodes = nodes_on(plate, contact.face, mechanism, size_mm)
     if contact.wall_mm is not None:
@@ -148,7 +150,8 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, wanted), axis=0)]
         if edges.shape[1] == 0 or np.intersect1d(nodes, wanted).size:
             raise DataError(
-                f"contact {contact.name} of {mechanism.name} must be between two faces that share nothing, but they do."
+                f"contact {contact.name} of {mechanism.name} must be between two faces with no common part, "
+                "but they have one."
             )
         # The body lies on the right of an edge that runs so that the void is on its left.
         segments = np.hstack([edges[[0, 2]], edges[[2, 1]]])

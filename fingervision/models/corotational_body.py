@@ -1,8 +1,8 @@
-"""A condensed body in large rotation: in axes that rotate with its first frame it stays linear.
+"""A condensed body in large rotation: linear elasticity in axes that rotate with the body's first frame.
 
 The corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures, volume 1,
 section 7.3) for an element with any number of nodes: the energy is d' K d / 2, with d the frames' motions relative to
-the first frame.
+the first frame and K the stiffness matrix.
 """
 
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ def turned_axes(angle: float) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorotationalBody:
-    """One body.
+    """One condensed body in large rotation.
 
     Parameters
     ----------
     places_mm : ndarray of float, shape (m, 2)
-        Its frames at rest.
+        Positions of the body's frames at rest.
     stiffness_n_mm : ndarray of float, shape (3 m, 3 m)
-        Of small motions; rigid ones cost nothing.
+        Stiffness for small motions of the frames; rigid motions cause no force.
     """
 
     places_mm: Array

@@ -17,16 +17,16 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class CorotationalFrame:
-    """Nodes with displacements x, y and rotation, and the elements between them.
+    """A plane frame structure: nodes with displacements x, y and rotation, and the elements between them.
 
     Parameters
     ----------
     nodes_mm : ndarray of float, shape (n, 2)
-        Places at rest; unknowns are ordered x, y, rotation, node by node.
+        Positions of the nodes at rest; unknowns are ordered x, y, rotation, node by node.
     ends : ndarray of int, shape (m, 2)
-        Nodes of each element.
+        Indices of the two nodes of each element.
     end_compliance : ndarray of float, shape (m, 3, 3)
-        Compliance of each element at its second node, the first fixed: along, across, rotation.
+        Compliance of each element at its second node with the first node fixed: along the element, across it, rotation.
     """
 
     nodes_mm: Array
@@ -54,7 +54,7 @@ class CorotationalFrame:
 
     @property
     def unknowns(self) -> int:
-        """Three a node."""
+        """Number of unknowns: three per node."""
         return 3 * len(self.nodes_mm)
 
     def internal_force_n(self, displacement: Array) -> tuple[csr_matrix, Array]:
@@ -87,7 +87,7 @@ class CorotationalFrame:
         return np.asarray(np.einsum("mij,mj->mi", self._natural, self._deformation(displacement)[0]))
 
     def _deformation(self, displacement: Array) -> tuple[Array, Array, Array, Array]:
-        """Elongation and end rotations from the chord, shape (m, 3); the chord's cosine, sine and length."""
+        """Elongation and end rotations relative to the chord, shape (m, 3); chord's cosine, sine and length."""
         local = displacement[self._dofs]
         at_rest = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
         drift = local[:, 3:5] - local[:, 0:2]

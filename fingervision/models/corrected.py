@@ -9,22 +9,22 @@ from fingervision.domain.parameter import Estimate
 
 @dataclass(frozen=True, slots=True)
 class CorrectedModel:
-    """A base model and the effects added to it, by name; the measuring chain of the diagnosis evaluates them.
+    """A base model and the parameters of the effects added to it; the diagnosis evaluates the effects.
 
     Parameters
     ----------
     name : str
-        How the report calls it.
+        Name of the model in the report.
     base : Model
         The gripper without effects.
     base_path : str
-        File of the base model.
+        Path of the base model's file.
     input_range_mm : tuple of two floats
-        Inputs that the base covers.
+        Smallest and largest input that the base model covers.
     effects : mapping of str to mapping of str to Estimate
-        Parameters of each effect.
+        Estimated parameters of each effect, by the names of effect and parameter.
     kind : str or None
-        Kind of gripper model that the base was tabulated from; None for a simulation table.
+        Kind of gripper model from which the base was tabulated; None for a base made from a simulation table.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Range of inputs for which an elastic model of a gripper is meant."""
+"""Range of inputs for which an elastic model of a gripper is valid."""
 
 from fingervision.domain.gripper import Gripper
 
@@ -8,10 +8,11 @@ _OF_HEIGHT = 0.01
 
 
 def covered_inputs_mm(gripper: Gripper, first_touch_mm: float | None) -> tuple[float, float]:
-    """Smallest and largest input: to 1.5 times the input of first touch, and to five times it in the other direction.
+    """Smallest and largest valid input: 1.5 times the input of first touch, and five times it in the other direction.
 
-    For the published gripper this is -0.77 to 2.6 mm, where its hinges begin to yield; the models give values beyond as
-    well, which are not to be trusted. If nothing touches, it is a hundredth of the height in either direction.
+    For the published gripper the range is -0.77 to 2.6 mm; its hinges begin to yield at the upper end. The models also
+    compute results outside the range, which are not to be trusted. For a gripper whose fingers never touch, the range
+    is a hundredth of the height in either direction.
     """
     if first_touch_mm is None:
         return -_OF_HEIGHT * gripper.body.height_mm, _OF_HEIGHT * gripper.body.height_mm

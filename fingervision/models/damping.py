@@ -1,4 +1,6 @@
-"""Damping of the gripper's vibrations: modal ratio, Rayleigh, loss factor, and equation (4) of Hricko & Havlik (2015).
+"""Damping of the gripper's vibrations: four damping laws.
+
+These are a constant modal ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko & Havlik (2015).
 
 PA12 at room temperature has a loss factor tan d = 0.03 to 0.08, so that zeta = tan d / 2 is about 0.025; static results
 do not depend on damping.
@@ -42,14 +44,14 @@ class LossFactor:
 
 @dataclass(frozen=True, slots=True)
 class RayleighDamping:
-    """C = a M + b K, with equal damping ratios at two frequencies; lower ratios between them, higher ones beyond.
+    """Rayleigh damping C = a M + b K, fitted to equal ratios at two frequencies; lower between them, higher beyond.
 
     Parameters
     ----------
     ratio : float
-        At both frequencies.
+        Damping ratio at the two frequencies.
     low_rad_s, high_rad_s : float
-        The frequencies.
+        The two frequencies at which the ratio is reached.
     """
 
     ratio: float
@@ -73,7 +75,7 @@ class RayleighDamping:
 
 @dataclass(frozen=True, slots=True)
 class PaperDamping:
-    """Equation (4), evaluated mode by mode: 2 zeta w = gamma w0 c(w / w0).
+    """Equation (4) of Hricko & Havlik (2015), evaluated mode by mode: 2 zeta w = gamma w0 c(w / w0).
 
     The equation is an illustrative example of a theory (S. Adhikari, J. Sound Vib. 293 (2006) 156), not a material law.
     It adds powers of w that have different units, so that its result would depend on the unit of time; frequencies are
@@ -83,7 +85,7 @@ class PaperDamping:
     Parameters
     ----------
     reference_rad_s : float or None
-        The frequency w0; the lowest of the modes that it is asked for where None.
+        Reference frequency w0; None takes the lowest of the modes to be damped.
     gamma : float
         Dimensionless factor; zeta(w0) = 0.045 gamma.
     """
@@ -97,7 +99,7 @@ class PaperDamping:
         Raises
         ------
         ModelError
-            Where a mode lies below w0 or its ratio outside (0, 0.3).
+            If a mode lies below w0, or its damping ratio is outside (0, 0.3).
         """
         reference_rad_s = float(rad_s.min()) if self.reference_rad_s is None else self.reference_rad_s
         relative = rad_s / reference_rad_s
@@ -112,8 +114,8 @@ class PaperDamping:
 def paper_rate(w: float) -> float:
     """Equation (4) for one mode: 2 zeta w of the dimensionless frequency w, term by term.
 
-    exp(-w^4 / 2) sinh((4/3) ln(w) / w^2) + w^(3/2) cos^2(1 / w^2) atan(w / pi); the paper's last argument,
-    sqrt(M^-1 K) / pi, is w / pi.
+    exp(-w^4 / 2) sinh((4/3) ln(w) / w^2) + w^(3/2) cos^2(1 / w^2) atan(w / pi); for one mode, the last argument
+    sqrt(M^-1 K) / pi of the paper becomes w / pi.
     """
     first = 0.0 if w**4 > 2.0 * _SINH_UNDERFLOWS_ABOVE else exp(-(w**4) / 2.0) * sinh(4.0 / 3.0 * log(w) / w**2)
     return first + float(w**1.5) * cos(1.0 / w**2) ** 2 * atan(w / pi)
@@ -125,7 +127,7 @@ def checked(ratios: Array) -> Array:
     Raises
     ------
     ModelError
-        For others.
+        If a damping ratio is outside this range.
     """
     if np.any(ratios <= 0.0) or np.any(ratios >= _MOST):
         worst = ratios[np.argmax(np.abs(ratios))]

@@ -1,4 +1,4 @@
-"""Short text of a damping law, as given to `model --damping`."""
+"""Parse the short text of a damping law that is given to `model --damping`."""
 
 from math import isfinite, pi
 
@@ -16,12 +16,12 @@ def parse_damping(text: str) -> Damping:
     ----------
     text : str
         `modal:RATIO`, `loss:FACTOR` (twice the ratio), `rayleigh:RATIO:HZ:HZ`, `paper` or `paper:GAMMA`: equation (4)
-        of the paper relative to the lowest mode that vibrates.
+        of Hricko & Havlik (2015) relative to the lowest vibrating mode.
 
     Raises
     ------
     UsageError
-        Where it is none of these, or its ratio is none of a solid.
+        If the text has none of these forms, or its damping ratio is not possible for a solid.
     """
     law, *parts = text.split(":")
     try:

@@ -1,10 +1,10 @@
 """Out-of-plane motion of a plate of any depth: quadratic triangles in the plane, polynomials through the depth.
 
 Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with Legendre polynomials P_k: odd ones for in-plane
-components, even ones for the out-of-plane component. These describe bending, torsion and shear of a plate that is
-symmetric about its middle plane. The solution converges to three-dimensional elasticity as the order grows (hierarchic
-plate models: Babuska and Li, Comput. Methods Appl. Mech. Eng. 100 (1992) 249), without the assumptions of plate or beam
-theory: torsion of a deep neck includes restrained warping, and bodies bend right up to their junctions.
+components, even ones for the out-of-plane component. This parity describes bending, torsion and shear of a plate that
+is symmetric about its middle plane. The solution converges to three-dimensional elasticity as the order grows
+(hierarchic plate models: Babuska and Li, Comput. Methods Appl. Mech. Eng. 100 (1992) 249), without the assumptions of
+plate or beam theory: torsion of a deep neck includes restrained warping, and bodies bend right up to their junctions.
 """
 
 from functools import cached_property
@@ -25,27 +25,27 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _ORDER = 3
-"""Of the polynomials along the plane; across it one less. The first mode of the paper's sample is then 0.04 % above
-that of order 5, and of hinges 1 to 20 times as wide as thick within 0.2 % of CalculiX's wedges
-(`tests/benchmarks/models_three_dimensions.py`); order 1 is 7 % too high."""
+"""Order of the polynomials through the depth for the in-plane components; one less for the out-of-plane component. The
+first mode of the published sample is then 0.04 % above that of order 5, and for hinges 1 to 20 times as wide as thick
+within 0.2 % of CalculiX's wedge elements (`tests/benchmarks/models_three_dimensions.py`); order 1 is 7 % too high."""
 
 _NEAREST = 12
-"""Nodes that a quadratic is laid through, twice what it needs."""
+"""Number of nodes to which a quadratic is fitted: twice its number of coefficients."""
 
 
 class DeepPlate:
-    """A meshed plate that moves out of its plane.
+    """A meshed plate that deforms out of its plane.
 
     Parameters
     ----------
     mesh : PlaneMesh
-        Quadratic triangles.
+        Mesh of quadratic triangles.
     material : Material
-        Linear elastic.
+        Linear elastic material.
     plate_mm : float
-        Depth.
+        Depth of the plate (out of the plane).
     order : int
-        Of the polynomials along the plane, odd.
+        Odd order of the polynomials through the depth for the in-plane components.
     """
 
     def __init__(self, mesh: PlaneMesh, material: Material, plate_mm: float, order: int = _ORDER) -> None:
@@ -79,7 +79,7 @@ class DeepPlate:
 
     @cached_property
     def _plane(self) -> dict[tuple[int, int], csr_matrix]:
-        """Integrals over the plane of products of shape functions, differentiated by x (0), y (1) or neither (2)."""
+        """Integrals of products of two shape functions, each differentiated by x (0), y (1) or neither (2)."""
 
         def part(shape: Any, way: int) -> Any:
             return shape if way == 2 else shape.grad[way]
@@ -94,7 +94,7 @@ class DeepPlate:
 
     @cached_property
     def stiffness_n_mm(self) -> csr_matrix:
-        """Linear stiffness matrix by Hooke's law in three dimensions."""
+        """Linear stiffness matrix by Hooke's law in three dimensions (N/mm)."""
         E, nu = self.material.youngs_modulus_mpa, self.material.poisson_ratio
         lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.material.shear_modulus_mpa
 
@@ -133,7 +133,7 @@ class DeepPlate:
         return float(np.linalg.lstsq(around / scale, values, rcond=None)[0][0] / scale[0])
 
     def supported(self, held: Indices) -> "SupportedPlate":
-        """Hold some coefficients."""
+        """Return the plate with the given coefficients fixed to zero."""
         return SupportedPlate(self, np.setdiff1d(np.arange(self.unknowns), held))
 
 
@@ -145,7 +145,7 @@ class SupportedPlate:
     plate : DeepPlate
         The plate.
     free : ndarray of int
-        Coefficients that nothing holds.
+        Indices of the coefficients that are not fixed.
     """
 
     def __init__(self, plate: DeepPlate, free: Indices) -> None:
@@ -154,7 +154,7 @@ class SupportedPlate:
         self._factors = factorised(self._stiffness)
 
     def modes_hz(self, count: int) -> tuple[float, ...]:
-        """First natural frequencies."""
+        """Lowest natural frequencies (Hz)."""
         free = self._free
         mass = self._plate.mass_t[free][:, free].tocsc()
         inverse = LinearOperator(mass.shape, self._factors.solve, dtype=np.float64)
@@ -163,7 +163,7 @@ class SupportedPlate:
         return tuple((np.sqrt(np.sort(squared)) / (2.0 * np.pi)).tolist())
 
     def sag(self, gravity_mm_s2: float) -> Array:
-        """Displacements under the plate's own weight across its plane, shape (unknowns of the plate,)."""
+        """Displacements under the plate's own weight perpendicular to the plate, shape (unknowns of the plate,)."""
         plate = self._plate
         load = gravity_mm_s2 * (plate.mass_t @ plate.lifted)
         moved = np.zeros(plate.unknowns)

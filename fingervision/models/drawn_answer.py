@@ -1,4 +1,4 @@
-"""Input of a law of the drawing: the drawing, its small-displacement response, and its body in the deformed shape."""
+"""Inputs of a law that depends on the drawing: the drawing, its elastic body and its response to a changed lever."""
 
 from dataclasses import dataclass
 
@@ -10,20 +10,21 @@ from fingervision.models.small_answer import RatioCurves
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnAnswer:
-    """Response of a drawing, as computed by one kind of model.
+    """A drawing and its elastic response, as computed by one kind of model.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
     body : DrivenBody
-        The right half, as the kind of model has it.
+        The elastic right half, as this kind of model computes it.
     input_range_mm : (float, float)
-        Inputs that the model is meant for.
+        Smallest and largest input for which the model is valid.
     lever : RatioCurves or None
-        Along a change of the lever's length l2: the link that the amplification hangs on.
+        Ratio of changed to unchanged response over the input, for a change of the length l2 of the lever arm that
+        determines the amplification.
     """
 
     gripper: Gripper

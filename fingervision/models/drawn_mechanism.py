@@ -1,4 +1,4 @@
-"""A mechanism drawn by bodies as a model for the diagnosis, with access to its hinges, links and bodies."""
+"""Model for the diagnosis of a mechanism whose drawing names its hinges, links and bodies."""
 
 from functools import cached_property
 from typing import Protocol, runtime_checkable
@@ -22,28 +22,29 @@ GAP = "gap"
 
 @runtime_checkable
 class DrawnMechanism(Protocol):
-    """A model whose drawing states its hinges, links and bodies."""
+    """A model whose drawing names its hinges, links and bodies."""
 
     @property
     def places(self) -> PlaceAnswers:
-        """Predictions with a hinge, link or body of the drawing changed."""
+        """Predictions of the gap with a hinge, link or body of the drawing changed."""
         ...
 
 
 class MechanismModelOfGap:
-    """A mechanism with a probe pair called gap, by small displacements.
+    """Model of a mechanism that has a probe pair named `gap`, for small displacements.
 
     Parameters
     ----------
     mechanism : Mechanism
         The drawing.
     kind : str
-        Kind of model that answers for the gap; places are the lumped model's, whatever the kind.
+        Kind of model that computes the gap; predictions for changed hinges, links and bodies always come from the
+        lumped model.
 
     Raises
     ------
     FingervisionError
-        Where no pair is called gap.
+        If the mechanism has no probe pair named `gap`.
     """
 
     def __init__(self, mechanism: Mechanism, kind: str) -> None:
@@ -79,12 +80,12 @@ class MechanismModelOfGap:
         self._force_n = state.force_n
 
     def respond(self, input_mm: Array) -> Response:
-        """Respond by small displacements, with the midline at zero at rest."""
+        """Compute the response for small displacements; the midline is zero at zero input."""
         u = np.asarray(input_mm, dtype=float)
         half = 0.5 * self._rest_mm
         return Response(-half + self._left * u, half + self._right * u, self._force_n * u)
 
     @cached_property
     def places(self) -> PlaceAnswers:
-        """Predictions with a hinge, link or body of the drawing changed."""
+        """Predictions of the gap with a hinge, link or body of the drawing changed."""
         return PlaceAnswers(self.mechanism, self._model if isinstance(self._model, MechanismFrame) else None)

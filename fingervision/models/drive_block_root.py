@@ -1,9 +1,9 @@
-"""Compliance of the drive block at the root of the shuttle bar, which the bar's own compliance omits.
+"""Extra compliance where the shuttle bar joins the drive block, because the block itself deforms.
 
-The block is hardly larger than the bar is wide, so that no formula for a root on a half plane (O'Donnell, J. Appl.
-Mech. 27 (1960) 764) holds. The block is meshed with a stub of the bar, as long as Saint-Venant's principle requires,
-fixed at its drive face and on the symmetry axis; the bar's own compliance is subtracted from the compliance at the
-stub's end. The result depends on geometry only, and is computed once per block.
+The block is hardly larger than the bar is wide, so that the formula for a bar rooted in a half plane (O'Donnell, J.
+Appl. Mech. 27 (1960) 764) does not hold. The block is meshed with a stub of the bar, as long as Saint-Venant's
+principle requires, fixed at its drive face and on the symmetry axis; the bar's own compliance is subtracted from the
+compliance at the stub's end. The result depends on geometry only, and is computed once per block.
 """
 
 from dataclasses import dataclass
@@ -26,31 +26,33 @@ Array = NDArray[np.float64]
 
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _STUB = 1.5
-"""Widths of the bar: a self-balanced load has decayed to 0.2 % there (Timoshenko and Goodier, article 26)."""
+"""Length of the stub in widths of the bar: a self-balanced load has decayed to 0.2 % there (Timoshenko and Goodier,
+article 26)."""
 _ACROSS, _BODY = 2.0, 0.12
-"""Triangles across and edge length over the size: within 2 % of a mesh twice as fine, which is
-0.01 % of the gap per input of the paper's sample."""
+"""Triangles across the thinnest part, and edge length over the block's size: the compliance is then within 2 % of that
+of a mesh twice as fine, which changes the gap per input of the published sample by 0.01 %."""
 _DIGITS = 12
-"""Of a block's numbers: two drawings that differ by rounding have the same block."""
+"""Digits to which the dimensions of a block are rounded, so that drawings that differ by rounding share one block."""
 _NEAR = 1e-7
 _LEAST = 1e-3
-"""Of the largest eigenvalue: no direction is stiffer than that, which keeps the frame well conditioned."""
+"""Least eigenvalue of the compliance as a share of the largest: it bounds the stiffness in every direction, which keeps
+the frame's equations well conditioned."""
 
 
 @dataclass(frozen=True, slots=True)
 class BlockShape:
-    """Dimensions of block and shuttle divided by the shuttle's width, from the centre of the drive face.
+    """Dimensions of block and shuttle, divided by the shuttle's width; the origin is the centre of the drive face.
 
     Parameters
     ----------
     half_width, low, high : float
-        Of the block.
+        Half width of the block, and the positions of its lower and upper side.
     start, end : (float, float)
         Ends of the shuttle's axis.
     face_half : float
-        Half width of the drive's face.
+        Half width of the drive face.
     poisson : float
-        Of the material.
+        Poisson's ratio of the material.
     """
 
     half_width: float
@@ -99,12 +101,12 @@ def drive_block_compliance(gripper: Gripper, unit: Array | None = None) -> Array
     gripper : Gripper
         The drawing.
     unit : ndarray of float, shape (3, 3), or None
-        `unit_compliance` of its block, where known already.
+        Result of `unit_compliance` for this block, if already computed.
 
     Returns
     -------
     ndarray of float, shape (3, 3)
-        Motion x, y, rotation by load there, in the ground's axes.
+        Motion (x, y, rotation) of that point per unit load at it, in global axes.
     """
     turned = np.array([1.0, 1.0, 1.0 / gripper.links.shuttle_width_mm])
     unit = unit_compliance(block_shape(gripper)) if unit is None else unit
@@ -113,7 +115,7 @@ def drive_block_compliance(gripper: Gripper, unit: Array | None = None) -> Array
 
 @lru_cache(maxsize=256)
 def unit_compliance(shape: BlockShape) -> Array:
-    """The same compliance for unit modulus, plate thickness and shuttle width; shape (3, 3)."""
+    """Compliance that the block adds, for unit modulus, plate thickness and shuttle width; shape (3, 3)."""
     material = Material("unit", 1.0, shape.poisson, 1.0, 1.0)
     entry = np.array(shape.entry)
     along = np.subtract(shape.end, shape.start) / np.hypot(*np.subtract(shape.end, shape.start))

@@ -18,9 +18,11 @@ from fingervision.models.drive_block_root import block_shape, unit_compliance
 Array = NDArray[np.float64]
 
 _NODES = 5
-"""Along a number: beside the block itself within 1 % for a third more or less of a link's length."""
+"""Chebyshev points per dimension: the interpolated compliance is then within 1 % of the computed one for a change of a
+link's length by a third."""
 _TOLERANCE = 0.03
-"""Of the largest entry, at the points that are tried: 2 % is what the meshes of a block leave (`drive_block_root`)."""
+"""Largest error of the interpolation at the test points, as a share of the largest entry; the finite size of the
+block's mesh alone causes 2 % (`drive_block_root`)."""
 _TRIED = 3
 _SAME = 1e-9
 
@@ -33,15 +35,15 @@ def block_compliances(drawn: Callable[[Sequence[float]], Gripper], axes: Sequenc
     Parameters
     ----------
     drawn : callable
-        Values to the drawing that has them.
+        Maps values of the varied dimensions to the drawing that has them.
     axes : sequence of sequence of float
-        Values that each number takes.
+        Values that each varied dimension takes.
 
     Returns
     -------
     callable
-        Values to the unit compliance, shape (3, 3); None where it is to be computed for the drawing itself, because the
-        grid is too small for an interpolation or the block changes too abruptly.
+        Maps values to the unit compliance, shape (3, 3). It returns None if the compliance must be computed for each
+        drawing separately, because the grid is too small for an interpolation or the compliance changes too abruptly.
     """
     changing = [place for place in range(len(axes)) if _changes(drawn, axes, place)]
     if not changing or int(np.prod([len(axes[place]) for place in changing])) <= 2 * _NODES ** len(changing):
@@ -81,7 +83,7 @@ def block_compliances(drawn: Callable[[Sequence[float]], Gripper], axes: Sequenc
 
 
 def _changes(drawn: Callable[[Sequence[float]], Gripper], axes: Sequence[Sequence[float]], place: int) -> bool:
-    """Whether a dimension changes the block's shape."""
+    """Whether varying a dimension over its range changes the block's shape."""
     values = [float(row[0]) for row in axes]
     shapes = []
     for value in (min(axes[place]), float(np.mean(axes[place])), max(axes[place])):
@@ -91,7 +93,7 @@ def _changes(drawn: Callable[[Sequence[float]], Gripper], axes: Sequence[Sequenc
 
 
 def _lagrange(nodes: Array, at: float) -> Array:
-    """Lagrange weights of the values at the nodes for a polynomial's value at a point."""
+    """Lagrange weights by which values at the nodes are summed to the interpolating polynomial's value at a point."""
     apart = nodes[:, None] - nodes[None, :] + np.eye(nodes.size)
     way = np.where(np.eye(nodes.size, dtype=bool), 1.0, at - nodes[None, :])
     return np.asarray(np.prod(way / apart, axis=1))

@@ -1,4 +1,4 @@
-"""An elastic half gripper, guided and driven: its unknowns, supports, small displacements, contact and modes."""
+"""An elastic half gripper with supports and drive: its small displacements, contact and vibration modes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -52,28 +52,31 @@ class DrivenBody:
     Parameters
     ----------
     stiffness_n_mm : sparse matrix, shape (unknowns, unknowns)
-        Of small motions.
+        Stiffness matrix for small motions.
     assemble_mass : callable
-        The mass matrix in tonnes, made when it is first asked for: static answers need none.
+        Returns the mass matrix in tonnes; called when it is first needed, because static results do not need it.
     tangent : callable
-        Displacements to tangent stiffness and internal forces, in the deformed shape.
+        Maps displacements to the tangent stiffness and the internal forces in the deformed shape.
     driven, free : ndarray of int
-        Unknowns that move by the input, and that nothing holds; the others are held.
+        Indices of the unknowns that move by the input, and of those that are free; all others are fixed.
     swaying : ndarray of int
-        Unknowns that nothing holds while both halves move the same way sideways, the drive with them: the symmetry axis
-        then cannot move along itself, and the actuator guides nothing across.
+        Indices of the unknowns that are free while both halves and the drive move the same way sideways (antisymmetric
+        modes): points on the symmetry axis then cannot move along the axis, and the actuator does not guide the drive
+        sideways.
     face, face_rest_mm : ndarray
-        Unknowns across the symmetry plane of the points that may touch it, and their distances from it at rest.
+        Unknowns (perpendicular to the symmetry plane) of the points that may touch that plane, and the points'
+        distances from the plane at rest.
     measured, weights : ndarray
-        Unknowns whose weighted sum is the motion of the measuring point across the symmetry plane.
+        Unknowns and weights whose weighted sum is the motion of the measuring point perpendicular to the symmetry
+        plane.
     measured_rest_mm : float
-        Its distance from the symmetry plane at rest.
+        Distance of the measuring point from the symmetry plane at rest.
     nodes : ndarray of int, shape (nodes, 2)
-        Unknowns along x and y of every node.
+        Indices of the unknowns along x and y of every node.
     nodes_mm : ndarray of float, shape (nodes, 2)
-        Their places at rest.
+        Positions of the nodes at rest.
     nodal_force : callable or None
-        Displacements to internal forces alone, where that is less work than with the tangent.
+        Maps displacements to internal forces without the tangent, where that is faster.
     """
 
     stiffness_n_mm: csr_matrix
@@ -92,17 +95,17 @@ class DrivenBody:
     nodal_force: Callable[[Array], Array] | None = None
 
     def internal_force_n(self, displacement: Array) -> Array:
-        """Internal forces in the deformed shape, without the tangent matrix where the body can omit it."""
+        """Internal forces in the deformed shape, computed without the tangent matrix where that is possible."""
         return self.tangent(displacement)[1] if self.nodal_force is None else self.nodal_force(displacement)
 
     @cached_property
     def paths(self) -> dict[tuple[float, float, bool, int], list[Equilibrium]]:
-        """Cache of equilibria in the deformed shape, by first and last input, contact and number of steps."""
+        """Cache of equilibria in the deformed shape, by first input, last input, contact and number of steps."""
         return {}
 
     @cached_property
     def touches(self) -> dict[float, Equilibrium]:
-        """Cache of first touches in the deformed shape, by the initial estimate."""
+        """Cache of the inputs of first touch in the deformed shape; the key is the initial estimate of that input."""
         return {}
 
     @property
@@ -133,9 +136,9 @@ class DrivenBody:
 
     @cached_property
     def face_displacement_mm(self) -> Array:
-        """Small displacements of the whole body with the drive fixed, under a unit force on each face point.
+        """Small displacements of the body with the drive fixed, under a unit force on one face point after another.
 
-        One column each.
+        There is one column for each face point.
         """
         loads = np.zeros((self.unknowns, self.face.size))
         loads[self.face, np.arange(self.face.size)] = 1.0
@@ -144,7 +147,7 @@ class DrivenBody:
         return moved
 
     def at_rest(self) -> Equilibrium:
-        """Return the undeformed body."""
+        """Return the equilibrium at zero input: the undeformed body."""
         return Equilibrium(0.0, np.zeros(self.unknowns), 0.0, np.zeros(self.face.size))
 
     def face_gap_mm(self, displacement_mm: Array) -> Array:
@@ -156,7 +159,7 @@ class DrivenBody:
         return float(self.measured_rest_mm + self.weights @ displacement_mm[self.measured])
 
     def equilibrium(self, input_mm: float, *, contact: bool = False) -> Equilibrium:
-        """Small displacements at one input; with contact, the symmetry plane stops the fingers."""
+        """Equilibrium at one input by small displacements; with `contact`, the symmetry plane stops the fingers."""
         moved = input_mm * self.unit_displacement_mm
         pressed = np.zeros(self.face.size)
         free_gap = self.face_gap_mm(moved)
@@ -168,14 +171,14 @@ class DrivenBody:
         return Equilibrium(input_mm, moved, force_n, pressed)
 
     def first_touch_mm(self) -> float | None:
-        """Input at which the first face point meets the symmetry plane (mm); None where none moves towards it."""
+        """Input at which the first face point meets the symmetry plane (mm); None if no face point moves towards it."""
         slope = self.unit_displacement_mm[self.face]
         if np.all(slope <= 0.0):
             return None
         return float(np.max(-self.face_rest_mm[slope > 0.0] / slope[slope > 0.0]))
 
     def unknowns_in_motion(self, *, drive_held: bool) -> Indices:
-        """Unknowns that can vibrate."""
+        """Indices of the unknowns that take part in vibrations, with the drive held or free along its axis."""
         return self.free if drive_held else np.union1d(self.free, self.driven)
 
     def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
@@ -198,7 +201,7 @@ class DrivenBody:
         return self._modes_among(self.unknowns_in_motion(drive_held=drive_held), count)
 
     def swaying_modes(self, *, count: int) -> tuple[Array, Array]:
-        """First antisymmetric natural modes, with the drive free to move sideways; returns as `modes` does."""
+        """First antisymmetric natural modes, with the drive free to move sideways; same return values as `modes`."""
         return self._modes_among(self.swaying, count)
 
     def _modes_among(self, free: Indices, count: int) -> tuple[Array, Array]:

@@ -14,18 +14,18 @@ from fingervision.domain.gripper import Material, SNLine
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """Number of cycles that a flexure endures.
+    """Number of load cycles that a flexure endures.
 
     Parameters
     ----------
     amplitude_mpa, mean_mpa : float
-        Of the stress in the cycle.
+        Amplitude and mean of the stress over a cycle.
     reversed_mpa : float
-        Fully reversed amplitude that does the same damage; infinite where the cycle yields.
+        Fully reversed amplitude that does the same damage; infinite where the cycle causes yielding.
     cycles : float or None
-        Median life; None where the S-N line does not say.
+        Median life; None outside the range of the S-N line.
     at_least, at_most : float or None
-        What is known where the line ends: more than its last, fewer than its first cycles.
+        Bounds outside the range of the S-N line: more cycles than its last point, or fewer than its first.
     """
 
     amplitude_mpa: float
@@ -37,7 +37,7 @@ class Endurance:
 
     @property
     def words(self) -> str:
-        """The number of cycles in words."""
+        """Describe the endured number of cycles as text."""
         if self.cycles is not None:
             return f"about {self.cycles:.2g} cycles"
         if self.at_least is not None:
@@ -46,12 +46,12 @@ class Endurance:
 
 
 def endurance(material: Material, lowest_mpa: float, highest_mpa: float) -> Endurance | None:
-    """Number of cycles for a stress that alternates between two values, from the material's S-N line.
+    """Number of cycles endured if the stress alternates between two values, from the material's S-N line.
 
     Parameters
     ----------
     material : Material
-        With its S-N line; None is returned without one.
+        Material; None is returned for a material without an S-N line.
     lowest_mpa, highest_mpa : float
         Signed stress at the two ends of the cycle.
     """

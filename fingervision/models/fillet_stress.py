@@ -3,8 +3,8 @@
 The values come from plane finite elements (`tests/benchmarks/models_fillet_table.py`), because the usual charts
 (Pilkey, Peterson's Stress Concentration Factors, charts 3.1 and 3.7) end at shoulders of three heights. Between the
 table's nodes, the excess of the factors over 1 is interpolated over the logarithms of radius / thickness and depth /
-radius. Beyond its ends it is extrapolated as a power of the radius, because the stress at a sharp corner has no limit,
-and held constant over the depth.
+radius. Beyond the table's ends the excess is extrapolated as a power of the radius, because the stress at a sharp
+corner is unbounded, and held constant over the depth.
 """
 
 import numpy as np
@@ -14,9 +14,9 @@ from scipy.interpolate import RegularGridInterpolator
 Array = NDArray[np.float64]
 
 RADII = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
-"""Of the fillet, in thicknesses of the neck."""
+"""Fillet radii of the table, divided by the thickness of the neck."""
 DEPTHS = (1.0, 1.5, 3.0, 8.0)
-"""Of the shoulder, in radii."""
+"""Depths of the shoulder of the table, divided by the fillet radius."""
 _FACTORS = (
     ((1.9725, 1.7687), (2.1170, 1.8355), (2.3616, 1.9162), (2.6177, 1.9518)),
     ((1.8162, 1.5461), (1.8996, 1.5644), (2.0103, 1.5778), (2.0912, 1.5752)),
@@ -26,7 +26,8 @@ _FACTORS = (
     ((1.0849, 1.0484), (1.0849, 1.0485), (1.0851, 1.0486), (1.0850, 1.0487)),
     ((1.0437, 1.0249), (1.0435, 1.0247), (1.0435, 1.0251), (1.0435, 1.0248)),
 )
-"""In tension and in bending, by radius, then by depth; of a neck whose two ends do not see each other."""
+"""Stress concentration factors (tension, bending), by radius, then by depth, for a neck so long that the stresses at
+its two ends do not influence each other."""
 
 
 def fillet_factors(thickness_mm: float, fillet_mm: float, depth_mm: float) -> tuple[float, float]:
@@ -35,9 +36,10 @@ def fillet_factors(thickness_mm: float, fillet_mm: float, depth_mm: float) -> tu
     Parameters
     ----------
     thickness_mm, fillet_mm : float
-        Of the neck, and the radius of its corners; without a radius there is no limit, and both factors are 1.
+        Thickness of the neck, and radius of its corners; at radius 0 the stress is unbounded, and both factors are
+        returned as 1.
     depth_mm : float
-        From the neck's surface to the shoulder's end.
+        Depth of the shoulder, from the neck's surface.
     """
     if fillet_mm <= 0.0:
         return 1.0, 1.0

@@ -2,9 +2,9 @@
 
 Bars that bend up to where their axes meet do not represent the joint of root, cross bar, shuttle and finger, which are
 as wide as they are long: the force on a gripped part would be up to a third too low. The body is cut from the drawing
-at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380) to the cuts, the tip's
-inner face, and mean motions of a few patches in between, which carry its mass. The other nodes of the bars follow its
-motion, for pictures and poses.
+at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380) to the motions of the
+cuts, of the tip's inner face, and of a few patches in between, which carry the body's mass. The remaining nodes of the
+bar model follow the body's motion; they serve pictures and poses.
 """
 
 from dataclasses import dataclass, replace
@@ -33,32 +33,33 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _OTHERS = ("pillar", "hinge 1", "hinge 2", "shuttle", "drive block")
-"""Members of the half that are not the finger."""
+"""Names of the members of the half gripper that do not belong to the finger."""
 _BLOCK = 2
-"""Place of the drive block among the shapes of a half."""
+"""Index of the drive block among the shapes of a half gripper."""
 _ON_FACE = ("tip's corner", "tip's heel", "measuring point")
 _ACROSS, _EDGE = 2.0, 0.05
-"""Triangles across what is thin, and edge length over the size, as for the bodies of a mechanism."""
+"""Triangles across thin parts, and edge length over the body's size, as for the bodies of a mechanism."""
 _NEAR, _OVER = 1e-7, 1.1
 _BEYOND = 1.04
-"""Of a link's width: what is cut away behind a hinge reaches beyond it by so much."""
+"""Width of the strip removed behind a hinge, as a multiple of the link's width."""
 _PATCH = 0.5
-"""Of a member's width: radius of the patch whose mean motion stands for the section."""
+"""Radius of a patch whose mean motion represents a section, as a share of the member's width."""
 _LEAST_NODES = 6
 _FOLLOWED = 12
-"""Nearest nodes of the mesh that a node of the bars follows."""
+"""Number of nearest mesh nodes whose motion a following node of the bars takes."""
 _STIFF = 1e-3
-"""Compliance of what ties a follower over that of a square of the finger's width: it carries a contact's load alone."""
+"""Compliance of the springs that tie a following node, relative to that of a square of the finger's width. The springs
+carry contact loads only."""
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _MOST_KEPT = 32
 _UNIT = Material("unit", 1.0, 0.3, 1.0, 1.0)
 _BODY = Body(1.0, 1.0, 1.0, 0.0, 0.0)
-"""Neither takes part in where the hinges end."""
+"""Placeholder body: its values do not influence where the hinges end."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Station:
-    """A node of the bars: the member that ends there, its position, and the member's width."""
+    """A node of the bar model: name of the member that ends there, position, and the member's width."""
 
     name: str
     at_mm: PointMm
@@ -67,16 +68,16 @@ class _Station:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FingerBody:
-    """The finger, by the nodes of the bars that it replaces.
+    """The finger as one elastic body, described at the nodes of the bars that it replaces.
 
     Parameters
     ----------
     nodes : ndarray of int, shape (m,)
-        Nodes of the tree of members: of member i's end, i + 1. The body's axes turn with the first.
+        Node numbers in the tree of members (member i ends at node i + 1). The body's axes rotate with the first node.
     turning : CorotationalBody
-        Their stiffness; nodes that bear no mass and no load follow.
+        Stiffness of the nodes; nodes without mass and load follow the others.
     mass_t : ndarray of float, shape (3 m, 3 m)
-        Mass by their motions.
+        Mass matrix for the nodes' motions.
     """
 
     nodes: Indices
@@ -85,7 +86,7 @@ class FingerBody:
 
     @property
     def unknowns(self) -> Indices:
-        """Number of unknowns, three per node: x, y, rotation."""
+        """Indices of the unknowns of the finger's nodes: x, y, rotation of each node."""
         return np.asarray((3 * self.nodes[:, None] + np.arange(3)).ravel())
 
 
@@ -95,7 +96,7 @@ def finger_body(gripper: Gripper, skeleton: Skeleton) -> FingerBody:
     Raises
     ------
     DataError, ModelError
-        Where the hinges do not cut it from the rest.
+        If the hinges do not separate the finger from the rest.
     """
     members = skeleton.members
     places = [place for place, member in enumerate(members) if is_of_finger(member.name)]
@@ -131,7 +132,7 @@ def is_of_finger(name: str) -> bool:
 def _unit_body(
     body: Body, hinge: Hinge, lever: Lever, links: Links, poisson: float, stations: tuple[_Station, ...]
 ) -> tuple[Indices, Array, Array]:
-    """Order of the stations, with stiffness and mass for unit modulus, density (kg/m^3) and plate thickness."""
+    """Order of the stations; stiffness and mass for unit modulus, density (kg/m^3) and plate thickness."""
     gripper = Gripper(Material("unit", 1.0, poisson, 1.0, 1.0), body, hinge, lever, links)
     mechanism = half_mechanism(gripper)
     spans = _spans(hinge, lever, links)
@@ -160,14 +161,14 @@ def _unit_body(
 
 @lru_cache(maxsize=_MOST_KEPT)
 def _spans(hinge: Hinge, lever: Lever, links: Links) -> tuple[FlexureSpan, ...]:
-    """Both hinges between their cuts."""
+    """Find where each of the two hinges is cut from the bodies that it joins."""
     mechanism = half_mechanism(Gripper(_UNIT, _BODY, hinge, lever, links))
     region = mechanism.region
     return tuple(span_of(flexure, region) for flexure in mechanism.flexures)
 
 
 def _finger_region(mechanism: Mechanism, spans: tuple[FlexureSpan, ...]) -> PlanarRegion:
-    """Remove the drive block, the flexures and the bodies at their other ends."""
+    """Region of the finger: the drawing without the drive block, the flexures and the bodies at their other ends."""
     far = 2.0 * mechanism.region.size_mm
     steps: list[tuple[bool, Shape]] = [*mechanism.bodies[:_BLOCK], *mechanism.bodies[_BLOCK + 1 :]]
     steps += [step for flexure in mechanism.flexures for step in flexure.steps()]
@@ -197,7 +198,7 @@ def _frames(
     stations: tuple[_Station, ...],
     size_mm: float,
 ) -> tuple[list[Frame], list[int]]:
-    """The kept frames, each moved to its station, and the stations: both cuts, the face, patches in between."""
+    """Frames of the kept stations (two cuts, the face, patches in between), and the stations' indices."""
     names = [station.name for station in stations]
     cuts = [0, len(names) - 1 - names[::-1].index("stub")]
     face = names.index("measuring point")
@@ -233,7 +234,7 @@ def _moved(frame: Frame, to_mm: PointMm) -> Frame:
 
 
 def _patch_frame(plate: PlaneStressPlate, nodes: Indices, at_mm: PointMm) -> Frame:
-    """Mean motion of a patch: the rigid motion nearest to that of its nodes."""
+    """Coordinate frame with the mean motion of a patch: the rigid motion nearest to that of the patch's nodes."""
     rigid = _rigid(plate, nodes, at_mm)
     fit = np.linalg.pinv(rigid)
     rows = np.zeros((3, plate.unknowns))
@@ -242,7 +243,7 @@ def _patch_frame(plate: PlaneStressPlate, nodes: Indices, at_mm: PointMm) -> Fra
 
 
 def _rigid(plate: PlaneStressPlate, nodes: Indices, at_mm: PointMm) -> Array:
-    """Displacements of nodes, x then y, under rigid motions of a point, shape (2 k, 3)."""
+    """Displacements of nodes (all x, then all y) for unit rigid motions about a point, shape (2 k, 3)."""
     x, y = plate.nodes_mm[:, nodes] - np.array(at_mm)[:, None]
     one, zero = np.ones(nodes.size), np.zeros(nodes.size)
     return np.vstack([np.column_stack([one, zero, -y]), np.column_stack([zero, one, x])])
@@ -256,7 +257,7 @@ def _tie(
     kept: list[int],
     place: int,
 ) -> Array:
-    """Motion of a following node from those of the kept stations, shape (3, 3 k)."""
+    """Matrix from the motions of the kept stations to the motion of a following node, shape (3, 3 k)."""
     station = stations[place]
     tie = np.zeros((3, shapes_mm.shape[1]))
     if station.name in _ON_FACE:

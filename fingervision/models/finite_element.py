@@ -1,11 +1,12 @@
-"""The gripper by finite elements (Hricko & Havlik (2015) used Comsol): the plane body of the real outline.
+"""Finite-element model of the gripper: its outline as a plane body (Hricko & Havlik (2015) used Comsol).
 
 One half is solved under the symmetry constraint: the lower face of the pillar is clamped, the symmetry axis cannot move
 across itself, the drive face moves by the input. The plate is in plane stress; its hinges lie between plane stress and
-plane strain, by their width (`width_effect`). The published gripper in plane stress, for a converged mesh: 7.7212 mm of
-gap per millimetre of input, 2.0014 N/mm, 19.07 MPa/mm; including the width of its hinges 2.06 N/mm, as with
-three-dimensional bricks. Its link length was chosen so that this slope equals the one published for Comsol; their
-agreement is therefore no validation.
+plane strain, depending on their width (`width_effect`). For the published gripper in plane stress, a converged mesh
+gives 7.7212 mm of gap per millimetre of input, a stiffness of 2.0014 N/mm and a stress of 19.07 MPa/mm; including the
+width of the hinges the stiffness is 2.06 N/mm, as with three-dimensional brick elements. The link length of that
+gripper is not published and was chosen so that the slope equals the one published for Comsol; the agreement of the two
+slopes is therefore no validation.
 """
 
 from collections.abc import Sequence
@@ -44,7 +45,8 @@ TRUST, WHY_TRUSTED = 3, "it has the outline itself, and the other takes the body
 _MODES = 3
 _ON_NOTCH = 1e-6
 _SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR = 0.001, 0.005, 0.01
-"""Of the mesh, beside finer meshes and published figures (`tests/benchmarks/models_held_out.py`)."""
+"""Relative errors of the mesh, estimated from finer meshes and published values
+(`tests/benchmarks/models_held_out.py`)."""
 
 
 class FiniteElementGripper:
@@ -55,16 +57,17 @@ class FiniteElementGripper:
     gripper : Gripper
         The drawing.
     physics : Physics
-        What goes beyond small displacements.
+        Which effects beyond small displacements are included.
     mesh : PlaneMesh or None
-        Triangles of the right half; None takes the packaged mesh of the reference outline, or makes one.
+        Triangles of the right half; None loads the packaged mesh for the reference outline and makes a new mesh for
+        others.
     width_effect : bool
-        Whether the plate's width holds the hinges back; plane stress everywhere where not.
+        Whether the constraint of the hinges by the plate's width is included; if False, plane stress holds everywhere.
 
     Raises
     ------
     FingervisionError
-        Where the gripper cannot be meshed, or its body does not reach the clamp, the axis or the drive.
+        If the gripper cannot be meshed, or its body does not reach the clamp, the symmetry axis or the drive.
     """
 
     name = KIND
@@ -81,16 +84,16 @@ class FiniteElementGripper:
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input for which the model is meant (mm)."""
+        """Smallest and largest input for which the model is valid (mm)."""
         return covered_inputs_mm(self.gripper, self.half.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero (mm)."""
+        """The gap at zero input (mm)."""
         return 2.0 * self.half.measured_rest_mm
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Respond statically at each input."""
+        """Compute the static response at each input."""
         return symmetric_response(self.half, self.physics, input_mm)
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -101,7 +104,7 @@ class FiniteElementGripper:
     def peak_stress(self) -> PeakStress:
         """Largest von Mises stress in the notches per 1 mm of input.
 
-        Re-entrant corners, where it is singular, are excluded.
+        Re-entrant corners, where the stress is singular, are excluded.
         """
         return PeakStress(*self._peak(self.plate.von_mises_mpa(self.half.unit_displacement_mm)))
 
@@ -139,11 +142,11 @@ class FiniteElementGripper:
 
     @cached_property
     def across_plane(self) -> OutOfPlane:
-        """First mode and sag out of the plane, with the drive fixed, in three dimensions (`deep_plate`)."""
+        """First mode and sag out of the plane, with the drive fixed, computed in three dimensions (`deep_plate`)."""
         return out_of_plane(half_mechanism(self.gripper))
 
     def figures(self) -> ModelFigures:
-        """Figures of the model for the comparison table."""
+        """Characteristic numbers of the model for the comparison table."""
         return ModelFigures(
             gap_per_input(self.half),
             self.half.equilibrium(1.0).force_n,

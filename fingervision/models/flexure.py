@@ -1,4 +1,4 @@
-"""One flexure of a drawing: the shapes that it adds or cuts, its height along its axis, and the effect of its width."""
+"""Geometry of one flexure: the shapes that it adds or removes, its height along its axis, its out-of-plane width."""
 
 from dataclasses import dataclass
 from math import cos, radians, sin, sqrt
@@ -18,28 +18,30 @@ Array = NDArray[np.float64]
 
 FlexureKind = Literal["circular", "elliptic", "filleted", "leaf"]
 _HEIGHT_THAT_BENDS = 0.13
-"""Of the thickness, that a fillet adds on either side: the height is then 1.26 times the neck's, and twice as stiff."""
+"""Height that a fillet adds on either side, in thicknesses, up to which the section counts as bending: its height is
+then 1.26 times the neck's, and its bending stiffness twice the neck's."""
 _POISSON = 0.34
-"""Of the share: it changes by 0.006 from 0.2 to 0.34, and acts times nu^2."""
+"""Poisson's ratio for which the plane-strain share is computed: the share changes by 0.006 only from 0.2 to 0.34, and
+is multiplied by nu^2."""
 
 
 @dataclass(frozen=True, slots=True)
 class Flexure:
-    """One flexure, with its own dimensions.
+    """One flexure with its dimensions.
 
     Parameters
     ----------
     name : str
-        For messages.
+        Name of the flexure in messages.
     kind : str
         `circular` and `elliptic`: two discs or ellipses cut into the body; `filleted`: two slots with rounded corners
         cut into the body; `leaf`: a thin bar added between bodies.
     at_mm : (float, float)
-        Its middle.
+        Centre of the flexure.
     axis_deg : float
-        Direction of its axis from x.
+        Angle of the flexure's axis from x.
     thickness_mm : float
-        Least height.
+        Least height of the flexure.
     half_length_mm, depth_mm : float
         Half extent along the axis, and how far the cut goes in from the surface of the neck: both the radius of a
         circular flexure. A leaf has no depth.
@@ -57,7 +59,7 @@ class Flexure:
     fillet_mm: float = 0.0
 
     def point_mm(self, along: Any, across: Any) -> tuple[Any, Any]:
-        """A point, or array of points, from its coordinates along and across the axis."""
+        """Convert coordinates along and across the flexure's axis to a point, or to an array of points."""
         c, s = cos(radians(self.axis_deg)), sin(radians(self.axis_deg))
         return self.at_mm[0] + c * along - s * across, self.at_mm[1] + s * along + c * across
 
@@ -66,7 +68,7 @@ class Flexure:
         return Polygon(tuple(self.point_mm(a, b) for a, b in places))
 
     def steps(self) -> list[tuple[bool, Shape]]:
-        """Shapes that the flexure adds to or cuts from the region."""
+        """Shapes that the flexure adds to the region or removes from it."""
         half = 0.5 * self.thickness_mm
         if self.kind == "leaf":
             ends = (*self.point_mm(-self.half_length_mm, 0.0), *self.point_mm(self.half_length_mm, 0.0))
@@ -86,11 +88,11 @@ class Flexure:
 
     @property
     def is_notch(self) -> bool:
-        """Whether its surfaces are circular or elliptic arcs over the whole length."""
+        """Whether the flexure's surfaces are circular or elliptic arcs over its whole length."""
         return self.kind in ("circular", "elliptic")
 
     def height_mm(self, x_mm: Array) -> Array:
-        """Height at positions along the axis, counted from the middle (mm)."""
+        """Height at positions along the axis, measured from the flexure's centre (mm)."""
         t, a = self.thickness_mm, self.half_length_mm
         if self.is_notch:
             return self.notch(1.0).height_mm(x_mm)
@@ -100,12 +102,12 @@ class Flexure:
         return np.asarray(t + 2.0 * self.fillet_mm * (1.0 - np.sqrt(1.0 - within**2)))
 
     def notch(self, plate_mm: float) -> Notch:
-        """The notch of a circular or elliptic flexure."""
+        """Notch with the dimensions of a circular or elliptic flexure, for a plate thickness."""
         return Notch(self.thickness_mm, self.half_length_mm, self.depth_mm, plate_mm)
 
     @property
     def _bent_mm(self) -> float:
-        """Length that bends, of a leaf or a straight neck: fillets as far as they are twice as stiff at most."""
+        """Length of a leaf or straight neck that bends; of fillets, the part with at most twice the stiffness."""
         straight, r = self.half_length_mm - self.fillet_mm, self.fillet_mm
         if r == 0.0:
             return 2.0 * straight
@@ -113,16 +115,16 @@ class Flexure:
         return 2.0 * (straight + r * sqrt(1.0 - (1.0 - rise) ** 2))
 
     def width_share(self, plate_mm: float) -> float:
-        """How far the plate's width holds it back in bending: 0 in plane stress, 1 in plane strain.
+        """Degree to which the plate's width constrains the bending: 0 for plane stress, 1 for plane strain.
 
-        Of a strip the mean of two: of one whose ends turn, and of one whose ends keep their direction.
+        For a leaf or a straight neck it is the mean of two cases: ends that rotate, and ends that keep their direction.
         """
         if self.is_notch:
             return plane_strain_share(self.notch(plate_mm))
         return 0.5 * sum(strip_share(plate_mm / self._bent_mm, _POISSON))
 
     def width_doubt(self, plate_mm: float) -> float:
-        """How far that share may be off, because it is not known how a strip's ends move."""
+        """Half range of `width_share`, because the boundary conditions of a strip's ends are not known."""
         if self.is_notch:
             return 0.0
         bent, swayed = strip_share(plate_mm / self._bent_mm, _POISSON)

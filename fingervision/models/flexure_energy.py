@@ -1,4 +1,4 @@
-"""How far notches work as they are meant to: bent at their necks, neither sheared nor stretched."""
+"""Share of a notch flexure's strain energy that is not in the intended deformation, bending of its neck."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,16 +9,16 @@ Array = NDArray[np.float64]
 
 
 def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plate_mm: float) -> tuple[float, float]:
-    """Strain energy of a flexure outside its intended deformation, and its total strain energy (N mm).
+    """Strain energy of a flexure outside its intended deformation, and the flexure's total strain energy (N mm).
 
     Parameters
     ----------
     span : FlexureSpan
         The flexure.
     end_loads : ndarray of float, shape (segments, 3)
-        Tension in N and moments in N mm at both ends of every segment, as `CorotationalFrame.end_loads` has them.
+        Tension in N and moments in N mm at both ends of every segment, as returned by `CorotationalFrame.end_loads`.
     compliances : ndarray of float, shape (segments, 3, 3)
-        Of the segments at their ends.
+        Compliance of each segment at its end.
     plate_mm : float
         Thickness of the plate.
     """

@@ -1,8 +1,8 @@
-"""The stretch of a flexure that bends as a beam: where it begins and ends, and the compliance of its segments.
+"""The part of a flexure that is modelled as a beam: where it begins and ends, and the compliance of its segments.
 
-A notch is a beam between the points where it meets its bodies, corrected by the tables for hinges. For a leaf and for a
-straight neck, the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle the stress there
-is a beam's, and the compliance of the roots belongs to the elastic bodies.
+A notch is a beam between the points where it meets the bodies that it joins, corrected by the tables for hinges. For a
+leaf and for a straight neck, the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle the
+stress there is that of a beam, and the compliance of the roots is included in the elastic bodies.
 """
 
 from dataclasses import dataclass, replace
@@ -24,41 +24,44 @@ Array = NDArray[np.float64]
 
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _SEGMENTS, _SEGMENTS_OF_LEAF = 10, 20
-"""Of a notch, whose bending is at its neck, and of what bends all along: a chord is shorter than its arc by 1 / n^2."""
+"""Number of segments of a notch, which bends at its neck, and of a leaf or straight neck, which bends along its whole
+length: the error from replacing an arc by chords is 1 / n^2."""
 _SAMPLES = 401
 _ROUNDS, _BETWEEN = 5, 65
-"""Each round narrows the end of the free length 64 times: to 1e-11 of the half length."""
+"""Rounds of the search for the end of the free length, and points in each: a round narrows the interval 64 times, five
+rounds to 1e-11 of the half length."""
 _BESIDE = 1e-4
-"""Of the thickness: how far beside a flexure's surface material and void are looked for."""
+"""Distance from a flexure's surface at which material and void are tested, as a share of the thickness."""
 _SAINT_VENANT = 1.5
-"""Thicknesses from the root: a self-balanced load of a strip decays by exp(-2.1 x / (t / 2)) at least (Timoshenko and
-Goodier, article 26), to 0.2 % there."""
+"""Distance of a cut from the root in thicknesses: a self-balanced load of a strip decays at least as exp(-2.1 x / (t /
+2)) (Timoshenko and Goodier, article 26), to 0.2 % there."""
 _LEAST_SHARE = 0.3
-"""Of the free length: a short neck keeps that much of its own as a beam."""
+"""Least share of the free length that is modelled as a beam, for necks too short for the distance above."""
 _OVER = 1.02
-"""A cut reaches beyond the section by so much on either side, into the void."""
+"""Height of a cut as a multiple of the section's height, so that the cut ends in the void on either side."""
 _WITHIN = 0.95
-"""Of a notch that opens into something wider than itself: the cut lies that far out, still inside the notch."""
+"""Position of the cut of a notch that opens into something wider, as a share of its half length: still inside the
+notch."""
 _BEYOND = 0.02
-"""Thicknesses beyond a notch's end: the cut, square through the link."""
+"""Distance of the cut beyond a notch's end, in thicknesses; the cut runs straight through the link."""
 _NARROW = 0.25
-"""Width over thickness at which the tables are those of plane stress."""
+"""Ratio of width to thickness below which the tables are those of plane stress."""
 _GAUSS = leggauss(12)
 _SHEAR = 6.0 / 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class FlexureSpan:
-    """A flexure between its two cuts.
+    """A flexure with the positions of its two ends, where it is cut from the bodies.
 
     Parameters
     ----------
     flexure : Flexure
-        As drawn.
+        The flexure as drawn.
     free_mm : (float, float)
-        Stations along the axis, from the flexure's middle, between which nothing but the flexure stands.
+        Positions along the axis, from the flexure's centre, between which there is no material but the flexure.
     cut_mm : (float, float)
-        Stations of the cuts.
+        Positions of the two cuts along the axis.
     heights_mm : (float, float)
         Heights of the sections at the cuts.
     """
@@ -70,7 +73,7 @@ class FlexureSpan:
 
     @property
     def slab(self) -> Polygon:
-        """Region that separates the bodies on either side where the flexure is cut away."""
+        """Region of the flexure between its cuts; removing it separates the bodies on either side."""
         (a, b), (low, high) = self.cut_mm, self.heights_mm
         corners = ((a, -0.5), (b, -0.5), (b, 0.5), (a, 0.5))
         heights = (low, high, high, low)
@@ -78,7 +81,7 @@ class FlexureSpan:
                                                                                          strict=True)))  # fmt: skip
 
     def notch(self, plate_mm: float) -> Notch:
-        """The notch with the same bending behaviour."""
+        """Notch with the same bending behaviour as this flexure, with its height at the ends of the free length."""
         web_mm = max(float(self.flexure.height_mm(np.array([end]))[0]) for end in self.free_mm)
         notch = self.flexure.notch(plate_mm)
         return replace(notch, web_mm=web_mm) if self.flexure.is_notch else notch
@@ -96,7 +99,7 @@ class FlexureSpan:
         return np.concatenate([-halves[0][:0:-1], halves[1]])
 
     def compliances(self, plate_mm: float, material: Material, theory: HingeTheory, *, width_effect: bool) -> Array:
-        """Compliance of each segment at its end, along, across and in rotation; shape (segments, 3, 3)."""
+        """Compliance of each segment at its end (along the axis, across it, rotation); shape (segments, 3, 3)."""
         spans = list(pairwise(self.stations_mm(plate_mm).tolist()))
         corrected = theory is HingeTheory.CORRECTED
         if self.flexure.is_notch:
@@ -111,7 +114,7 @@ class FlexureSpan:
 
 
 def _segment(flexure: Flexure, span: tuple[float, float], plate_mm: float, material: Material, held: float) -> Array:
-    """Timoshenko beam of varying height between two stations."""
+    """Compliance of a Timoshenko beam of varying height between two positions along the flexure's axis."""
     nodes, weights = _GAUSS
     half = 0.5 * (span[1] - span[0])
     x, dx = 0.5 * (span[0] + span[1]) + half * nodes, half * weights
@@ -126,7 +129,7 @@ def _segment(flexure: Flexure, span: tuple[float, float], plate_mm: float, mater
 
 
 def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
-    """Find where a flexure is free of the bodies that it joins, and where it is to be cut."""
+    """Find the length over which a flexure is free of the bodies that it joins, and where to cut it from them."""
     stations = np.linspace(0.0, flexure.half_length_mm * (1.0 - 1e-9), _SAMPLES)
     free, cuts, heights = [], [], []
     for side in (-1.0, 1.0):
@@ -146,7 +149,7 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
 
 
 def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:
-    """Whether at each station the flexure's own height is all the material there is."""
+    """Whether, at each position, the material across the axis is that of the flexure only."""
     half = 0.5 * flexure.height_mm(stations)
     apart = _BESIDE * flexure.thickness_mm
     found = np.ones(stations.size, dtype=bool)
@@ -158,7 +161,7 @@ def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[n
 
 
 def _cut(flexure: Flexure, region: PlanarRegion, side: float, end_mm: float) -> tuple[float, float]:
-    """Position and height of the cut on one side."""
+    """Position and height of the cut on one side of the flexure."""
     t = flexure.thickness_mm
     if not flexure.is_notch:
         straight = min(end_mm, flexure.half_length_mm - flexure.fillet_mm)

@@ -1,4 +1,4 @@
-"""Nominal stress in a lumped flexure: bending and tension of the section, with the factors of a notch or of fillets."""
+"""Nominal stress in a lumped flexure, from bending and tension, with stress concentration of a notch or of fillets."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,21 +17,21 @@ _SAMPLES = 401
 def nominal_stress_mpa(
     span: FlexureSpan, end_loads: Array, mechanism: Mechanism, theory: HingeTheory, *, width_effect: bool = True
 ) -> float:
-    """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) between the ends where the flexure meets its bodies.
+    """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) over the free length of a flexure.
 
     Parameters
     ----------
     span : FlexureSpan
         The flexure.
     end_loads : ndarray of float, shape (segments, 3)
-        Tension in N and moments in N mm at both ends of every segment, as `CorotationalFrame.end_loads` has them.
+        Tension in N and moments in N mm at both ends of every segment, as returned by `CorotationalFrame.end_loads`.
     mechanism : Mechanism
-        For plate and material.
+        Mechanism that gives the plate thickness and the material.
     theory : HingeTheory
-        Nominal stress of a straight bar by beam theory; with Neuber's factors, or those of the fillets, and the
-        width's share where corrected.
+        Beam theory gives the nominal stress of a straight bar; the corrected theory includes Neuber's factors, or those
+        of the fillets, and the constraint by the plate's width.
     width_effect : bool
-        Whether the plate's width holds the flexure back.
+        Whether the constraint of the flexure by the plate's width is included.
     """
     plate_mm = mechanism.plate_mm
     stations = span.stations_mm(plate_mm)
@@ -57,7 +57,7 @@ def nominal_stress_mpa(
 
 
 def _factors(span: FlexureSpan, plate_mm: float) -> tuple[float, float]:
-    """Stress concentration in tension and in bending: of a notch, of a straight neck's fillets; 1 for a leaf."""
+    """Stress concentration factors in tension and bending: of a notch, or of a neck's fillets; 1 for a leaf."""
     flexure = span.flexure
     if flexure.is_notch:
         return notch_factors(span.notch(plate_mm))

@@ -1,4 +1,4 @@
-"""A Functional Mock-up Unit (FMI 2 or 3, model exchange or co-simulation) as a function of time, by FMPy."""
+"""Run a Functional Mock-up Unit (FMI 2 or 3, model exchange or co-simulation) as a function of time, by FMPy."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -10,15 +10,16 @@ import numpy as np
 from fingervision.domain.effect import Array
 
 UNITS_MM: Mapping[str, float] = {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "nm": 1e-6}
-"""Millimetres in a unit of length, by the unit's name."""
+"""Millimetres per unit of length, by the unit's name."""
 INPUTS = ("input_mm", "input", "u_in", "u", "position", "displacement", "stroke", "x", "in")
 GAPS = ("gap_mm", "gap", "opening", "y", "out", "output")
 OTHERS = ("left_mm", "right_mm", "force_n")
 FINER = 4
-"""Steps of a co-simulation between two times: it holds its input over a step, read at the step's middle."""
+"""Co-simulation steps between two given times: the FMU holds its input, read at the middle of the step, over a step."""
 MOST_STEPS = 200_000
 LONGEST_STEP_S = 0.01
-"""A step is no longer, however far apart the times: what rings at 10 Hz is then still read ten times a period."""
+"""Longest co-simulation step, however far apart the given times are: a vibration at 10 Hz is then still sampled ten
+times per period."""
 
 
 def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array], dict[str, Array]]:
@@ -27,9 +28,9 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     Parameters
     ----------
     path : Path
-        The `.fmu`.
+        Path of the `.fmu` file.
     names : mapping of str to str
-        Names of the variables `input` and `gap`, where they are stated.
+        Names of the FMU's variables for `input` and `gap`, where stated.
 
     Returns
     -------
@@ -39,12 +40,15 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     Raises
     ------
     ValueError
-        FMPy is missing, the file is no FMU for this system, or its variables leave it open which is which.
+        If FMPy is missing, the file is no FMU for this system, or it cannot be decided which variables are input and
+        gap.
     """
     try:
         from fmpy import extract, read_model_description, supported_platforms
     except ImportError:
-        raise ValueError("is an FMU, which FMPy reads: install it with `pip install fingervision[fmu]`.") from None
+        raise ValueError(
+            "is an FMU, which is read by the library FMPy: install that with `pip install fingervision[fmu]`."
+        ) from None
     if not path.is_file():
         raise ValueError("must be a file, but is not there.")
     try:
@@ -120,10 +124,11 @@ def _run(
 
 
 def _drive_between_steps() -> None:
-    """Let FMPy's integrator read the input at each time that it evaluates, instead of that of the last step.
+    """Let FMPy's integrator read the input at each time that it evaluates, instead of the input at the last step.
 
-    FMPy 0.3 sets inputs only before a step and in the root function. Over a step of CVode a moving input then lags, and
-    the error test fails where it jumps. The change applies to the whole process of the model, which runs nothing else.
+    FMPy 0.3 sets inputs only before a step and in the root function. During a step of the integrator CVode a moving
+    input then lags, and the integrator's error test fails where the input jumps. The change applies to the whole worker
+    process, which runs only the model.
     """
     from fmpy import sundials
 
@@ -141,7 +146,7 @@ def _drive_between_steps() -> None:
 
 
 def _outputs(variables: list[Any], names: Mapping[str, str]) -> dict[str, Any]:
-    """Choose the output for the gap, or those of both fingers, and that of the force if there is one."""
+    """Choose the output variables: the gap, or the positions of both fingers, and the force if there is one."""
     listed = {variable.name.lower(): variable for variable in variables if variable.causality == "output"}
     out = {name: listed[name] for name in OTHERS if name in listed}
     if not ({"left_mm", "right_mm"} <= set(out)) or "gap" in names:
@@ -151,7 +156,7 @@ def _outputs(variables: list[Any], names: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _choose(variables: list[Any], causality: str, stated: str | None, usual: tuple[str, ...]) -> Any:
-    """Choose the stated variable, the one with a usual name, or the only one there is."""
+    """Choose the variable with the stated name, else one with a usual name, else the only variable there is."""
     word = "input" if causality == "input" else "gap"
     real = [one for one in variables if one.causality == causality and one.type in ("Real", "Float64", "Float32")]
     if stated is not None:
@@ -170,7 +175,8 @@ def _choose(variables: list[Any], causality: str, stated: str | None, usual: tup
     if not real:
         raise ValueError(f"must have a real {causality} to be driven in time, but has none.")
     raise ValueError(
-        f"has {len(real)} {causality}s ({_listed(real)}), and it is not said which is the {word}: name it in a "
+        f"has {len(real)} {causality}s ({_listed(real)}), and it is not stated which of them is the {word}: "
+        "name it in a "
         f'model.toml with base = "the.fmu" and {word} = "its name".'
     )
 
@@ -180,7 +186,7 @@ def _listed(variables: list[Any]) -> str:
 
 
 def _mm(variable: Any) -> float:
-    """Millimetres per unit of a variable: as declared, or by the suffix of its name, or else 1."""
+    """Millimetres per unit of a variable: from its declared unit, else from the suffix of its name, else 1."""
     unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
     if unit is None:
         ending = re.search(r"_(m|cm|mm|um|nm)$", variable.name)

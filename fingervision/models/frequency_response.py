@@ -1,4 +1,4 @@
-"""Response of a mechanism to a vibrating drive: amplitude and phase over frequency, small displacements."""
+"""Response of a mechanism to a vibrating drive: amplitude and phase over frequency, for small displacements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _ACROSS_A_PEAK = 12
-"""Frequencies within the half-power width of every peak: its height is then met within 0.4 %."""
+"""Frequencies within the half-power width of every resonance: the height of the peak is then resolved within 0.4 %."""
 _WIDTHS = 6.0
 _LEAST_ROWS = 400
 
@@ -27,16 +27,17 @@ class FrequencyResponse:
     Parameters
     ----------
     frequency_hz : ndarray of float, shape (n,)
-        Of the drive.
+        Frequency of the drive.
     per_input : mapping of str to ndarray of complex, shape (n,)
-        Amplitude of a length by 1 mm of the drive's amplitude (its stage follows exactly): peaks at the modes with the
-        drive held.
+        Complex amplitude of each probed length per 1 mm of drive amplitude (the stage follows exactly): peaks at the
+        modes with the drive held.
     per_force_mm_n : mapping of str to ndarray of complex, shape (n,)
-        Amplitude of a length by 1 N at a drive that is free to move: peaks at the modes with the drive free.
+        Complex amplitude of each probed length per 1 N at a drive that is free to move: peaks at the modes with the
+        drive free.
     drive_per_force_mm_n : ndarray of complex, shape (n,)
-        Amplitude of the drive by 1 N.
+        Complex amplitude of the drive per 1 N.
     modes_hz, free_modes_hz, damping_ratios, free_damping_ratios : ndarray of float
-        Natural frequencies with the drive held and free, of the modes kept, and their damping ratios.
+        Natural frequencies of the modes kept, with the drive held and free, and the damping ratios of these modes.
     """
 
     frequency_hz: Array
@@ -54,18 +55,19 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Compute the response to a sinusoidal drive at some frequencies.
 
-    Modes beyond those given contribute their static response, so that both curves are exact at 0 Hz.
+    Modes beyond those given contribute their static response, so that the responses per input and per force are exact
+    at 0 Hz.
 
     Parameters
     ----------
     model : ModalModel
         The mechanism with its drive held; its modes should reach to twice the highest frequency.
     free : FreeModes
-        The same with its drive free.
+        The mechanism with its drive free.
     frequency_hz : ndarray of float, shape (n,)
-        Of the drive.
+        Frequencies of the drive.
     damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
-        Modal damping of 0.025 where None.
+        Damping law; None is a modal damping ratio of 0.025.
     """
     law = damping or ModalDamping()
     model, ratios = model.damped(law)
@@ -105,7 +107,7 @@ def _complex(values: Any) -> ComplexArray:
 def resolved_frequencies_hz(
     model: ModalModel, free: FreeModes, damping: Damping, first_hz: float, last_hz: float
 ) -> Array:
-    """Frequencies so close together that no resonance, with the drive fixed or free, falls between two of them."""
+    """Frequencies spaced so closely that every resonance, with the drive fixed or free, is resolved."""
     kept, ratios = model.damped(damping)
     free_ratios = described(damping, free.rad_s)
     places = [np.linspace(first_hz, last_hz, _LEAST_ROWS)]

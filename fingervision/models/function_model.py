@@ -20,13 +20,15 @@ from fingervision.models.table import TableModel
 
 SUFFIXES = (".fmu", ".py")
 LONGEST_S = 120.0
-"""Seconds of wall time that a call may take: an ordinary gripper of some hundred states needs one or two."""
+"""Longest wall time of one call: the model of an ordinary gripper with some hundred states needs one or two seconds."""
 STEPS = 21
-"""Inputs at which the model is let come to rest: linear between them, with the rest in the remainder over time."""
+"""Number of inputs, from lowest to highest, at which the model is run until the gap is at rest; the static gap is
+linear between them, and any remaining nonlinearity appears in the simulated remainder over time."""
 HOLDS_S = (2.0, 8.0, 32.0)
-"""Holds that are tried until the gap has settled; grippers ring for less than a second and creep for a minute."""
+"""Hold times tried one after another until the gap has settled: grippers ring for less than a second and creep for
+about a minute."""
 SETTLED = 1e-4
-"""Share of the gap's range that it may still move in the second half of a hold."""
+"""Largest change of the gap in the second half of a hold that counts as settled, as a share of the gap's range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +40,14 @@ class FunctionModel:
     path : Path
         `.fmu` (FMI 2 or 3, model exchange or co-simulation) or `.py`.
     names : mapping of str to str
-        Which variable of an FMU is the `input` and which the `gap`, where its names do not say so.
+        Names of the FMU's variables for `input` and `gap`, if its variables are named otherwise.
     """
 
     path: Path
     names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def respond(self, input_mm: Array) -> Response:
-        """Static response at each input, which is held until the gap has settled; `input_mm` of shape (n,)."""
+        """Static response at each input, each held until the gap has settled; `input_mm` of shape (n,)."""
         if np.ptp(input_mm) == 0.0:
             time_s = np.array([0.0, 0.5, 1.0]) * HOLDS_S[0]
             (held,) = self.simulate([(time_s, np.full(3, float(input_mm[0])))])
@@ -54,12 +56,12 @@ class FunctionModel:
         return self.at_rest(float(input_mm.min()), float(input_mm.max())).respond(input_mm)
 
     def at_rest(self, low_mm: float, high_mm: float) -> TableModel:
-        """Tabulate the static gap, as the mean of increasing and decreasing input.
+        """Tabulate the static gap, as the mean of runs with increasing and decreasing input.
 
         Raises
         ------
         ModelError
-            The model fails, or its gap does not depend on the input, or never settles.
+            If the model fails, or its gap does not depend on the input or never settles.
         """
         up = np.linspace(low_mm, high_mm, STEPS)
         places = np.concatenate([up, up[::-1]])
@@ -96,12 +98,12 @@ class FunctionModel:
         Parameters
         ----------
         runs : sequence of (ndarray of float, ndarray of float), each of shape (n,)
-            Times, strictly increasing from 0, and inputs in mm; straight between them.
+            Times, strictly increasing from 0, and inputs in mm; the input is linear between these points.
 
         Raises
         ------
         ModelError
-            The file cannot be run, crashes, does not end, or answers what is no number.
+            If the file cannot be run, crashes, does not end, or returns something that is not a number.
         """
         with TemporaryDirectory(prefix="fingervision-") as folder:
             asked, answered = Path(folder) / "asked.npz", Path(folder) / "answered.npz"
@@ -126,7 +128,7 @@ class FunctionModel:
                 return [_response(found, k) for k in range(len(runs))]
 
     def _failure(self, code: int, stderr: bytes) -> str:
-        """Describe how the process ended."""
+        """Explain in a message how the worker process failed."""
         said = stderr.decode(errors="replace").strip().splitlines()
         if said and said[-1].startswith(SAYS):
             return f"{self.path} {said[-1].removeprefix(SAYS)}"
@@ -134,11 +136,11 @@ class FunctionModel:
             name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
             return f"{self.path} must answer, but crashed ({name}): the fault is in the model; nothing was lost."
         last = f" Its last words: {said[-1][:300]}" if said else ""
-        return f"{self.path} must answer, but its process ended with code {code}: mend the model.{last}"
+        return f"{self.path} must answer, but its process ended with code {code}: correct the model.{last}"
 
 
 SAYS = "fingervision-model: "
-"""Begins the line in which the process of a model says why it could not answer."""
+"""Prefix of the line in which the worker process reports why it could not compute a response."""
 
 
 def _response(found: Mapping[str, Array], k: int) -> Response:

@@ -1,4 +1,4 @@
-"""Worker process of a user's model: it reads times and inputs, and writes the points of the fingers."""
+"""Worker process of a user's model: reads times and inputs, and writes positions of the fingers' measuring points."""
 
 import json
 import sys
@@ -62,7 +62,7 @@ def _python_function(path: Path) -> Function:
 
 
 def _points(answer: Answer, time_s: Array) -> dict[str, Array]:
-    """Convert a model's return value to left, right and force; refuse what is no finite number for each time."""
+    """Convert a model's return value to left, right and force; refuse any that has not one finite number per time."""
     out: dict[str, Array] = {}
     for name in ("gap_mm", "left_mm", "right_mm", "force_n"):
         if name not in answer:
@@ -72,7 +72,9 @@ def _points(answer: Answer, time_s: Array) -> dict[str, Array]:
         except (TypeError, ValueError):
             raise ValueError(f"must give numbers for {name}, but gives {type(answer[name]).__name__}.") from None
         if values.shape != time_s.shape:
-            raise ValueError(f"must give {time_s.size} values of {name}, one a time, but gives shape {values.shape}.")
+            raise ValueError(
+                f"must give {time_s.size} values of {name}, one for each time, but gives shape {values.shape}."
+            )
         if not np.all(np.isfinite(values)):
             at_s = float(time_s[np.flatnonzero(~np.isfinite(values))[0]])
             raise ValueError(f"must give finite values of {name}, but gives a NaN or infinity at {at_s:g} s.")

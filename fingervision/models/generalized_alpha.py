@@ -1,7 +1,7 @@
 """Time integration of a body in large rotation and contact: the generalised-alpha method.
 
-Second-order accurate in the step, with adjustable damping of frequencies that the step cannot resolve. Source: Chung
-and Hulbert, J. Appl. Mech. 60 (1993) 371.
+The method is second-order accurate in the time step, with adjustable damping of frequencies too high for the step.
+Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _ITERATIONS = 25
 _SETTLED = 1e-8
 _SLOW = 0.1
-"""A residual that falls to less than a tenth in an iteration needs no new factorisation."""
+"""Ratio of two successive residuals below which the factorisation of the previous iteration is kept."""
 _DENSE_BELOW = 400
 
 
@@ -50,25 +50,26 @@ def integrate(
     Parameters
     ----------
     mass, damping : sparse matrix, shape (n, n)
-        Of all unknowns.
+        Mass and damping matrices for all unknowns.
     internal : callable
-        Displacements to tangent stiffness and internal forces.
+        Maps displacements to the tangent stiffness and the internal forces.
     start : (ndarray, ndarray)
         Displacements and velocities at the first time.
     prescribed : (ndarray of int, ndarray, shape (steps + 1,))
-        Unknowns that all follow one history, straight from step to step, and the history. Their masses must not be
-        coupled to those of the free unknowns: the impulses of the kinks would otherwise be lost.
+        Indices of the unknowns that all follow one prescribed history, and this history, linear within each step. The
+        masses of these unknowns must not be coupled to those of the free unknowns: the impulses at the kinks of the
+        history would be lost.
     free : ndarray of int
-        Unknowns that move; those neither free nor prescribed are held.
+        Indices of the unknowns that are free to move; those neither free nor prescribed are fixed.
     step_s : float
         Time step.
     high_frequency_radius : float
-        Spectral radius at infinite frequency: 1 keeps all energy, 0 annihilates what the step cannot resolve.
+        Spectral radius at infinite frequency: 1 conserves all energy, 0 annihilates frequencies too high for the step.
 
     Raises
     ------
     ModelError
-        Where a step does not settle.
+        If the iteration of a step does not converge.
     """
     rho = high_frequency_radius
     alpha_m, alpha_f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
@@ -111,13 +112,13 @@ def integrate(
             v[free] += gamma / (beta * step_s) * change
             a[free] += change / (beta * step_s**2)
         else:
-            raise ModelError(f"The motion did not settle in step {place} of {step_s:g} s; use shorter steps.")
+            raise ModelError(f"The motion did not converge in step {place} of {step_s:g} s; use shorter steps.")
         rows.append((u.copy(), v.copy(), a.copy()))
     return Motion(*(np.array(part) for part in zip(*rows, strict=True)))
 
 
 class _Factor:
-    """Factorisation of the free part of a matrix: dense where it is small, which is three times as fast there."""
+    """Factorisation of the free part of a matrix; small matrices are treated as dense, which is three times as fast."""
 
     def __init__(self, matrix: csr_matrix, free: NDArray[np.int64]) -> None:
         part = matrix[free][:, free]
@@ -134,7 +135,7 @@ class _Factor:
 
 
 def _at_first(mass: csr_matrix, free: NDArray[np.int64], right: Array) -> Array:
-    """Accelerations at the start; massless unknowns have none."""
+    """Accelerations at the start; zero for unknowns without mass."""
     part = mass[free][:, free].tocsc()
     if np.all(part.diagonal()):
         return np.asarray(splu(part).solve(right))

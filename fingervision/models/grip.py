@@ -1,8 +1,8 @@
-"""A part held between the fingers, and its gripping force, by small displacements.
+"""Gripping force on a part held between the fingers, for small displacements.
 
 The part is a block with flat sides, of given width and stiffness, centred between the fingers. Each finger meets a
-plane at half the part's width, which yields by the finger's force over twice the part's stiffness: Signorini's contact
-problem, with that compliance added to every pair of points on the finger's face.
+plane at half the part's width, which yields by the finger's force divided by twice the part's stiffness. This is
+Signorini's contact problem with the part's compliance added to that of every pair of points on the finger's face.
 """
 
 from dataclasses import dataclass
@@ -17,45 +17,47 @@ from fingervision.models.signorini import contact_forces_n
 Array = NDArray[np.float64]
 
 _BEYOND_TOUCH = 0.05
-"""Of the way to the touch: far enough that rounding is nothing, too near for more of the face to touch."""
+"""Step beyond the input of first touch, as a share of that input: large beside rounding errors, and so small that no
+further point touches."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part between the fingers.
+    """A part to be gripped between the fingers.
 
     Parameters
     ----------
     width_mm : float
-        Unloaded.
+        Width of the part without load.
     stiffness_n_mm : float
-        Force by which it is squeezed over the width that it loses; infinite where it is rigid.
+        Squeezing force per loss of width; infinite for a rigid part.
     """
 
     width_mm: float
     stiffness_n_mm: float = inf
 
     def squeezed_mm(self, grip_n: float) -> float:
-        """Width under a gripping force (mm)."""
+        """Width of the part under a gripping force (mm)."""
         return self.width_mm - grip_n / self.stiffness_n_mm
 
 
 def grip_equilibrium(body: DrivenBody, input_mm: float, part: Part) -> Equilibrium:
-    """Compute the small displacements with a part between the fingers.
+    """Compute the small displacements of the gripper with a part between the fingers.
 
     Parameters
     ----------
     body : DrivenBody
         The right half.
     input_mm : float
-        Of the drive.
+        Displacement of the drive.
     part : Part
-        Between the fingers.
+        The part between the fingers.
 
     Returns
     -------
     Equilibrium
-        Its contact forces are those of the part on each point of one finger's face; their sum is the grip.
+        Equilibrium of the right half; its contact forces are those of the part on each point of one finger's face, and
+        their sum is the gripping force.
     """
     moved = input_mm * body.unit_displacement_mm
     free_gap = body.face_gap_mm(moved) - 0.5 * part.width_mm
@@ -70,7 +72,7 @@ def grip_equilibrium(body: DrivenBody, input_mm: float, part: Part) -> Equilibri
 
 
 def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
-    """Input at which the part is first touched (mm); None where no finger moves towards it."""
+    """Input at which a finger first touches the part (mm); None if the fingers do not move towards it."""
     slope = body.unit_displacement_mm[body.face]
     closing = slope > 0.0
     if not closing.any():
@@ -79,9 +81,9 @@ def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
 
 
 def mechanical_advantage(body: DrivenBody) -> float | None:
-    """Gripping force of each finger per drive force, beyond the input at which the fingers touch each other.
+    """Increase of each finger's gripping force per increase of drive force, once the fingers touch each other.
 
-    The rest of the drive's work bends hinges and fingers. None where the fingers do not close.
+    The rest of the drive's work bends hinges and fingers. None is returned for fingers that do not close.
     """
     touch = body.first_touch_mm()
     if touch is None:

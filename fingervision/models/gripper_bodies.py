@@ -1,4 +1,4 @@
-"""Poses of the gripper's bodies (both fingers and the drive) by every kind of model of a `gripper.toml`."""
+"""Poses of the gripper's bodies (both fingers and the drive), for every kind of model of a `gripper.toml`."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -21,20 +21,23 @@ Array = NDArray[np.float64]
 Poses = Callable[[Array], Mapping[str, BodyPose]]
 
 _MOST_EQUILIBRIA = 41
-"""Equilibria in the deformed shape; a curve through 41 is within 0.02 um of its own refinement for the sample."""
+"""Most equilibria computed in the deformed shape: for the published sample a spline through 41 of them is within 0.02
+um of a finer one."""
 _RIGHT, _LEFT = "right_", "left_"
 _MIRROR = np.array([-1.0, 1.0, -1.0])
 _ON_AXIS = np.array([0.0, 1.0, 0.0])
-"""A body that both halves share moves along the axis alone; its half also bends aside, against the other half."""
+"""Components of motion (x, y, rotation) kept for a body on the symmetry axis: it moves along the axis only, although
+each of its halves alone would also bend sideways, against the other half."""
 
 
 _KEPT: dict[tuple[Hinge, Lever, Links], tuple[LinkBody, ...]] = {}
 _MOST_KEPT = 8
-"""Drawings whose bodies are kept: every kind of model of a drawing has the same, and cuts them in half a second."""
+"""Number of drawings whose bodies are cached: all kinds of model of a drawing use the same bodies, which take half a
+second to cut out."""
 
 
 def gripper_bodies(gripper: Gripper) -> tuple[LinkBody, ...]:
-    """Divide the right half into its bodies."""
+    """Divide the right half of a gripper into its bodies."""
     outline = (gripper.hinge, gripper.lever, gripper.links)
     if outline not in _KEPT:
         while len(_KEPT) >= _MOST_KEPT:
@@ -49,7 +52,7 @@ def poses_of_plate(plate: PlaneStressPlate, gripper: Gripper, *, large: bool) ->
 
 
 def poses_of_frame(gripper: Gripper, skeleton: Skeleton, *, large: bool) -> Poses:
-    """Poses of the right half's bodies from the motions of the nodes of its bars.
+    """Poses of the right half's bodies from the motions of the nodes of the bars.
 
     A bar is represented by two rows of points at its sixths across its width, which give the bar's area and second
     moment.
@@ -95,16 +98,16 @@ def gripper_poses(half: DrivenBody, physics: Physics, poses: Poses, input_mm: Ar
     half : DrivenBody
         The right half.
     physics : Physics
-        What goes beyond small displacements.
+        Which effects beyond small displacements are included.
     poses : callable
-        Displacements of the half to the poses of its bodies.
+        Maps displacements of the half to the poses of its bodies.
     input_mm : ndarray of float, shape (n,)
         Inputs.
 
     Returns
     -------
     dict of str to ndarray of float, shape (n, 3)
-        `x_mm`, `y_mm` and `angle_mrad` of every body that moves, the left finger the right one's mirror image.
+        `x_mm`, `y_mm` and `angle_mrad` of every moving body; the left finger is the mirror image of the right one.
     """
     inputs = np.asarray(input_mm, dtype=float)
     if physics == LINEAR:
@@ -134,7 +137,7 @@ def _through(nodes: Array, rows: Array, inputs: Array) -> Array:
 
 
 def _owner(member: str) -> str:
-    """Body to which a bar of the half belongs; None for a bar of a hinge."""
+    """Name of the body to which a bar of the half belongs; None for a bar of a hinge."""
     if member.startswith("hinge"):
         return ""
     if member in ("shuttle", "drive block"):
@@ -143,7 +146,7 @@ def _owner(member: str) -> str:
 
 
 def _turned(arm: Array, angle: float, *, large: bool) -> Array:
-    """Displacement of the end of a rotating arm."""
+    """Displacement of the far end of an arm that rotates about its other end."""
     if not large:
         return angle * np.array([-arm[1], arm[0]])
     c, s = np.cos(angle) - 1.0, np.sin(angle)

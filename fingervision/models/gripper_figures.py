@@ -1,4 +1,4 @@
-"""All figures of one model of a gripper by name: at rest, at the ends of a range of inputs, and its limits."""
+"""All characteristic numbers of one model by name: at zero input, at the ends of a range of inputs, and limits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
@@ -34,23 +34,24 @@ _ENDS: Mapping[str, str] = {"_mm": "mm", "_hz": "Hz", "_n": "N", "_mpa": "MPa", 
 def gripper_figures(
     gripper: Gripper, model: Any, inputs: Sequence[float] | NDArray[np.float64], figures: ModelFigures | None = None
 ) -> dict[str, float | None]:
-    """Column of `models.csv` for a model: small displacements at rest, and the loads at both ends of the inputs.
+    """Column of `models.csv` for one model: numbers at zero input, and loads at both ends of a range of inputs.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     model : StiffnessMatrixGripper, LumpedGripper or FiniteElementGripper
-        Of that drawing, with its physics.
+        Model of that drawing, with its physics.
     inputs : sequence of float
-        Whose smallest and largest are the ends; a cycle between them is what the hinges endure.
+        Inputs whose smallest and largest value are the ends of the range; the endurance is for a cycle between these
+        ends.
     figures : ModelFigures or None
-        `model.figures()` where known already.
+        Result of `model.figures()`, if already computed.
 
     Returns
     -------
     dict of str to float or None
-        By name, units at its end (`unit_of`); None where the model does not know.
+        Numbers by name; the unit ends the name (`unit_of`). None for a number that the model cannot compute.
     """
     figures = figures or model.figures()
     peak = figures.peak_stress
@@ -103,23 +104,23 @@ def gripper_figures(
 
 
 def life_between(gripper: Gripper, low: Sequence[float | None], high: Sequence[float | None]) -> Endurance | None:
-    """Endurance of the hinges between two loads (input, gap, force, grip, stress).
+    """Endurance of the hinges for a cycle between two states of load (input, gap, force, grip, stress).
 
-    The sign of the stress follows the input.
+    The stress is counted with the sign of the input.
     """
     ends = sorted(copysign(load[4] or 0.0, load[0] or 0.0) for load in (low, high))
     return endurance(gripper.material, ends[0], ends[1])
 
 
 def unit_of(name: str) -> str:
-    """Unit of a row, from its name."""
+    """Unit of a characteristic number, taken from the end of its name."""
     if name.endswith("]"):
         return name[name.rindex("[") + 1 : -1]
     return _UNITS.get(name) or next((unit for end, unit in _ENDS.items() if name.endswith(end)), "1")
 
 
 def label_of(name: str) -> str:
-    """Name of a row in words, without its unit, and the unit after a slash: for the axis of a figure."""
+    """Axis label of a characteristic number: its name in words, a slash, and its unit."""
     unit = unit_of(name)
     bare = name[: name.rindex(" [")] if name.endswith("]") else name
     for end in ("_mpa_per_mm", "_n_mm", "_deg_per_mm", *_ENDS):

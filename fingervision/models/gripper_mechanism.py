@@ -1,4 +1,4 @@
-"""The gripper as a mechanism drawn by bodies: one half with its symmetry, or both halves with their own dimensions."""
+"""The gripper as a general planar mechanism: one half with its symmetry, or both halves with their own dimensions."""
 
 from math import hypot
 
@@ -8,11 +8,11 @@ from fingervision.models.mechanism import Contact, Drive, Face, Mechanism
 from fingervision.models.plane_shapes import Polygon, Shape, bar, box
 
 _FAR = 3.0
-"""Of the largest coordinate: the wall of symmetry reaches beyond the body."""
+"""Extent of the wall on the symmetry axis, as a multiple of the largest coordinate of the body."""
 
 
 def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mechanism:
-    """Draw the right half: it slides along the symmetry axis, and its tip may touch that axis.
+    """Describe the right half as a mechanism that slides along the symmetry axis; its tip may touch that axis.
 
     The gap is twice the distance of the probe `tip` from the axis, and the force of both halves is twice the drive's.
     """
@@ -37,14 +37,14 @@ def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mecha
 
 
 def whole_mechanism(left: Gripper, right: Gripper, name: str) -> Mechanism:
-    """Draw both halves, the left one mirrored from its own drawing; the actuator guides the drive.
+    """Describe both halves as one mechanism; the left half is mirrored, the actuator guides the drive.
 
     Parameters
     ----------
     left, right : Gripper
         Drawings that share the drive block, the material and the plate.
     name : str
-        What it is called.
+        Name of the mechanism.
     """
     x0, x1, low, high = _drive_box(right)
     halves = ((left, -1.0, "left "), (right, 1.0, "right "))
@@ -92,7 +92,7 @@ def _foot(gripper: Gripper, side: float, name: str) -> Face:
 
 
 def _bodies(gripper: Gripper, side: float) -> list[Polygon]:
-    """Bars and polygons of one half, clipped at the symmetry axis; the left half is the mirror image."""
+    """Bars and polygons of one half, clipped at the symmetry axis; those of the left half are mirror images."""
     links = gripper.links
     shapes = (
         box(*links.pillar_and_root_mm),

@@ -1,4 +1,4 @@
-"""The outline of a gripper's right half, and the geometric conditions that it must meet.
+"""Outline of a gripper's right half, and the geometric conditions that this outline must satisfy.
 
 The half is the union of its bars and polygons, minus four notch discs, minus everything left of the symmetry axis.
 """
@@ -14,17 +14,19 @@ from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box
 
 _ON = 1e-6
-"""Of the height: how far beside a face material and void are looked for."""
+"""Distance on either side of a face at which material and void are tested, as a share of the gripper's height."""
 _SLIT = 0.05
-"""Of the neck: width of the slit that is sawn through it to see whether the body then falls in two."""
+"""Width, as a share of the neck, of the slit cut through a neck to test whether the body then falls into two parts."""
 _ASKEW_DEG = 15.0
-"""A notch across its link by more than this is no hinge of the link: its neck is then 4 % longer than its height."""
+"""Largest angle between a notch and its link: a notch at a larger angle is not a hinge of the link; its neck is then 4
+% longer than its height."""
 _STATED = 0.05
-"""Relative: how far the stated width and height may be from the drawn ones. They take no part in any answer."""
+"""Largest relative difference between the stated width and height and those drawn. The stated ones are used in no
+computation."""
 
 
 def notch_centres_mm(gripper: Gripper) -> tuple[PointMm, ...]:
-    """Centres of the four discs that cut the two hinges: radius + thickness / 2 to either side of each axis."""
+    """Centres of the four discs that cut the two hinges: radius + thickness / 2 on either side of each hinge's axis."""
     return _notch_centres_mm(gripper.hinge, gripper.lever)
 
 
@@ -38,7 +40,7 @@ def _notch_centres_mm(hinge: Hinge, lever: Lever) -> tuple[PointMm, ...]:
 
 
 def half_region(gripper: Gripper) -> PlanarRegion:
-    """The right half as shapes that are added and cut; its outline is computed once per drawing."""
+    """The right half as a sequence of shapes added and removed; its outline is computed once per drawing."""
     face = (gripper.lever.drive_face_half_width_mm, gripper.lever.drive_face_y_mm)
     return _half_region(gripper.hinge, gripper.lever, gripper.links, (face,))
 
@@ -70,8 +72,8 @@ def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
     Raises
     ------
     DataError
-        Where the half is not one body, a notch is a closed hole, a hinge does not hold its two sides together or does
-        not part them, or the clamp, the drive face or the tip's inner face is no face of the body.
+        If the half is not one body, a notch is a closed hole, a hinge does not connect the parts on its two sides or is
+        not their only connection, or the clamp, the drive face or the tip's inner face is not a face of the body.
     """
     region = half_region(gripper)
     try:
@@ -127,8 +129,8 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     if len(pieces) != 2 or not parted:
         end = "clamp" if number == 1 else "drive"
         raise DataError(
-            f"Hinge {number} in {origin} must be all that joins the {end} to the tip, but beside the "
-            f"neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm other material does; check "
+            f"Hinge {number} in {origin} must be the only connection from the {end} to the tip, but other material "
+            f"beside the neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm connects them too; check "
             f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
         )
 
@@ -159,7 +161,7 @@ def _check_faces(gripper: Gripper, region: PlanarRegion, origin: str) -> None:
 
 
 def check_stated_size(gripper: Gripper, origin: str) -> None:
-    """Refuse a drawing whose stated width or height is not that of its links."""
+    """Refuse a drawing whose stated width or height differs from that of its links."""
     region = half_region(gripper)
     points = np.concatenate([c.at(np.linspace(c.t0, c.t1, 9)) for loop in region.loops for c in loop.curves], axis=1)
     body = gripper.body
@@ -172,5 +174,5 @@ def check_stated_size(gripper: Gripper, origin: str) -> None:
         if abs(stated - value) > _STATED * value:
             raise DataError(
                 f"body.{name} in {origin} must be that of the drawn links, {value:.6g} mm within "
-                f"{100.0 * _STATED:g} %, but is {stated:g}; correct the one or the other."
+                f"{100.0 * _STATED:g} %, but is {stated:g}; correct one of the two."
             )

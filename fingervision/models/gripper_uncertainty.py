@@ -1,4 +1,4 @@
-"""Uncertainty of a gripper's figures from the stated uncertainties of its dimensions."""
+"""Uncertainty of a gripper's characteristic numbers from the stated uncertainties of its dimensions."""
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
@@ -29,23 +29,24 @@ def gripper_uncertainty(
     theory: HingeTheory = HingeTheory.CORRECTED,
     physics: Physics = LINEAR,
 ) -> dict[str, FigureUncertainty]:
-    """Propagate the stated uncertainties of a drawing to every figure of `gripper_figures`.
+    """Propagate the stated uncertainties of a drawing to every number of `gripper_figures`.
 
-    The figures of changed drawings come from the lumped model (out of the plane from the stiffness matrix), with small
-    displacements, with contact where the physics includes it; a bar model gives their ratio to the drawing's own
-    (`changed_drawings`). Finite elements for every changed drawing would take minutes, and an uncertainty needs two
-    digits only. The same uncertainty is stated for the figures of the other kinds of model.
+    The numbers of drawings with changed dimensions come from the lumped model (out of the plane from the stiffness
+    matrix), for small displacements, and with contact if the physics includes it; they are scaled from those of the
+    given drawing by ratios that a bar model computes (`changed_drawings`). Finite elements for every changed drawing
+    would take minutes, and an uncertainty needs two digits only. The same uncertainty is stated for the other kinds of
+    model.
 
     Parameters
     ----------
     gripper : Gripper
-        With its `uncertainties`.
+        Drawing with its `uncertainties`.
     inputs : sequence of float
-        Whose smallest and largest are the ends.
+        Inputs whose smallest and largest value are the ends of the range.
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
     physics : Physics
-        Of the figures.
+        Which effects beyond small displacements are included.
     """
     check_uncertainties(gripper)
     numbers = _numbers(gripper)
@@ -73,7 +74,7 @@ def check_uncertainties(gripper: Gripper) -> None:
     Raises
     ------
     DataError, ModelError
-        Where one standard uncertainty either way leaves no gripper.
+        If a change of a dimension by one standard uncertainty in either direction gives no valid gripper.
     """
     for name, estimate in _numbers(gripper).items():
         for by in (-(estimate.u or 0.0), estimate.u or 0.0):
@@ -92,7 +93,7 @@ def _numbers(gripper: Gripper) -> dict[str, Estimate]:
 
 
 def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
-    """Return a gripper with changed dimensions; refuse dimensions that no gripper can have."""
+    """Return the gripper with changed dimensions; refuse dimensions that are not possible for a gripper."""
     for name, by in changes.items():
         value = attrgetter(name)(gripper) + by
         if not name.endswith(_ANY_SIGN) and value <= 0.0:

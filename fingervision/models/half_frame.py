@@ -1,4 +1,4 @@
-"""One half of the gripper as a frame: the members of the tree become elements, their masses are lumped at the nodes."""
+"""One half of the gripper as a frame structure: tree members become elements, with masses lumped at nodes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _STIFF_JOINT = 1e-3
-"""Compliance of a rigid joint relative to a square bar of its length: small, yet well conditioned."""
+"""Compliance of a rigid joint relative to that of a square bar of the joint's length: small, yet well conditioned."""
 
 
 def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
-    """Convert a tree of members to elements."""
+    """Convert a tree of members to a frame of beam elements."""
     members = skeleton.members
     nodes = np.array([members[0].start_mm, *(member.end_mm for member in members)])
     ends = np.array([(member.parent + 1, place + 1) for place, member in enumerate(members)])
@@ -30,7 +30,7 @@ def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
 
 
 def joined_frame_of(gripper: Gripper, skeleton: Skeleton) -> JoinedFrame:
-    """Convert a tree of members to elements, except for the finger, which is one body."""
+    """Convert a tree of members to beam elements, except the finger, which becomes one elastic body."""
     body, bars = finger_body(gripper, skeleton), frame_of(gripper, skeleton)
     places = np.array([place for place, member in enumerate(skeleton.members) if not is_of_finger(member.name)])
     elements = CorotationalFrame(bars.nodes_mm, bars.ends[places], bars.end_compliance[places])
@@ -40,18 +40,19 @@ def joined_frame_of(gripper: Gripper, skeleton: Skeleton) -> JoinedFrame:
 def half_frame(
     gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame | None = None
 ) -> DrivenBody:
-    """Support and drive the frame of the right half.
+    """Apply supports and drive to the frame of the right half.
 
-    The clamp is fixed, the drive point moves by the input along the axis, and can neither move across it nor rotate.
+    The clamp is fixed. The drive point moves by the input along the symmetry axis, and can neither move sideways nor
+    rotate.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     skeleton : Skeleton
-        Its tree of members.
+        Tree of members of the drawing.
     frame : CorotationalFrame or None
-        Its elements; made where None.
+        Frame made from the tree; None makes it.
     """
     frame = frame or frame_of(gripper, skeleton)
     nodes, ends = frame.nodes_mm, frame.ends
@@ -87,10 +88,10 @@ def _end_compliance(gripper: Gripper, axis_mm: Array, place: int, skeleton: Skel
 def _mass_t(
     nodes: Array, ends: NDArray[np.int64], skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame
 ) -> csr_matrix:
-    """Half of each member's mass at each end, with the correction to a uniform bar's rotational inertia.
+    """Mass matrix: half of each member's mass at each end, corrected to a uniform bar's rotational inertia.
 
-    This is the mass matrix (2) of Hricko & Havlik (2015), m and I_z, node by node: I_z of a bar about its centre is m
-    (l^2 + w^2) / 12. A body that replaces members has its own mass matrix.
+    This is the mass matrix (2) of Hricko & Havlik (2015), with mass m and moment of inertia I_z for each node: I_z of a
+    bar about its centre is m (l^2 + w^2) / 12. An elastic body that replaces members has its own mass matrix.
     """
     mass, inertia = np.zeros(len(nodes)), np.zeros(len(nodes))
     body = frame.body if isinstance(frame, JoinedFrame) else None

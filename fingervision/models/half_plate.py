@@ -1,7 +1,7 @@
 """One half of the gripper as a meshed plate: its supports, guide, drive and measuring point.
 
-The lower face of the pillar is clamped, the symmetry axis cannot move across itself, and the drive face moves by the
-input.
+The lower face of the pillar is clamped, points on the symmetry axis cannot move sideways, and the drive face moves by
+the input.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ _ON_MM = 1e-7
 
 
 def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
-    """Support and drive the meshed right half.
+    """Apply supports and drive to the meshed right half.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
     Raises
     ------
     DataError
-        Where the mesh has no node on the clamp, the axis, the drive face or the tip's inner face.
+        If the mesh has no node on the clamp, the symmetry axis, the drive face or the tip's inner face.
     """
     links, lever = gripper.links, gripper.lever
     x, y = plate.nodes_mm
@@ -67,7 +67,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
 
 
 def _inner_face(gripper: Gripper, plate: PlaneStressPlate) -> Indices:
-    """Edges of the tip's inner face: two ends and the middle, shape (3, k)."""
+    """Edges of the tip's inner face, each by the indices of its two end nodes and its middle node, shape (3, k)."""
     x, y = plate.nodes_mm
     edges = plate.outline_edges
     upright = np.all(np.abs(x[edges] - gripper.tip_corner_mm[0]) < _ON_MM, axis=0)
@@ -80,7 +80,7 @@ def _inner_face(gripper: Gripper, plate: PlaneStressPlate) -> Indices:
 
 
 def _measuring_point(gripper: Gripper, plate: PlaneStressPlate, edges: Indices) -> tuple[Indices, Array]:
-    """Nodes of the edge that contains the measuring point, and the quadratic weights of their displacements."""
+    """Nodes of the edge that contains the measuring point, and quadratic weights that interpolate the motion there."""
     y = plate.nodes_mm[1]
     y_mm = gripper.measuring_point_mm[1]
     ends = np.sort(y[edges[:2]], axis=0)

@@ -1,10 +1,11 @@
 """Compliance of a notch hinge: beam theory integrated along the notch, in all six directions.
 
-The load acts at the right end of the notch, x = R, the left end is fixed. Order of the components: displacements along
-x, y, z, rotations about x, y, z; x along the hinge, y across it in the plane, z out of the plane. The circular case is
-that of Paros and Weisbord (1965) and Wu and Zhou (Rev. Sci. Instrum. 73 (2002) 3101), which this reproduces to ten
-digits. Beam theory is too stiff, the more so the thicker the hinge: compared with a finite-element model at t / R =
-0.25, by 5 % in bending and 7 % in tension; in torsion it is 28 % too soft. `corrected_compliance` mends that.
+The load acts at the right end of the notch, x = R; the left end is fixed. The components are ordered as displacements
+along x, y, z, then rotations about x, y, z, with x along the hinge, y across the hinge in the plane, and z out of the
+plane. The circular case is that of Paros and Weisbord (1965) and Wu and Zhou (Rev. Sci. Instrum. 73 (2002) 3101), which
+this reproduces to ten digits. Beam theory is too stiff, the more so the thicker the hinge: compared with a
+finite-element model at t / R = 0.25, by 5 % in bending and 7 % in tension; in torsion it is 28 % too soft.
+`corrected_compliance` corrects these errors.
 """
 
 import numpy as np
@@ -17,28 +18,29 @@ from fingervision.models.notch import Notch
 Array = NDArray[np.float64]
 
 _GAUSS = leggauss(160)
-"""Points and weights: thirteen digits from t / R = 0.002 to 1."""
+"""Gauss-Legendre points and weights: accurate to thirteen digits from t / R = 0.002 to 1."""
 _SHEAR = 6.0 / 5.0
 """Shear factor of a rectangle: Timoshenko, Strength of Materials, part 1."""
 
 
 def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, float] | None = None) -> Array:
-    """Integrate the compliance of a notch by beam theory, shear and Saint-Venant torsion included.
+    """Integrate the compliance of a notch by beam theory, including shear and Saint-Venant torsion.
 
     Parameters
     ----------
     notch : Notch
-        Its shape.
+        Shape of the notch.
     material : Material
-        Linear elastic.
+        Linear elastic material.
     span_mm : (float, float) or None
-        A part of the notch, along its axis from its middle; the load acts at the part's right end. The parts' series
-        is the whole to rounding, however they are cut. None for the whole notch.
+        Start and end of a part of the notch, as positions along its axis from its middle; the load acts at the part's
+        right end. The parts in series have the compliance of the whole notch to rounding, wherever it is divided. None
+        for the whole notch.
 
     Returns
     -------
     ndarray of float, shape (6, 6)
-        mm/N, rad/N = mm/(N mm) and rad/(N mm), symmetric.
+        Symmetric matrix with entries in mm/N, rad/N = mm/(N mm) and rad/(N mm).
     """
     # With x = a sin(angle) the integrands are smooth at the notch's ends; with sin(angle / 2) = c sinh(s) the peak of
     # 1 / h^3 at the neck, which is sqrt(t R) wide, becomes as wide as the range, so that thin necks lose no digits.
@@ -67,7 +69,7 @@ def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, floa
 def bar_compliance(length_mm: float, width_mm: float, plate_mm: float, material: Material) -> Array:
     """Compliance of a straight bar (Timoshenko beam) at its loaded end, with the other end fixed.
 
-    As `beam_compliance`.
+    Order of components and units are those of `beam_compliance`.
     """
     E, G = material.youngs_modulus_mpa, material.shear_modulus_mpa
     area = width_mm * plate_mm

@@ -1,12 +1,13 @@
 """Beam theory of the notch hinge corrected by finite elements: the default of the models.
 
 The compliance in each direction is multiplied by ratios that `tests/benchmarks/models_hinge_table.py` prints for nu =
-0.34. The first is plane stress between rigid end planes to beam theory. The second is the restraint by the width, from
-quadratic bricks, which scales with nu^2. The third, for a hinge in a body, is elastic blocks to rigid planes, because
-the blocks yield where the notch joins them. At t / R = 0.25 and b / t = 3, bricks are 1.05 times as compliant as beams
-in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of the
-table, ratios are interpolated over log(t / R) and log(b / t); beyond its ends they are constant, except in torsion,
-where the ratio continues to fall with (t / b)^2.
+0.34. The first ratio is that of the compliance in plane stress between rigid end planes to beam theory. The second is
+the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third, for a hinge in a
+body, is the ratio of the compliance between elastic blocks to that between rigid planes, because the blocks yield where
+the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam theory in
+bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of the table,
+ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant, except in
+torsion, where the ratio continues to fall with (t / b)^2.
 """
 
 from enum import StrEnum
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class HingeTheory(StrEnum):
-    """Source of a hinge's compliance: beam theory, or corrected by finite elements."""
+    """Source of a hinge's compliance: beam theory alone, or beam theory corrected by finite elements."""
 
     CORRECTED = "corrected"
     BEAM = "beam"
@@ -33,7 +34,8 @@ class HingeTheory(StrEnum):
 _T_OVER_R = (0.0125, 0.025, 0.05, 0.1, 0.25, 0.5, 0.8, 1.6)
 _B_OVER_T = (0.5, 1.0, 3.0, 10.0, 30.0, 100.0)
 _POISSON = 0.34
-"""Of the tables. The width's share in the in-plane compliance is proportional to nu^2: plane strain is 1 - nu^2."""
+"""Poisson's ratio of the tables. The effect of the width on the in-plane compliance is proportional to nu^2: the factor
+for plane strain is 1 - nu^2."""
 _X, _Y, _ABOUT_X, _ABOUT_Z = 0, 1, 3, 5
 
 # By t / R, then by b / t; order of the six: displacements x, y, z, rotations about x, y, z.
@@ -129,7 +131,7 @@ _BLOCKS_OVER_PLANES = (
 
 @lru_cache(maxsize=1)
 def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpolator]:
-    """Curves over log(t / R): shares and ratios by b / t, plane stress over beam theory, blocks over planes."""
+    """Curves over log(t / R): ratios that depend on b / t, plane stress to beam theory, blocks to planes."""
     table = np.array(_BRICKS_OVER_BEAM)
     shares = (1.0 - table / table[:, :1, :]) / _POISSON**2
     mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
@@ -140,7 +142,7 @@ def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpola
 
 @lru_cache(maxsize=512)
 def _bricks(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
-    """Interpolated factors: shares of plane strain along, across and about z, and ratios of the other directions."""
+    """Interpolate shares of plane strain (along x, along y, about z) and ratios of the other directions."""
     if t_over_r < _T_OVER_R[0]:
         # What counts is the width over the length that bends, sqrt(t R).
         b_over_t *= np.sqrt(t_over_r / _T_OVER_R[0])
@@ -154,7 +156,7 @@ def _bricks(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
 
 
 def plane_strain_share(notch: Notch) -> float:
-    """How strongly the width restrains the notch in bending: 0 in plane stress, 1 in plane strain."""
+    """Degree to which the width restrains the notch in bending: 0 for plane stress, 1 for plane strain."""
     share = _bricks(notch.curvature_ratio, notch.plate_mm / notch.thickness_mm)[_ABOUT_Z]
     return min(max(share, 0.0), 1.0)
 
@@ -180,7 +182,7 @@ def blocks_over_planes(notch: Notch) -> Array:
 
 
 def hinge_ratio(notch: Notch, material: Material, theory: HingeTheory) -> Array:
-    """Ratio of a notch's compliance in a body to beam theory, shape (6,); ones for beam theory."""
+    """Ratio of the compliance of a notch in a body to that by beam theory, shape (6,); ones for `BEAM`."""
     if theory is HingeTheory.BEAM:
         return np.ones(6)
     ratio = planes_ratio(notch, material) * blocks_over_planes(notch)
@@ -193,7 +195,7 @@ def corrected_compliance(notch: Notch, material: Material) -> Array:
     """Compliance of a notch between rigid end planes, corrected by finite elements.
 
     The correction multiplies the matrix by a diagonal matrix from both sides, which keeps it symmetric and positive
-    definite; the entries that couple displacement and rotation then agree with bricks within 0.3 %.
+    definite; the entries that couple displacement and rotation then agree with brick elements within 0.3 %.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Nominal stress in the hinges of a frame: bending and tension of the section under the loads of the joints.
+"""Nominal stress in the hinges of a frame: bending and tension of the section, from the loads at the frame's nodes.
 
 At the surface of a notch the stress is a few per cent higher than in a straight bar, by Neuber's factors for a deep
 notch (Kerbspannungslehre, 1937; Pilkey, Peterson's Stress Concentration Factors, charts 2.10 and 2.31). A wide plate
@@ -21,7 +21,8 @@ from fingervision.models.skeleton import Member, Skeleton
 Array = NDArray[np.float64]
 
 _SAMPLES = 9
-"""Along a segment: the largest stress lies beside the neck where the moment grows along the hinge."""
+"""Sections per segment at which the stress is computed: the maximum lies beside the neck if the moment varies along the
+hinge."""
 _HINGES = ("hinge 1", "hinge 2")
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 
@@ -29,23 +30,24 @@ _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 def peak_hinge_stress(
     gripper: Gripper, skeleton: Skeleton, displacement: Array, theory: HingeTheory = HingeTheory.BEAM
 ) -> PeakStress:
-    """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) in the hinges, nominal or with the notch's factors.
+    """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) in the hinges, nominal or with notch factors.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     skeleton : Skeleton
-        Its tree of members, hinges cut into segments.
+        Tree of members, with the hinges divided into segments.
     displacement : ndarray of float, shape (3 * (members + 1),)
-        Small displacements (mm) and rotations (rad) by some input, joint by joint, the clamp first.
+        Small displacements (mm) and rotations (rad) of the nodes at some input, starting with the clamp.
     theory : HingeTheory
-        Nominal stress of a straight bar by beam theory; von Mises's on the notch where corrected.
+        Beam theory gives the nominal stress of a straight bar; the corrected theory gives the von Mises stress on the
+        notch.
 
     Returns
     -------
     PeakStress
-        At that input, on the side of the section that both loads stretch or press alike.
+        Stress at that input, on the side of the section where tension and bending stresses add.
     """
     moved = displacement.reshape(-1, 3)
     loads = np.zeros((len(skeleton.members), 3))
@@ -68,12 +70,12 @@ def peak_in_deformed_shape(
     displacement: Array,
     theory: HingeTheory,
 ) -> PeakStress:
-    """The same in the deformed shape, with the loads in axes that rotate with the material."""
+    """Find the largest hinge stress in the deformed shape, with loads in axes that rotate with the material."""
     return _peak(gripper, skeleton, frame.end_loads(displacement) * np.array([1.0, -1.0, 1.0]), theory)
 
 
 def _peak(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheory) -> PeakStress:
-    """Largest stress from tension and the moments at both ends of every member, shape (members, 3)."""
+    """Largest stress, from tension and end moments of every member (`loads`, shape (members, 3))."""
     lever = gripper.lever
     first, second = notches_of(gripper)
     hinges = {"hinge 1": (lever.hinge1_mm, first), "hinge 2": (lever.hinge2_mm, second)}
@@ -103,7 +105,7 @@ def _peak(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheor
 
 
 def notch_factors(notch: Notch) -> tuple[float, float]:
-    """Neuber's stress concentration of a deep notch on both sides, in tension and in bending."""
+    """Neuber's stress concentration factors, in tension and bending, of a bar with deep notches on both sides."""
     ratio = 0.5 * notch.curvature_ratio  # half the neck's height over the radius of curvature
     root, angle = sqrt(ratio), atan(sqrt(ratio))
     tension = 2.0 * (ratio + 1.0) * root / ((ratio + 1.0) * angle + root)

@@ -1,4 +1,4 @@
-"""Frame of the half gripper: pillar, hinges and shuttle as elements, the finger as one body that rotates."""
+"""Frame structure of the half gripper: pillar, hinges and shuttle as beam elements, the finger as one elastic body."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,20 +16,20 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class JoinedFrame:
-    """Elements and one body at the nodes of one tree; large rotations, small strains.
+    """Beam elements and one elastic body that share the nodes of a tree; large rotations, small strains.
 
     Parameters
     ----------
     nodes_mm : ndarray of float, shape (n, 2)
-        Of the whole tree.
+        Positions of all nodes of the tree.
     ends : ndarray of int, shape (m, 2)
-        Of all members, those within the body too.
+        Node indices of the two ends of all members, including those within the body.
     places : ndarray of int
-        Members that are elements.
+        Indices of the members that are beam elements.
     elements : CorotationalFrame
-        These.
+        The beam elements.
     body : FingerBody
-        Instead of the others.
+        The elastic body that replaces the other members.
     """
 
     nodes_mm: Array
@@ -40,7 +40,7 @@ class JoinedFrame:
 
     @property
     def unknowns(self) -> int:
-        """Three a node."""
+        """Number of unknowns: three per node."""
         return self.elements.unknowns
 
     @cached_property

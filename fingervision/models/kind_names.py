@@ -10,7 +10,7 @@ GROUP = "fingervision.models"
 
 @cache
 def built_in_kinds() -> tuple[str, ...]:
-    """List the modules of this package that state a name as KIND, sorted."""
+    """List the names of the modules of this package that define KIND, sorted."""
     here = Path(__file__).parent
     return tuple(
         sorted(
@@ -23,5 +23,5 @@ def built_in_kinds() -> tuple[str, ...]:
 
 
 def kind_names() -> tuple[str, ...]:
-    """List the kinds, built in and installed."""
+    """List the names of all kinds of model, built in and installed."""
     return tuple(dict.fromkeys((*built_in_kinds(), *(point.name for point in entry_points(group=GROUP)))))

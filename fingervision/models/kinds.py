@@ -1,4 +1,4 @@
-"""The parametric models: modules of this package that state their KIND, and those of other distributions."""
+"""Registry of the parametric models: modules of this package that define KIND, and those of other distributions."""
 
 import importlib
 from collections.abc import Iterable
@@ -26,17 +26,17 @@ class GripperModel(Model, Protocol):
 
     @property
     def name(self) -> str:
-        """Its kind."""
+        """Name of the model's kind."""
         ...
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input for which the model is meant (mm)."""
+        """Smallest and largest input for which the model is valid (mm)."""
         ...
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero (mm)."""
+        """The gap at zero input (mm)."""
         ...
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -47,7 +47,7 @@ class GripperModel(Model, Protocol):
         ...
 
     def figures(self) -> ModelFigures:
-        """Figures of the model for the comparison table."""
+        """Characteristic numbers of the model for the comparison table."""
         ...
 
 
@@ -56,14 +56,14 @@ class Kind(Protocol):
 
     Optional attributes are `SMALL_DISPLACEMENTS_ALONE` (True for a model without large rotation and contact) and
     `TRUST`, a number (finite elements of the outline 3, bars in the plane 2, bars at small displacements 1; default 0).
-    Where two kinds differ by more than their own errors, the one with the larger number is trusted, for the reason
-    given in `WHY_TRUSTED`.
+    If two kinds differ by more than their own errors, the kind with the larger `TRUST` is trusted, for the reason given
+    in `WHY_TRUSTED`.
     """
 
     KIND: str
 
     def build(self, gripper: Gripper, physics: Physics, theory: HingeTheory) -> GripperModel:
-        """Build it."""
+        """Build the model of a gripper."""
         ...
 
 
@@ -102,12 +102,12 @@ def by_trust(names: Iterable[str]) -> list[str]:
 
 
 def trust(kind: str) -> int:
-    """Trust in a kind relative to others: how much of the outline it models."""
+    """Number by which a kind is trusted relative to others: the larger, the more of the outline it models."""
     return int(getattr(REGISTRY.get(kind).value, "TRUST", 0)) if kind in kinds() else 0
 
 
 def why_trusted(kind: str) -> str:
-    """Reason why this kind of model is more accurate than simpler ones; empty if it states none."""
+    """Reason why this kind of model is more accurate than simpler kinds; empty if the module gives none."""
     return str(getattr(REGISTRY.get(kind).value, "WHY_TRUSTED", "")) if kind in kinds() else ""
 
 
@@ -121,16 +121,16 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     gripper : Gripper
         The drawing.
     physics : Physics
-        What goes beyond small displacements; some kinds know small displacements alone.
+        Which effects beyond small displacements are included; some kinds support small displacements only.
     theory : HingeTheory
-        Of the hinges; `finite_element` has no need of one.
+        Theory of the hinges' compliance; not used by `finite_element`.
 
     Raises
     ------
     UsageError
-        Where the kind is unknown or does not know the physics asked for.
+        If the kind is unknown or does not support the requested physics.
     PluginShapeError
-        A model from outside the package fails, or answers what is no answer.
+        If a model from outside the package fails or returns an invalid result.
     """
     try:
         entry = REGISTRY.get(kind)
@@ -139,7 +139,7 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     if entry.origin.built_in:
         return entry.value.build(gripper, physics, theory)
     if physics != LINEAR and small_displacements_alone(kind):
-        raise UsageError(f"{kind} knows small displacements alone: leave out --large-rotation and --contact.")
+        raise UsageError(f"{kind} handles small displacements only: leave out --large-rotation and --contact.")
     return _tried(kind, entry.origin, entry.value, gripper, physics, theory)
 
 
@@ -161,11 +161,11 @@ def _tried(
         raise
     except Exception as error:
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-        raise PluginShapeError(f"{who} must answer for every drawing, but raised {said}: {origin.remedy}.") from error
+        raise PluginShapeError(f"{who} must work for every drawing, but raised {said}: {origin.remedy}.") from error
     if shapes != {asked.shape} or not np.all(np.isfinite(gap_mm)):
         words = f"{gap_mm.tolist()}" if shapes == {asked.shape} else f"shape {sorted(shapes)}"
         raise PluginShapeError(
-            f"{who} must answer three inputs with three finite gaps, but gave {words}: {origin.remedy}."
+            f"{who} must give three finite gaps for three inputs, but gave {words}: {origin.remedy}."
         )
     if not np.isclose(gap_mm[1], rest_mm, rtol=0.0, atol=1e-9 * max(1.0, abs(rest_mm))):
         raise PluginShapeError(
@@ -173,9 +173,11 @@ def _tried(
         )
     if not isinstance(figures, ModelFigures):
         given = type(figures).__name__
-        raise PluginShapeError(f"{who} must give ModelFigures as its figures, but gave a {given}: {origin.remedy}.")
+        raise PluginShapeError(
+            f"{who} must return a ModelFigures object from `figures`, but returned a {given}: {origin.remedy}."
+        )
     if figures.peak_stress is not None and not hasattr(model, "loaded"):
         raise PluginShapeError(
-            f"{who} must have loaded(inputs_mm) where it knows a stress, but has none: {origin.remedy}."
+            f"{who} must have a method loaded(inputs_mm) if it states a stress, but has none: {origin.remedy}."
         )
     return model

@@ -1,9 +1,9 @@
 """Equilibrium in the deformed shape: Newton's method on the total Lagrangian equations, with contact if requested.
 
-One tangent matrix is used for many steps, along the path too, as long as the residual falls well. If the fingers may
-touch, every step is a linear complementarity problem (Signorini) with the tangent's compliance, so that touching and
-separating points are found together with the displacements (Newton's method for generalised equations: Josephy,
-Mathematics Research Center report 1965, University of Wisconsin, 1979).
+One tangent matrix is used for many iterations, and for many inputs along the path, as long as the residual falls
+quickly. If the fingers may touch, every step is a linear complementarity problem (Signorini) with the tangent's
+compliance, so that touching and separating points are found together with the displacements (Newton's method for
+generalised equations: Josephy, Mathematics Research Center report 1965, University of Wisconsin, 1979).
 """
 
 from math import log
@@ -19,19 +19,20 @@ from fingervision.models.signorini import contact_forces_n
 Array = NDArray[np.float64]
 
 _TANGENTS, _STEPS_EACH = 30, 12
-"""A tangent costs as much as some ten steps."""
+"""Most tangent matrices, and iterations with each: computing a tangent costs as much as about ten iterations."""
 _SET_CHANGES = 12
 _RESIDUAL, _ROUNDING = 1e-9, 1e-7
-"""Of the largest nodal force of the small displacements. Where the residual does not fall any more, it is rounding."""
+"""Largest residual of a solution, as a share of the largest nodal force of the small displacements; and the larger
+residual that is accepted as rounding error if it does not fall any more."""
 _ON_MM = 1e-7
 _STEP_MM = 0.5
 _SCALE_MM = 1e-3
 _CURVE = 3
-"""Equilibria that a next one is extrapolated from."""
+"""Number of previous equilibria from which the next one is extrapolated."""
 
 
 class _Tangent:
-    """The latest tangent matrix of a body, factorised, with the displacements by a unit force on each face point."""
+    """The latest tangent matrix of a body, factorised, with the displacements for unit forces on each face point."""
 
     def __init__(self, body: DrivenBody, *, contact: bool) -> None:
         self.body, self.contact = body, contact
@@ -54,7 +55,7 @@ class _Tangent:
         return solver
 
     def step(self, moved: Array, internal_n: Array) -> tuple[Array, Array]:
-        """Displacements of all unknowns, and contact forces, that balance the internal forces by this tangent."""
+        """Displacements of all unknowns, and contact forces, that balance the internal forces for this tangent."""
         body, step = self.body, np.zeros_like(moved)
         solver = self._solver or self.renew(moved)
         step[body.free] = solver.solve(-internal_n[body.free])
@@ -74,23 +75,24 @@ def large_equilibrium(
 ) -> Equilibrium:
     """Find the equilibrium at one input.
 
-    With contact, gap >= 0, force >= 0, and one of them is zero at every point of the fingers' faces.
+    With contact, the gap and the contact force are both >= 0 at every point of the fingers' faces, and at least one of
+    the two is zero.
 
     Parameters
     ----------
     body : DrivenBody
-        The body.
+        The elastic half gripper.
     input_mm : float
         Displacement of the drive.
     start : Equilibrium
-        A neighbouring equilibrium to begin from.
+        A neighbouring equilibrium from which the iteration starts.
     contact : bool
         Whether the symmetry plane stops the fingers.
 
     Raises
     ------
     ModelError
-        Where the iteration does not settle.
+        If the iteration does not converge.
     """
     return _next(_Tangent(body, contact=contact), input_mm, [start])
 
@@ -135,7 +137,7 @@ def _is_slow(body: DrivenBody, residual: float, before: float, wanted: float, si
 
 
 def _predicted(body: DrivenBody, input_mm: float, path: list[Equilibrium]) -> Array:
-    """Extrapolate the path; with only one equilibrium, by the small displacements."""
+    """Extrapolate the path of equilibria; if there is only one so far, add the small displacements."""
     last = path[-1]
     if len(path) == 1:
         return last.displacement_mm + (input_mm - last.input_mm) * body.unit_displacement_mm
@@ -152,7 +154,8 @@ def large_path(
 ) -> list[Equilibrium]:
     """Follow the equilibria from a first one, or from rest, to an input, in steps of at most half a millimetre.
 
-    A curve needs at least three steps; one is enough where only the last equilibrium is needed (`least`).
+    `least` is the least number of steps: three for a curve through the equilibria, one if only the last equilibrium is
+    needed.
     """
     path = [start or body.at_rest()]
     first_mm = path[0].input_mm

@@ -1,8 +1,9 @@
 """The gripper as a chain of lumped flexures and elastic links, as in the SimMechanics model of Hricko & Havlik (2015).
 
-Each notch is divided into segments, closer together at the neck. Each segment's compliance is the integral over it, so
-that their sum is the notch's compliance up to rounding, however thin the notch is. The remaining error is that of beam
-theory, which the correction of the hinges removes. The finger between the hinges is one elastic body (`finger_body`).
+Each notch is divided into segments, which are shorter near the neck. The compliance of each segment is the integral
+over its length, so that the segments together have the notch's compliance up to rounding, however thin the notch is.
+The remaining error is that of beam theory, which the hinge correction removes. The finger between the hinges is one
+elastic body (`finger_body`).
 """
 
 from collections.abc import Sequence
@@ -38,32 +39,32 @@ TRUST, WHY_TRUSTED = 2, "both take the body for bars, and it has more of them"
 _SEGMENTS = 10
 _MODES = 3
 _SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR, _GRIP_ERROR = 0.002, 0.015, 0.02, 0.015
-"""Beside finite elements of other grippers: slope within 0.03 %, force 0.9 %, first modes 0.4 %
+"""Relative model errors, from finite elements of other grippers: slope within 0.03 %, force 0.9 %, first modes 0.4 %
 (`tests/benchmarks/models_held_out.py`), grip on a part 0.5 % (`models_grip.py`)."""
 _SLOPE_OF_BARS, _FORCE_OF_BARS, _MODE_OF_BARS, _GRIP_OF_BARS = 0.01, 0.03, 0.2, 0.35
-"""Of bars alone: they bend up to where their axes meet and the body does not, which leaves slope and force alone but
-not what pushes a finger back (31 % and 18 % for the grip and the first mode where the cross bar is 5 mm wide between
-bars of 9 mm)."""
+"""Relative model errors with a finger made of bars only: bars bend up to the point where their axes meet, and the real
+body does not. This hardly affects slope and force, but the grip and the first mode are 31 % and 18 % off where the
+cross bar is 5 mm wide between bars of 9 mm."""
 
 
 class LumpedGripper:
-    """Segments and bars of two identical halves.
+    """Lumped model of a gripper: hinge segments, and elastic links of two identical halves.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     physics : Physics
-        What goes beyond small displacements.
+        Which effects beyond small displacements are included.
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
     segments : int
-        Per notch; the paper's n.
+        Segments per notch; n in Hricko & Havlik (2015).
     block : ndarray of float, shape (3, 3), or None
-        `drive_block_root.unit_compliance` of the drive block, where known already.
+        Result of `drive_block_root.unit_compliance` for the drive block, if already computed.
     bars_alone : bool
-        Whether the finger too is bars joined at points, which takes a hundredth of the time; by beam theory it always
-        is.
+        Whether the finger too is modelled by bars joined at points, which takes a hundredth of the time; with beam
+        theory it always is.
     """
 
     name = KIND
@@ -89,16 +90,16 @@ class LumpedGripper:
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input for which the model is meant (mm)."""
+        """Smallest and largest input for which the model is valid (mm)."""
         return covered_inputs_mm(self.gripper, self.half.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero (mm)."""
+        """The gap at zero input (mm)."""
         return 2.0 * self.half.measured_rest_mm
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Respond statically at each input."""
+        """Compute the static response at each input."""
         return symmetric_response(self.half, self.physics, input_mm)
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -107,7 +108,7 @@ class LumpedGripper:
         return gripper_poses(self.half, self.physics, poses, input_mm)
 
     def peak_stress(self) -> PeakStress:
-        """Largest stress in the hinges per 1 mm of input, in the notch or, by beam theory, nominal."""
+        """Largest stress in the hinges per 1 mm of input: on the notch surface, or nominal with beam theory."""
         return peak_hinge_stress(self.gripper, self.skeleton, self.half.unit_displacement_mm, self.theory)
 
     def equilibria(self, inputs_mm: Sequence[float]) -> list[Equilibrium]:
@@ -139,14 +140,14 @@ class LumpedGripper:
 
     @property
     def _errors(self) -> tuple[float, float, float, float]:
-        """Relative model errors of slope, force, modes and grip; by beam theory those of bars and joints only."""
+        """Relative model errors of slope, force, modes and grip; with beam theory those of a finger made of bars."""
         if not isinstance(self.frame, JoinedFrame):
             return _SLOPE_OF_BARS, _FORCE_OF_BARS, _MODE_OF_BARS, _GRIP_OF_BARS
         force = _FORCE_ERROR + 2.0 * force_uncertainty(self.gripper.material)
         return _SLOPE_ERROR, force, _MODE_ERROR, _GRIP_ERROR
 
     def figures(self) -> ModelFigures:
-        """Figures of the model for the comparison table."""
+        """Characteristic numbers of the model for the comparison table."""
         slope, force, mode, grip = self._errors
         return ModelFigures(
             gap_per_input(self.half),

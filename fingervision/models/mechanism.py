@@ -1,4 +1,4 @@
-"""A planar flexure mechanism as its drawing states it: bodies, flexures, supports, drive, probes."""
+"""Description of a planar flexure mechanism, as given by its drawing: bodies, flexures, supports, drive, probes."""
 
 from dataclasses import dataclass
 from math import hypot, pi
@@ -14,12 +14,13 @@ from fingervision.models.plane_shapes import Shape
 from fingervision.models.width_effect import force_uncertainty
 
 _SAME_AREA = 1e-2
-"""Areas are those of polygons through the arcs, good to 1e-3."""
+"""Relative difference below which two areas count as equal: areas of regions with arcs are computed from polygons, with
+an error of 1e-3."""
 
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """The nodes of the outline inside an upright box: x from, x to, y from, y to (mm)."""
+    """A face of the body: the nodes of the outline inside an upright box from x to x and from y to y (mm)."""
 
     name: str
     box_mm: tuple[float, float, float, float]
@@ -32,11 +33,12 @@ class Drive:
     Parameters
     ----------
     face : Face
-        Where.
+        The face that moves.
     direction : (float, float)
-        Unit vector of a positive input.
+        Unit vector of the motion for a positive input.
     across : str
-        `held`: guided, as by a stage; `free`: the face may slide, only along x or y.
+        Motion across `direction`: `held` for a face guided as by a stage; `free` for a face that may slide (only with a
+        direction along x or y).
     """
 
     face: Face
@@ -46,18 +48,18 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Faces that may touch, without friction.
+    """A pair of faces, or a face and a wall, that may touch without friction.
 
     Parameters
     ----------
     name : str
-        For messages and results.
+        Name of the contact in messages and results.
     face : Face
-        The one.
+        The first face.
     other : Face or None
-        The other one, or
+        The second face; None for contact with a wall.
     wall_mm : ((float, float), (float, float)) or None
-        two points of a rigid straight wall.
+        Two points on a rigid straight wall; None for contact with a second face.
     """
 
     name: str
@@ -73,25 +75,25 @@ class Mechanism:
     Parameters
     ----------
     name : str
-        What it is called.
+        Name of the mechanism.
     material : Material
-        Of the plate.
+        Material of the plate.
     plate_mm : float
-        Its thickness.
+        Thickness of the plate.
     bodies : tuple of (bool, Shape)
-        Shapes that are added (true) or cut, in order; the flexures follow them.
+        Shapes that are added (true) or removed (false), in order; the flexures are applied after them.
     flexures : tuple of Flexure
-        Each with its own numbers.
+        Flexures, each with its own dimensions.
     fixed : tuple of Face
         Faces that do not move.
     slides : tuple of (Face, str)
-        Faces on a line of symmetry, and the component, x or y, that is held there.
+        Faces on a line of symmetry, each with the component (x or y) that is fixed there.
     drive : Drive
-        What moves.
+        The driven face.
     probes : dict of str to (float, float)
-        Points whose motion is wanted.
+        Points whose displacements are computed.
     pairs : dict of str to (str, str)
-        Pairs of probes whose distance is wanted; a gap is a pair.
+        Pairs of probes whose distance is computed; a gap is a pair.
     contacts : tuple of Contact
         Faces that may touch.
     body_names : tuple of str
@@ -113,7 +115,7 @@ class Mechanism:
 
     @property
     def width_error(self) -> float:
-        """Relative uncertainty of the force by how far the plate's width holds the flexures back."""
+        """Relative uncertainty of the force because the restraint of the flexures by the plate's width is uncertain."""
         doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
         return 2.0 * force_uncertainty(self.material) + self.material.poisson_ratio**2 * doubt
 
@@ -128,12 +130,13 @@ class Mechanism:
 
 
 def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
-    """Refuse a drawing that is no mechanism.
+    """Refuse a drawing that is not a valid mechanism.
 
     Raises
     ------
     DataError
-        Where it is not one body, a flexure holds no material or its neck is no neck, or a probe lies outside.
+        If the drawing is not one body, a flexure contains no material or is not thinnest at its neck, or a probe lies
+        outside.
     """
     name = mechanism.name
     try:
@@ -142,8 +145,8 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         raise DataError(f"In {name}: {error}") from error
     if outer != 1:
         raise DataError(
-            f"The bodies of {name} must be one piece, but are {outer}; let bodies and flexures overlap, and "
-            "no cut part them."
+            f"The bodies of {name} must form one connected piece, but form {outer}; let bodies and flexures "
+            "overlap, and let no cut separate them."
         )
     size = region.size_mm
     uncut = PlanarRegion(mechanism.bodies)
@@ -163,17 +166,17 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             _check_leaf(flexure, region, uncut, name)
         elif flexure.is_notch and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
             raise DataError(
-                f"The cuts of flexure {flexure.name} of {name} must open through the faces of what they part, but a "
-                f"whole ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm is a closed hole; make it "
-                "larger, or check its unit."
+                f"The cuts of flexure {flexure.name} of {name} must reach the outer edges of the body, but an "
+                f"ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm lies wholly inside it, as a closed "
+                "hole; enlarge the ellipse, or check its unit."
             )
     for place, flexure in enumerate(mechanism.flexures):
         for other in mechanism.flexures[:place]:
             apart = hypot(flexure.at_mm[0] - other.at_mm[0], flexure.at_mm[1] - other.at_mm[1])
             if apart < 0.5 * (flexure.thickness_mm + other.thickness_mm):
                 raise DataError(
-                    f"flexures {other.name} and {flexure.name} of {name} must be apart, but lie on each other; take "
-                    "one away or move it."
+                    f"flexures {other.name} and {flexure.name} of {name} must be apart, but overlap; remove "
+                    "or move one of them."
                 )
     for probe, (x, y) in mechanism.probes.items():
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
@@ -185,19 +188,19 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
 
 
 def _is_hole(area_mm2: float, flexure: Flexure) -> bool:
-    """Whether a closed part of the outline is one whole cut of a flexure."""
+    """Whether a hole in the outline is one complete cut of a flexure."""
     cut_mm2 = pi * flexure.half_length_mm * flexure.depth_mm
     return area_mm2 < 0.0 and abs(area_mm2 + cut_mm2) < _SAME_AREA * cut_mm2
 
 
 def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, name: str) -> None:
-    """Check that a leaf is free for longer than it is thick, and that both its ends lie inside bodies."""
+    """Check that a leaf's free length exceeds its thickness, and that both its ends lie inside bodies."""
     t, reach = flexure.thickness_mm, flexure.half_length_mm
     beside = np.array([flexure.point_mm(x * t, s * 0.501 * t) for x in (-0.5, 0.5) for s in (-1.0, 1.0)]).T
     if region.holds(beside).any():
         raise DataError(
-            f"flexure {flexure.name} of {name} must be free for longer than its thickness of {t:g} mm, but is not; "
-            "check its length and whether all lengths are millimetres."
+            f"flexure {flexure.name} of {name} must have a free length greater than its thickness of {t:g} "
+            "mm, but is not; check its length and whether all lengths are millimetres."
         )
     ends = np.array([flexure.point_mm(s * reach * (1.0 - 1e-6), 0.0) for s in (-1.0, 1.0)]).T
     inside = uncut.holds(ends)

@@ -1,4 +1,4 @@
-"""The bodies of a mechanism: the connected pieces of the drawing that remain when its flexures are cut away."""
+"""The bodies of a mechanism: the connected pieces of the drawing that remain when its flexures are removed."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -18,28 +18,29 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _CHORDS = 65
-"""Along an arc: a centroid is then within 1e-5 of the arc's radius."""
+"""Chords that replace an arc: the error of a centroid is then below 1e-5 of the arc's radius."""
 _SAMPLES = 24
-"""Points along either side of the box round a shape, by which it is told in which piece most of a shape lies."""
+"""Test points along either side of the box round a shape, by which the piece that contains most of the shape is
+found."""
 _ON = 1e-6
-"""Of the drawing's size: how near to a face's box the outline must come to lie on it."""
+"""Distance from a face's box within which the outline counts as lying on it, as a share of the drawing's size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkBody:
-    """One body.
+    """One body of a mechanism.
 
     Parameters
     ----------
     name : str
-        That of the first named shape of the drawing that mostly lies in it; letters, digits, `_` and `-` alone, so that
-        it can be part of a column's name.
+        Name of the first named shape of the drawing that lies mostly in the body; letters, digits, `_` and `-` only, so
+        that it can be part of a column's name.
     is_fixed : bool
-        Whether a fixed face holds it: its pose is no answer.
+        Whether a fixed face supports the body; its pose is then not computed.
     outline, holes : Loop, tuple of Loop
-        Its outline and its holes, without the flexures.
+        Outline and holes of the body, without the flexures.
     centroid_mm : ndarray of float, shape (2,)
-        Of its area: the reference point of its pose.
+        Centroid of the body's area, the reference point of its pose.
     """
 
     name: str
@@ -64,7 +65,7 @@ def bodies_of(mechanism: Mechanism, spans: Sequence[FlexureSpan] | None = None) 
     mechanism : Mechanism
         The drawing, already checked.
     spans : sequence of FlexureSpan, or None
-        Its flexures between their cuts; found where None.
+        The mechanism's flexures with the positions at which they are cut from the bodies; None computes these.
     """
     region = mechanism.region
     if spans is None:
@@ -98,9 +99,9 @@ def plate_poses(
     bodies : sequence of LinkBody
         Bodies.
     moved_mm : ndarray of float, shape (unknowns,)
-        Displacements.
+        Displacements of the nodes.
     large : bool
-        Whether they are large.
+        Whether the displacements are large.
     """
     return {name: rigid_motion(plate.nodes_mm, np.stack([moved_mm[plate.x_dofs], moved_mm[plate.y_dofs]]), weights,
                                centroid, large=large)
@@ -108,7 +109,7 @@ def plate_poses(
 
 
 def body_weights(plate: PlaneStressPlate, bodies: Sequence[LinkBody]) -> Mapping[str, tuple[Array, Array]]:
-    """Area represented by each node, shape (nodes,), and the centroid, of every moving body."""
+    """Area represented by each node, shape (nodes,), and the centroid, for every moving body."""
     corners = plate.nodes_mm[:, plate.corner_triangles]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     third = np.abs(one[0] * two[1] - one[1] * two[0]) / 6.0
@@ -127,12 +128,12 @@ def body_weights(plate: PlaneStressPlate, bodies: Sequence[LinkBody]) -> Mapping
 
 
 def column_name(name: str) -> str:
-    """Body's name as used in a column's name."""
+    """Name of a body in a form that can be part of a column's name."""
     return re.sub(r"[^0-9A-Za-z_-]+", "_", name).strip("_") or "body"
 
 
 def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
-    """Name every piece by the first named shape that lies mostly in it; the others are numbered."""
+    """Name every piece by the first named shape that lies mostly in it; pieces without one are numbered."""
     names: dict[int, str] = {}
     polygons = [_polygon(loop) for loop in pieces]
     for (added, shape), name in zip(mechanism.bodies, mechanism.body_names, strict=False):

@@ -1,8 +1,8 @@
-"""Stiffness-matrix model of a chain mechanism: rigid bodies, and flexures' compliances summed at the drive.
+"""Stiffness-matrix model of a chain of rigid bodies: the compliances of its flexures are summed at the drive.
 
-Equations (5) to (15) of Hricko & Havlik (2015), in the plane, for any chain from a fixed to the driven body: C = sum T
-C_i T' at the drive; the stiffness is that in the directions which the drive and its guides constrain. A closed loop has
-no such sum, and is refused.
+The model applies equations (5) to (15) of Hricko & Havlik (2015), in the plane, to any chain from a fixed body to the
+driven one: the compliance at the drive is C = sum T C_i T', and the stiffness is that in the directions which the drive
+and its guides constrain. For a closed loop of bodies such a sum does not exist; it is refused.
 """
 
 from dataclasses import replace
@@ -38,12 +38,13 @@ class MechanismChain:
     mechanism : Mechanism
         The drawing.
     theory : HingeTheory
-        Of the notches.
+        Theory of the notches' compliance.
 
     Raises
     ------
     FingervisionError
-        Where the drawing is no mechanism, or its flexures form a loop or hold other bodies than the driven one.
+        If the drawing is not a valid mechanism, its flexures form a loop, or no chain of flexures leads to the driven
+        body.
     """
 
     kind = "stiffness_matrix"
@@ -95,9 +96,9 @@ class MechanismChain:
         return bodies.pop()
 
     def _path_from(self, ground: set[int], driven: int) -> list[int]:
-        """Flexures from the fixed body (ground) to the driven one, in order.
+        """List the flexures on the path from the fixed body (ground) to the driven body, in order.
 
-        A chain has one flexure less than it has bodies, with the ground counted as one body.
+        In a chain the number of flexures is one less than the number of bodies, the ground included.
         """
         name = self.mechanism.name
         merged = [tuple(-1 if body in ground else body for body in join) for join in self._joins]
@@ -123,7 +124,7 @@ class MechanismChain:
         return reached[driven]
 
     def _support(self) -> None:
-        """Directions at the drive's centre that the drive and the guides of its body constrain: x, y, rotation."""
+        """Find the directions (x, y, rotation) at the drive's centre that the drive and its body's guides constrain."""
         mechanism = self.mechanism
         driven = self._only(mechanism.drive.face)
         held = {"x": False, "y": False, "turn": False}
@@ -149,16 +150,16 @@ class MechanismChain:
         self._load[self._held] = np.linalg.solve(compliance[np.ix_(self._held, self._held)], motion)
 
     def compliance_at(self, point: Array, path: list[int], loaded: Array | None = None) -> Array:
-        """Motion (x, y, rotation) of a point beyond some flexures under a load at another point, shape (3, 3).
+        """Motion (x, y, rotation) of one point under a load at another point of the chain, shape (3, 3).
 
         Parameters
         ----------
         point : ndarray of float, shape (2,)
-            That moves.
+            The point that moves.
         path : list of int
-            Flexures between it and the ground that the load passes too.
+            Flexures between the ground and that point which also carry the load.
         loaded : ndarray of float, shape (2,), or None
-            Where the load acts; the same point where None.
+            The point at which the load acts; None for the moving point itself.
         """
         mechanism = self.mechanism
         total = np.zeros((3, 3))
@@ -186,7 +187,7 @@ class MechanismChain:
 
     @property
     def stress_error(self) -> float:
-        """Relative error of the stress in the flexures, estimated in the same way."""
+        """Relative error of the stress from treating bodies as rigid, by comparison with the lumped model."""
         return self._errors[1]
 
     @cached_property
@@ -197,25 +198,25 @@ class MechanismChain:
         return force + elastic.force_error, stress + elastic.stress_error
 
     def touch_input_mm(self) -> dict[str, float]:
-        """Empty: this model does not include contact."""
+        """Return no contacts, because this model does not include contact."""
         return {}
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
-        """Empty: this model has no masses."""
+        """Return no natural frequencies, because this model has no masses."""
         del drive_held, count
         return ()
 
     def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
-        """Small displacements at one input.
+        """Compute the small displacements at one input.
 
         Raises
         ------
         ModelError
-            Where large rotation or contact is asked for.
+            If large rotation or contact is requested.
         """
         if large_rotation or contact:
             raise ModelError(
-                "The stiffness matrix knows small displacements without contact alone; take --kind lumped or "
+                "The stiffness matrix handles small displacements without contact only; take --kind lumped or "
                 "finite_element."
             )
         mechanism, load = self.mechanism, input_mm * self._load
@@ -252,11 +253,11 @@ class MechanismChain:
                     if one in self._reached and other not in self._reached:
                         self._reached[other] = [*self._reached[one], place]
             if len(self._reached) == before:
-                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that nothing holds.")
+                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that is not joined to a fixed face.")
         return self._reached[body]
 
     def _inward(self, point: tuple[float, float]) -> Array:
-        """A point slightly inside the body, from a point on its outline."""
+        """Return a point slightly inside the body, next to a point on its outline."""
         for angle in np.linspace(0.0, 2.0 * np.pi, 9)[:-1]:
             way = 1e-5 * self._size_mm * np.array([np.cos(angle), np.sin(angle)])
             x, y = np.array(point) + way
@@ -275,5 +276,5 @@ class MechanismChain:
 
 
 def _carried(arm: Array) -> Array:
-    """Motion at a point from the motion where the arm begins; the transpose transfers loads the other way."""
+    """Matrix from the motion at the start of an arm to that at its end; its transpose transfers loads back."""
     return np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Equilibria of any kind of driven mechanism: small or large displacements, with or without contact."""
+"""Equilibria of a driven mechanism of any kind: small or large displacements, with or without contact."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,11 +23,13 @@ _LEAST_STEP = 1e-3
 _BLOWN_UP = 1e6
 _RESIDUAL = 1e-8
 _ON = 1e-6
-"""Of the input: how near a touching node must be, and how far one may pass before it is held."""
+"""Tolerance of contact as a share of the input: largest gap of a touching node, and largest penetration before a node
+is held."""
 _SLOW = 0.1
-"""A residual that falls to less than a tenth in a step needs no new tangent, which costs as much as ten steps."""
+"""Ratio of successive residuals below which the present tangent is kept; a new tangent costs as much as ten steps."""
 _MOST_MOTION = 1e6
-"""Millimetres by 1 mm of input: no mechanism amplifies so, but one that nothing holds."""
+"""Motion in millimetres per 1 mm of input above which the mechanism counts as not supported; no real mechanism
+amplifies as much."""
 _STILL = 1e-9
 
 
@@ -38,11 +40,11 @@ class MechanismEquilibrium:
     Parameters
     ----------
     displacement : ndarray of float, shape (unknowns,)
-        In mm, and rad where unknowns are rotations.
+        Displacements in mm, and rotations in rad where the model has them.
     force_n : float
-        At the drive, along its direction.
+        Force at the drive, along its direction.
     pressed_n : tuple of ndarray of float
-        Force on each node of every contact pair; none where contact is left out.
+        Force on each node of every contact pair; empty if contact is not included.
     """
 
     displacement: Array
@@ -57,17 +59,19 @@ class DrivenMechanism:
     Parameters
     ----------
     name : str
-        For messages.
+        Name of the mechanism in messages.
     tangent : callable
-        Displacements to tangent stiffness and internal forces, in the deformed shape.
+        Maps displacements to the tangent stiffness and the internal forces, in the deformed shape.
     internal : callable
-        Displacements to internal forces alone.
+        Maps displacements to the internal forces alone.
     motions : sparse matrix, shape (unknowns, n)
-        Motions that nothing holds: displacements are these times what is sought, and the input times `by_input`.
+        Basis of the free motions: the displacements are this matrix times the n unknowns solved for, plus the input
+        times `by_input`.
     by_input : ndarray of float, shape (unknowns,)
-        Prescribed motion by 1 mm of input.
+        Prescribed motion per 1 mm of input.
     gaps : tuple of callable
-        For every contact pair, displacements to the gaps of its nodes, infinite where they face nothing, and slopes.
+        For every contact pair, a function that maps displacements to the gaps of its nodes (infinite for a node that
+        faces nothing) and their derivatives.
     """
 
     name: str
@@ -79,7 +83,7 @@ class DrivenMechanism:
 
     @cached_property
     def stiffness_n_mm(self) -> csr_matrix:
-        """Of small motions."""
+        """Stiffness matrix for small motions."""
         return self.tangent(np.zeros(self.by_input.size))[0]
 
     @cached_property
@@ -93,7 +97,7 @@ class DrivenMechanism:
         Raises
         ------
         ModelError
-            Where nothing holds the mechanism.
+            If the supports allow the mechanism to move freely.
         """
         try:
             load = self.motions.T @ (self.stiffness_n_mm @ self.by_input)
@@ -111,9 +115,9 @@ class DrivenMechanism:
         return float(moved @ (self.stiffness_n_mm @ moved))
 
     def touch_inputs_mm(self) -> list[float | None]:
-        """Input nearest to zero at which each pair first touches, in small displacements (mm).
+        """Input nearest to zero at which each contact pair first touches, for small displacements (mm).
 
-        None where it never does.
+        None is returned for a pair that never touches.
         """
         found: list[float | None] = []
         for gaps in self.gaps:
@@ -130,7 +134,7 @@ class DrivenMechanism:
         Raises
         ------
         ModelError
-            Where it cannot be followed from rest.
+            If the equilibrium cannot be reached by steps from rest.
         """
         gaps = self.gaps if contact else ()
         if large_rotation:
@@ -150,7 +154,7 @@ class DrivenMechanism:
 
     @cached_property
     def _touching(self) -> tuple[Array, Array, Array]:
-        """Gaps at rest of all nodes that may touch, their derivatives, and displacements under unit forces there."""
+        """Gaps at rest of the nodes that may touch, the gaps' derivatives, displacements for unit contact forces."""
         gap, sparse, _ = self._all_gaps(self.gaps, np.zeros(self.by_input.size))
         slope = np.where(np.isfinite(gap)[:, None], sparse.toarray(), 0.0)
         return gap, slope, self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ slope.T))
@@ -173,7 +177,7 @@ class DrivenMechanism:
         return gap, slope, bend
 
     def _followed(self, input_mm: float, pairs: Pairs) -> MechanismEquilibrium:
-        """Follow the equilibria from rest, in steps that grow with convergence and are halved without it."""
+        """Follow the equilibria from rest, in steps that are enlarged after convergence and halved after a failure."""
         moved = np.zeros(self.by_input.size)
         path = [(0.0, moved)]
         touching = np.zeros(self._all_gaps(pairs, moved)[0].size, dtype=bool)
@@ -189,8 +193,8 @@ class DrivenMechanism:
             step *= 0.5
             if step < _LEAST_STEP:
                 raise ModelError(
-                    f"The equilibrium of {self.name} was followed to an input of {reached * input_mm:.4g} mm and no "
-                    f"farther, but {input_mm:g} mm are asked for; take a smaller input."
+                    f"The equilibrium of {self.name} could be computed up to an input of "
+                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are asked for; take a smaller input."
                 )
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
         return MechanismEquilibrium(moved, float(self.by_input @ loads), self._by_pair(pressed) if pairs else ())
@@ -198,7 +202,7 @@ class DrivenMechanism:
     def _predicted(self, path: list[tuple[float, Array]], input_mm: float) -> Array:
         """Extrapolate the path; from rest, use the small displacements.
 
-        Without extrapolation, slender leaves would be stretched in every step.
+        Without extrapolation, slender leaf flexures would be stretched at the start of every step.
         """
         if len(path) == 1:
             return input_mm * self.unit_displacement
@@ -212,7 +216,7 @@ class DrivenMechanism:
     def _settled(
         self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
     ) -> tuple[Array, Flags, Array] | None:
-        """Hold nodes that would penetrate and release nodes under tension, until none of either is left."""
+        """Hold nodes that would penetrate and release nodes under tension, repeatedly, until there are none."""
         for _ in range(_SET_CHANGES):
             found = self._newton(moved, touching, pressed, input_mm, pairs)
             if found is None:
@@ -228,7 +232,7 @@ class DrivenMechanism:
     def _newton(
         self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
     ) -> tuple[Array, Array] | None:
-        """Newton's method for a given set of touching nodes; None where it does not converge."""
+        """Newton's method for a given set of touching nodes; returns None if it does not converge."""
         motions = self.motions
         scale = float(np.abs(self.stiffness_n_mm @ self.unit_displacement).max()) * abs(input_mm)
         solver, before = None, np.inf

@@ -1,4 +1,4 @@
-"""Nodes of a meshed mechanism that are fixed, slide or are driven, and whether these supports are sufficient."""
+"""Nodes of a meshed mechanism that are fixed, slide or are driven, and a test whether these supports suffice."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _ON = 1e-7
-"""Of the body's size: how near a node must be to a face's box."""
+"""Distance from a face's box within which a node counts as lying on the face, as a share of the body's size."""
 
 _LEVER = 1e-6
-"""Of a face's extent: shorter arms across a component leave the face free to turn."""
+"""Lever arms across a component that are shorter than this share of the face's extent do not prevent rotation."""
 
 
 def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm: float) -> Indices:
@@ -25,7 +25,7 @@ def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm:
     Raises
     ------
     DataError
-        Where there is no part of the outline.
+        If no part of the outline lies in the box.
     """
     x, y = plate.nodes_mm
     x0, x1, y0, y1 = face.box_mm
@@ -42,7 +42,7 @@ def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm:
 
 
 def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
-    """Weights of nodes in the mean motion of a face, those of a uniform load; shape (k,), with sum 1."""
+    """Weights of the nodes in the mean motion of a face (those of a uniform load), shape (k,), with sum 1."""
     edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, nodes), axis=0)]
     x, y = plate.nodes_mm
     length = np.hypot(x[edges[1]] - x[edges[0]], y[edges[1]] - y[edges[0]])
@@ -54,9 +54,10 @@ def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
 
 
 def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
-    """Whether a face is parallel to a component, so that prescribing it at every node leaves the face free to rotate.
+    """Whether a face is parallel to x or y (`component`), so that prescribing that component leaves it free to rotate.
 
-    Any other face is driven by its mean motion, because in large rotation it would have to stretch in order to rotate.
+    A face at another angle is driven by its mean motion: with the component prescribed at every node it would have to
+    stretch in order to rotate.
     """
     places = plate.nodes_mm[:, nodes]
     spread = np.ptp(places, axis=1)
@@ -64,7 +65,7 @@ def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
 
 
 def driven_components(mechanism: Mechanism) -> tuple[str, ...]:
-    """Components prescribed at every node of the drive's face: both where it is guided, else that of its direction."""
+    """Components prescribed at every node of the drive's face: x and y if it is guided, else that of the drive."""
     if mechanism.drive.across == "held":
         return "x", "y"
     return ("x",) if mechanism.drive.direction[0] != 0.0 else ("y",)
@@ -72,16 +73,16 @@ def driven_components(mechanism: Mechanism) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Supports:
-    """Nodes on the faces of a mechanism.
+    """Nodes on the supported and driven faces of a mechanism.
 
     Parameters
     ----------
     fixed : tuple of ndarray of int
-        Of every fixed face.
+        Nodes of every fixed face.
     slides : tuple of (ndarray of int, str)
-        Of every sliding face, with the component that is held.
+        Nodes of every sliding face, with the component that is fixed.
     driven : ndarray of int
-        Of the drive's face.
+        Nodes of the drive's face.
     """
 
     fixed: tuple[Indices, ...]
@@ -90,12 +91,12 @@ class Supports:
 
 
 def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> Supports:
-    """Find the nodes on every face.
+    """Find the nodes on every supported or driven face.
 
     Raises
     ------
     DataError
-        Where a face holds none, the drive's is fixed, or nothing is.
+        If a face contains no node, the drive's face is fixed, or no face is fixed.
     """
     fixed = tuple(nodes_on(plate, face, mechanism, size_mm) for face in mechanism.fixed)
     slides = tuple((nodes_on(plate, face, mechanism, size_mm), held) for face, held in mechanism.slides)

@@ -1,4 +1,4 @@
-"""Figures of a mechanism drawn by bodies, for any kind of model."""
+"""Characteristic numbers of a mechanism drawn by bodies, for any kind of model."""
 
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_frame import MechanismFrame
@@ -9,17 +9,17 @@ MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 
 
 def mechanism_figures(model: MechanismModel) -> dict[str, float]:
-    """Compute small displacements per 1 mm of input, the range up to yield, touches and natural frequencies.
+    """Compute response per 1 mm of input, input range up to yield, inputs of first contact, natural frequencies.
 
     Parameters
     ----------
     model : MechanismPlate, MechanismFrame or MechanismChain
-        Of the drawing.
+        Model of the drawing.
 
     Returns
     -------
     dict of str to float
-        By name, with the unit at its end.
+        Numbers by name, with the unit at the end of the name.
     """
     unit, rest = model.state(1.0), model.state(0.0)
     figures = {

@@ -1,8 +1,8 @@
 """A planar mechanism of lumped flexures between elastic bodies: any topology, loops included.
 
-It is the lumped model of Hricko & Havlik (2015), extended to any drawing. Flexures are chains of beam segments,
-corrected by the hinge tables; the bodies that they join are cut from the drawing and condensed to a few frames
-(`condensed_bodies`). Flexures and bodies may rotate by any angle.
+This is the lumped model of Hricko & Havlik (2015), extended to any drawing. Flexures are chains of beam segments,
+corrected by the hinge tables; the bodies that they join are cut from the drawing and condensed to a few coordinate
+frames (`condensed_bodies`). Flexures and bodies may rotate by any angle.
 """
 
 from collections.abc import Callable
@@ -37,33 +37,35 @@ from fingervision.models.triangulate import triangulate
 Array = NDArray[np.float64]
 
 _ACROSS, _BODY = 2.0, 0.05
-"""Triangles across what is thin, and edge length over the size: bodies bend little, and their stress is not
-asked."""
+"""Triangles across thin parts, and edge length over the body's size: the mesh is coarse because bodies deform little,
+and their stress is not computed."""
 _TINY = 1e-7
 _FORCE_ERROR = 0.015
-"""Of the tables of hinges between blocks, beside finite elements (`tests/benchmarks/models_held_out.py`)."""
+"""Relative error of the force from the tables of hinges between blocks, by comparison with finite elements
+(`tests/benchmarks/models_held_out.py`)."""
 _FORCE_MISUSED, _STRESS_ERROR, _STRESS_MISUSED = 0.06, 0.02, 0.3
-"""What a guided drive shears or stretches rather than bends: at t / R of 0.2 to 0.8 forces are 6 % low to 5 % high, and
-stress is low by 0.3 sqrt(t / R), because its peak is no longer at the neck."""
+"""Relative errors of force and stress where a guided drive shears or stretches flexures rather than bending them: at t
+/ R of 0.2 to 0.8 forces are 6 % low to 5 % high, and stress is low by 0.3 sqrt(t / R), because its peak is no longer at
+the neck."""
 _TINIEST = 1e-300
 
 
 class MechanismFrame:
-    """A mechanism of lumped flexures.
+    """Lumped model of a mechanism: flexures as beams between condensed elastic bodies.
 
     Parameters
     ----------
     mechanism : Mechanism
         The drawing.
     width_effect : bool
-        Whether the plate's width holds the flexures back; plane stress where not.
+        Whether the restraint of the flexures by the plate's width is included; plane stress if False.
     theory : HingeTheory
-        Of the notches.
+        Theory of the notches' compliance.
 
     Raises
     ------
     FingervisionError
-        Where the drawing is no mechanism, has no flexure, or a flexure does not join two bodies.
+        If the drawing is not a valid mechanism, has no flexure, or a flexure does not join two bodies.
     """
 
     kind = "lumped"
@@ -128,7 +130,7 @@ class MechanismFrame:
 
     @cached_property
     def driven(self) -> DrivenMechanism:
-        """Its equilibria."""
+        """The mechanism as a system whose equilibria can be computed."""
         every = identity(self.frame.unknowns, format="csc")
         return DrivenMechanism(
             self.mechanism.name, self._tangent, lambda moved: self._tangent(moved)[1], csr_matrix(every[:, self.free]),
@@ -136,7 +138,7 @@ class MechanismFrame:
         )  # fmt: skip
 
     def _gaps_of(self, contact: Contact) -> Callable[[Array], Gaps]:
-        """Gaps of a contact from the motions of the frames, at the two nodes of its face that are farthest apart."""
+        """Function that gives the gaps of a contact at the two nodes of its face that are farthest apart."""
         plate = self.plate
         pair = contact_pair(plate, contact, self.mechanism, self._size_mm)
         places = plate.nodes_mm[:, pair.nodes]
@@ -161,7 +163,7 @@ class MechanismFrame:
     def touch_input_mm(self) -> dict[str, float]:
         """Input nearest to zero at which each contact first touches, in small displacements.
 
-        Without those that never do.
+        Contacts that never touch are left out.
         """
         names = [contact.name for contact in self.mechanism.contacts]
         return {n: at for n, at in zip(names, self.driven.touch_inputs_mm(), strict=True) if at is not None}
@@ -191,10 +193,10 @@ class MechanismFrame:
         return self._errors[1]
 
     def _end_loads(self, moved: Array, *, large: bool) -> Array:
-        """Loads at the ends of all segments.
+        """Tension and end moments of all segments of the flexures.
 
-        For small displacements the axes of the segments do not turn: the loads are computed for a tiny fraction and
-        scaled.
+        For small displacements the segments' axes do not rotate: the loads are computed for a tiny fraction of the
+        displacements and scaled up.
         """
         share = 1.0 if large else _TINY * self._size_mm / max(float(np.abs(moved).max()), _TINY)
         return np.asarray(self.frame.end_loads(share * moved) / share)
@@ -227,7 +229,7 @@ class MechanismFrame:
                               np.zeros(self.plate.unknowns)))  # fmt: skip
 
     def _motion(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
-        """Displacement of a point of a body, or with the nearest section of a flexure."""
+        """Displacement of a point of a body; a point on a flexure moves with the nearest section of it."""
         for span, own in zip(self.spans, self.segments, strict=True):
             if span.slab.holds(np.array(point)[:, None])[0]:
                 nodes = np.unique(self.frame.ends[list(own)])

@@ -23,29 +23,31 @@ from fingervision.models.triangulate import PlaneMesh, triangulate
 Array = NDArray[np.float64]
 
 _ACROSS, _BODY = 4.0, 0.025
-"""Triangles across what is thin, and edge length over the body's size: as for the paper's sample."""
+"""Triangles across thin parts, and edge length over the body's size: as for the published sample."""
 _STRESS_ERROR = 0.01
-"""Beside meshes twice and three times as fine: 0.3 % (`tests/benchmarks/models_held_out.py`)."""
+"""Relative error of the stress; meshes twice and three times as fine differ by 0.3 %
+(`tests/benchmarks/models_held_out.py`)."""
 _BESIDE_CORNER = 0.5
-"""Of the thinnest flexure: stress nearer to a sharp corner is a figure of the mesh, and is left out."""
+"""Distance from a sharp corner, in thicknesses of the thinnest flexure, within which stress is left out, because it
+depends on the mesh there."""
 
 
 class MechanismPlate:
-    """A meshed mechanism.
+    """Finite-element model of a mechanism.
 
     Parameters
     ----------
     mechanism : Mechanism
         The drawing.
     width_effect : bool
-        Whether the plate's width holds the flexures back; plane stress where not.
+        Whether the restraint of the flexures by the plate's width is included; plane stress if False.
     refine : float
-        Edge lengths are divided by it.
+        Factor by which the edge lengths are divided.
 
     Raises
     ------
     FingervisionError
-        Where the drawing is no mechanism or a face holds no nodes of the outline.
+        If the drawing is not a valid mechanism, or a face contains no nodes of the outline.
     """
 
     kind = "finite_element"
@@ -101,12 +103,12 @@ class MechanismPlate:
 
     @cached_property
     def driven(self) -> DrivenMechanism:
-        """Its equilibria.
+        """The mechanism as a system whose equilibria can be computed.
 
         Raises
         ------
         DataError, ModelError
-            Where a contact's faces are none, or nothing holds the mechanism.
+            If a contact's face is not on the outline, or the supports allow the mechanism to move freely.
         """
         if self._wanders():
             raise ModelError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
@@ -149,7 +151,7 @@ class MechanismPlate:
     def touch_input_mm(self) -> dict[str, float]:
         """Input nearest to zero at which each contact first touches, in small displacements.
 
-        Without those that never do.
+        Contacts that never touch are left out.
         """
         names = [contact.name for contact in self.mechanism.contacts]
         return {n: at for n, at in zip(names, self.driven.touch_inputs_mm(), strict=True) if at is not None}
@@ -172,7 +174,7 @@ class MechanismPlate:
                               plate_poses(self.plate, self.bodies, moved, large=large_rotation))  # fmt: skip
 
     def _motion(self, moved: Array, point: tuple[float, float]) -> tuple[float, float]:
-        """Displacement of a point: quadratic interpolation through the nearest nodes, as in the elements."""
+        """Displacement of a point, by quadratic interpolation between the nearest nodes."""
         x, y = self.plate.nodes_mm
         near = np.argsort(np.hypot(x - point[0], y - point[1]))[:12]
         around = np.column_stack([np.ones(near.size), x[near] - point[0], y[near] - point[1],
@@ -208,12 +210,12 @@ class MechanismPlate:
     def modal_model(self, count: int) -> ModalModel:
         """Reduce the mechanism to its static shape and its modes with the drive fixed.
 
-        A pair's observable is a length, see `state`.
+        The observable of a pair of probes is their distance, see `state`.
 
         Parameters
         ----------
         count : int
-            How many modes.
+            Number of modes.
         """
         rad_s, shapes = self.modes(drive_held=True, count=count)
         static = self.unit_displacement_mm

@@ -18,16 +18,16 @@ class MechanismState:
     Parameters
     ----------
     input_mm, force_n : float
-        Motion of the drive along its direction, and the force there.
+        Motion of the drive along its direction, and the drive's force in that direction.
     probes_mm : dict of str to (float, float)
         Displacements of the probes.
     pairs_mm : dict of str to float
-        Distances of the pairs.
+        Distance of each pair of probes.
     stress_mpa : float
-        Largest stress in the flexures: von Mises's, half a thickness and more from sharp corners, where it has no
-        limit; or the nominal one of beams, with the notch's factors.
+        Largest stress in the flexures: the von Mises stress, excluding points within half a thickness of sharp corners,
+        where the stress is unbounded; or the nominal stress of beams, with the notch's factors.
     displacement_mm : ndarray of float, shape (unknowns,)
-        Of every node; of every frame where the model is lumped.
+        Displacements of every node; for a lumped model, of every coordinate frame.
     contact_n : dict of str to float
         Force of every contact pair.
     bodies : mapping of str to BodyPose
@@ -49,16 +49,17 @@ def pair_distances_mm(
 ) -> dict[str, float]:
     """Distances of the pairs of probes (mm), negative where the probes have passed each other.
 
-    For small displacements the distance is linear in them, along the line that joins the probes at rest.
+    For small displacements the distance changes linearly with the displacements, along the line that joins the probes
+    at rest.
 
     Parameters
     ----------
     mechanism : Mechanism
         The drawing.
     probes_mm : dict of str to (float, float)
-        Displacements of its probes.
+        Displacements of the mechanism's probes.
     large : bool
-        Whether displacements are large.
+        Whether the displacements are large.
     """
     found = {}
     for name, (a, b) in mechanism.pairs.items():

@@ -1,4 +1,4 @@
-"""Uncertainty of a mechanism's figures from the stated uncertainties of its dimensions."""
+"""Uncertainty of a mechanism's characteristic numbers from the stated uncertainties of its dimensions."""
 
 from collections.abc import Callable, Mapping
 
@@ -10,23 +10,24 @@ from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.uncertainty import FigureUncertainty, propagate
 
 _SAMPLES = 32
-"""Drawings of half a second each where linear propagation is not enough: u is then known within about a tenth."""
+"""Number of drawings sampled, at half a second each, if linear propagation is not sufficient: the standard uncertainty
+is then known within about a tenth."""
 
 
 def mechanism_uncertainty(
     redrawn: Callable[[Mapping[str, float]], Mechanism], numbers: Mapping[str, Estimate]
 ) -> dict[str, FigureUncertainty]:
-    """Propagate stated uncertainties to every figure of `mechanism_figures`.
+    """Propagate stated uncertainties to every number of `mechanism_figures`.
 
-    Changed drawings are computed by lumped flexures, or by finite elements where the drawing has none; the same
-    uncertainty is stated for the other kinds of model.
+    Drawings with changed dimensions are computed by the lumped model, or by finite elements if the drawing has no
+    flexures; the same uncertainty is stated for the other kinds of model.
 
     Parameters
     ----------
     redrawn : callable
-        Changes of some numbers, each in its own unit, to the drawing: `MechanismDrawing.mechanism`.
+        Maps changes of some dimensions, each in its own unit, to the changed drawing: `MechanismDrawing.mechanism`.
     numbers : mapping of str to Estimate
-        The uncertain numbers: `MechanismDrawing.estimates`.
+        The uncertain dimensions: `MechanismDrawing.estimates`.
     """
 
     def evaluate(changes: Mapping[str, float]) -> Mapping[str, float | None]:

@@ -9,7 +9,8 @@ from fingervision.models.triangulate import PlaneMesh, triangulate
 __all__ = ["ElementSize", "PlaneMesh", "mesh_outline", "notch_centres_mm"]
 
 _ACROSS = 0.8
-"""Triangles across a neck per thickness over edge length: along the notch they are half as long again as across it."""
+"""Ratio of (triangles across a neck) to (thickness over edge length): triangles along the notch are half as long again
+as across it."""
 _LEAST_ACROSS = 2.0
 
 
@@ -20,9 +21,9 @@ class ElementSize:
     Parameters
     ----------
     notch_mm : float
-        At the necks of the notches; it grows with the height of the material.
+        Edge length at the necks of the notches; it grows with the height of the material.
     body_mm : float
-        Far from them.
+        Edge length far from the notches.
     """
 
     notch_mm: float
@@ -47,7 +48,7 @@ def mesh_outline(gripper: Gripper, size: ElementSize) -> PlaneMesh:
     Raises
     ------
     DataError, ModelError
-        Where the notches cut the body in two, or a hinge is none.
+        If the notches cut the body in two, or a hinge is not valid.
     """
     check_outline(gripper)
     across = max(_LEAST_ACROSS, _ACROSS * gripper.hinge.thickness_mm / size.notch_mm)

@@ -1,4 +1,4 @@
-"""Element size: a fraction of the material's width where it is thin, with limited growth from element to element."""
+"""Element size: a fraction of the material's width in thin parts, with limited growth between neighbouring elements."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,21 +13,22 @@ from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 Array = NDArray[np.float64]
 
 _GROWTH = 0.3
-"""Edge length gained per length of way: neighbours differ by less than a third, and no triangle is needlessly flat."""
+"""Increase of edge length per distance: neighbouring edges differ by less than a third, and triangles are not
+needlessly flat."""
 _OF_RADIUS = 0.35
-"""Edge length over radius of curvature at most: the sagitta is 1.5 % of the radius, and the quadratic edge follows the
-arc to 1e-5 of it."""
+"""Largest ratio of edge length to radius of curvature: the sagitta is 1.5 % of the radius, and the quadratic edge
+follows the arc to 1e-5 of the radius."""
 _CLASS = 1.3
-"""Ratio of edge lengths within a class of points, of which the nearest is looked up."""
+"""Ratio of edge lengths within a group of points, of which only the nearest point is looked up."""
 _SMALLEST = 1e-4
-"""Of the body's size: nothing is meshed finer."""
+"""Smallest edge length, as a share of the body's size."""
 _ALONG_NOTCH = 6.0
-"""Triangles along the stretch of a notch that bends, for each across it: with 4 across the force of the paper's sample
-is then within 0.01 % of the limit."""
+"""Triangles along the bending length of a notch, per triangle across it: with 4 across, the force of the published
+sample is within 0.01 % of its limit."""
 _FIRST_SAMPLES = 24
 _AT_CORNER = 0.2
-"""Of the neighbouring edge length, at corners that turn into the body: stress is singular there, and triangles as large
-as elsewhere would leave the force of the paper's sample 0.1 % too high."""
+"""Edge length at re-entrant corners, as a share of the neighbouring edge length: the stress is singular there, and
+without refinement the force of the published sample would be 0.1 % too high."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ class SizeField:
     points_mm : ndarray of float, shape (n, 2)
         Points of the outline.
     edge_mm : ndarray of float, shape (n,)
-        Edge length there.
+        Edge length at each point.
     body_mm : float
         Largest edge length.
     """
@@ -72,7 +73,7 @@ def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField
     region : PlanarRegion
         The body.
     across : float
-        Triangles across the material where it is thinner than `across` times `body_mm`.
+        Number of triangles across the material where it is thinner than `across` times `body_mm`.
     body_mm : float
         Largest edge length.
     """
@@ -105,7 +106,7 @@ def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField
 
 
 def _thinned(at: Array, edge: Array, body_mm: float) -> SizeField:
-    """Remove points whose edge length follows from that of others."""
+    """Remove points whose edge length already follows from that of other points."""
     order = np.argsort(edge)
     at, edge = at[order], edge[order]
     kept = np.ones(len(edge), dtype=bool)
@@ -137,7 +138,7 @@ def _lengths(curve: Curve, t: Array) -> Array:
 
 
 def _ray_length(at: Array, towards: Array, other: Curve, least: float) -> Array:
-    """Distance from points along directions to a curve; infinite where the ray misses it."""
+    """Distance from points to a curve along given directions; infinite where the ray misses the curve."""
     apart = at - other.origin[:, None]
     if other.v is None:
         cross = towards[0] * other.u[1] - towards[1] * other.u[0]

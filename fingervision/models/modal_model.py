@@ -1,7 +1,8 @@
 """A driven elastic body reduced to its static shape and its natural modes: the basis of all dynamic responses.
 
-The motion u of the drive is prescribed. The body follows it by its static shape s; each mode r of the body with fixed
-drive is excited by that shape's inertia (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface unknown):
+The motion u of the drive is prescribed. The body follows u by its static shape s; each mode r of the body with fixed
+drive is excited by the inertia of the static shape (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface
+unknown):
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = -L_r u''
     force at the drive = k u + m u'' + sum_r L_r q_r''
@@ -37,11 +38,11 @@ class Observable:
     Parameters
     ----------
     rest_mm : float
-        At rest.
+        Value at zero input.
     per_input : float
-        Change by 1 mm of input, at rest at each input.
+        Change of the static value per 1 mm of input.
     by_mode : ndarray of float, shape (modes,)
-        Change by a unit of each mode's coordinate.
+        Change per unit of each mode's coordinate.
     """
 
     rest_mm: float
@@ -51,16 +52,17 @@ class Observable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalModel:
-    """The reduced body.
+    """A mechanism reduced to its static shape and its modes with the drive held.
 
     Parameters
     ----------
     stiffness_n_mm, mass_t : float
-        Of the static shape, by 1 mm of input: k and m.
+        Stiffness k and mass m of the static shape for 1 mm of input.
     rad_s, participation : ndarray of float, shape (modes,)
-        Angular frequencies of the body with its drive held, rising, and L, by modes of unit modal mass.
+        Angular frequencies of the modes with the drive held, in rising order, and the participation factors L of the
+        modes, normalised to unit modal mass.
     observed : mapping of str to Observable
-        What is asked for, by its column's name.
+        Computed outputs by the name of their column.
     """
 
     stiffness_n_mm: float
@@ -75,7 +77,7 @@ class ModalModel:
         return self.rad_s / (2.0 * pi)
 
     def with_modes(self, count: int) -> "ModalModel":
-        """Keep the first modes; the contribution of the others then follows the drive without delay."""
+        """Keep the first modes only; the contribution of the others then follows the drive without delay."""
         observed = {name: replace(seen, by_mode=seen.by_mode[:count]) for name, seen in self.observed.items()}
         return replace(self, rad_s=self.rad_s[:count], participation=self.participation[:count], observed=observed)
 
@@ -92,9 +94,9 @@ class FreeModes:
     Parameters
     ----------
     rad_s, drive : ndarray of float, shape (modes,)
-        Angular frequencies, rising, and the drive's motion in modes of unit modal mass.
+        Angular frequencies in rising order, and the drive's motion in each mode, normalised to unit modal mass.
     by_mode : mapping of str to ndarray of float, shape (modes,)
-        Change of each observed length by a unit of each mode's coordinate.
+        Change of each observed length per unit of each mode's coordinate.
     """
 
     rad_s: Array
@@ -103,15 +105,15 @@ class FreeModes:
 
 
 def described(damping: Damping, rad_s: Array) -> Array:
-    """Damping ratios of the modes for which a law is valid, from the lowest.
+    """Damping ratios of those lowest modes for which a damping law is valid.
 
-    A law whose ratio leaves the range of solids, as equation (4) does at a few times its reference frequency, is used
-    for the modes below that.
+    If the ratio leaves the range that is possible for solids, as that of equation (4) does at a few times its reference
+    frequency, the law is used for the modes below that frequency only.
 
     Raises
     ------
     FingervisionError
-        Where it does not describe the lowest mode.
+        If the law is not valid for the lowest mode.
     """
     for count in range(rad_s.size, 1, -1):
         try:
@@ -129,7 +131,7 @@ def gripper_modes(body: DrivenBody, count: int) -> ModalModel:
     body : DrivenBody
         The right half.
     count : int
-        How many modes of the held body.
+        Number of modes with the drive held.
     """
     rad_s, shapes = body.modes(drive_held=True, count=count)
     static = body.unit_displacement_mm

@@ -24,18 +24,19 @@ class Motion:
     Parameters
     ----------
     drive : DriveHistory
-        The inputs.
+        The drive history.
     observed_mm : mapping of str to ndarray of float, shape (n,)
-        Lengths over time.
+        Each observed length over time.
     static_mm : mapping of str to ndarray of float, shape (n,)
-        The same at rest at each input.
+        Static value of each observed length at each input.
     force_n : ndarray of float, shape (n,)
-        At the drive, the mean of the two pieces that meet at each sample. The mass that no mode carries adds an impulse
-        where the drive's speed jumps between two straight pieces, which belongs to no sample and is left out.
+        Force at the drive, at each sample the mean of the values in the two straight pieces of the history that meet
+        there. The mass that is in no mode adds an impulse where the drive's speed jumps between pieces; it belongs to
+        no sample and is left out.
     inertia_n : ndarray of float, shape (n,)
-        What vibration adds to the force.
+        Contribution of the vibration to the force.
     damping_ratios : ndarray of float, shape (modes,)
-        Of the modes kept.
+        Damping ratios of the modes kept.
     modes_hz : ndarray of float, shape (modes,)
         Natural frequencies of the modes kept.
     """
@@ -49,14 +50,15 @@ class Motion:
     modes_hz: Array
 
     def vibration_mm(self, name: str) -> float:
-        """Largest difference from the static response (mm)."""
+        """Largest difference of an observed length from its static value (mm)."""
         return float(np.abs(self.observed_mm[name] - self.static_mm[name]).max(initial=0.0))
 
 
 def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None = None) -> Motion:
-    """Compute the motion over a drive history, linear between its samples; each run begins at rest at its first input.
+    """Compute the motion over a drive history that is linear between samples; runs begin at rest at their first input.
 
-    Every step uses the exact solution of the modes' equations, so that sparse samples cause no error.
+    Every step uses the exact solution of the modes' equations, so that the result does not depend on the spacing of
+    samples.
 
     Parameters
     ----------
@@ -65,7 +67,7 @@ def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None
     drive : DriveHistory
         Inputs over time.
     damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
-        Modal damping of 0.025 where None.
+        Damping law; None is a modal damping ratio of 0.025.
     """
     model, ratios = model.damped(damping or ModalDamping())
     inputs = drive.input_mm
@@ -79,7 +81,7 @@ def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None
 
 
 def run_rows(drive: DriveHistory) -> list[slice]:
-    """Rows of each run, in order; one slice where the drive states no runs."""
+    """Rows of each run, in order; a single slice if the drive history is not divided into runs."""
     if drive.run is None:
         return [slice(0, drive.time_s.size)]
     names = np.array(drive.run)

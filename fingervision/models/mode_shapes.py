@@ -1,4 +1,4 @@
-"""Natural modes of a mechanism in its plane, by families, with their shapes as lines to draw."""
+"""In-plane natural modes of a mechanism, sorted into families, with their shapes as lines for plotting."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Solve = Callable[[int], tuple[Array, Array]]
 
 MOST_MODES = 40
 _SHOWN = 0.08
-"""Of the body's height: the largest motion in a drawn shape."""
+"""Largest displacement in a plotted mode shape, as a share of the body's height."""
 _FIRST = 4
 
 
@@ -36,17 +36,17 @@ class ModeShape:
     Parameters
     ----------
     family : str
-        What holds the drive, and whether the halves of a gripper mirror each other.
+        Boundary condition of the drive, and whether the two halves of a gripper move as mirror images.
     number : int
-        From 1.
+        Number of the mode, from 1.
     frequency_hz : float
         Natural frequency, undamped.
     lines_mm, shift_mm : ndarray of float, shape (n, 2, 2)
-        The body's outline or bars as pieces from one point to another, at rest, and their displacements at the
-        greatest deflection that is drawn (its size means nothing).
+        Line pieces (start, end) of the body's outline or bars at rest, and the displacements of their ends at the
+        largest plotted deflection (a mode's amplitude is arbitrary).
     swing : float
-        Share of the displacements by which the mode can be drawn both ways: mirrored halves pass through each other
-        beyond.
+        Largest share of the displacements that can be plotted in the opposite direction: beyond it the mirrored halves
+        would intersect.
     """
 
     family: str
@@ -73,7 +73,7 @@ def parse_modes(text: str) -> ModesWanted:
     Raises
     ------
     UsageError
-        Where it is neither.
+        If the text has neither form.
     """
     bare = text.strip()
     try:
@@ -99,7 +99,7 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
     model : LumpedGripper or FiniteElementGripper
         The gripper.
     wanted : ModesWanted
-        How many of each family.
+        Number of modes of each family, or highest frequency.
     """
     half: DrivenBody = model.half
     lines, points = _lines_of_half(model)
@@ -158,7 +158,7 @@ def _wanted_modes(solve: Solve, wanted: ModesWanted, unknowns: int) -> tuple[Arr
 
 
 def _lines_of_half(model: Any) -> tuple[Array, NDArray[np.int64]]:
-    """Line pieces to draw, shape (n, 2, 2), and the unknowns of their ends along x and y."""
+    """Line pieces to plot, shape (n, 2, 2), and the indices of the unknowns (x, y) of their ends."""
     if hasattr(model, "plate"):
         return _lines_of_plate(model.plate)
     frame = model.frame
@@ -172,7 +172,7 @@ def _lines_of_plate(plate: PlaneStressPlate) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
-    """Scale a shape for display; symmetric modes are drawn opening, and without letting the halves intersect."""
+    """Scale a mode shape for plotting; symmetric modes start by opening, and their halves must not intersect."""
     scale = _SHOWN * float(np.ptp(lines[..., 1])) / float(np.hypot(shape[..., 0], shape[..., 1]).max())
     if not mirrored:
         return scale * shape

@@ -21,34 +21,37 @@ from fingervision.models.stepped_response import step_for, stepped_motion
 Array = NDArray[np.float64]
 
 MODES = 8
-"""Of the held body. The sample's ninth has 9.6 kHz and a tenth of a per cent of the moving mass."""
+"""Number of modes with the drive held. The ninth mode of the published sample is at 9.6 kHz and has a tenth of a per
+cent of the moving mass."""
 _MOST_STEPS, _MOST_UNKNOWNS = 20_000, 400
-"""Steps in time that cost no more than half a minute: those of a frame of bars."""
+"""Most time steps and unknowns that are integrated step by step: these take at most half a minute, and are those of a
+frame of bars."""
 _FAST = 0.05
-"""Of the travel of the gap: vibrations larger than this are not small beside the motion that bends the shape."""
+"""Largest vibration that still counts as small beside the motion that deforms the shape, as a share of the gap's
+travel."""
 
 
 class VibratingModel(Protocol):
-    """A model with masses."""
+    """A model with masses, whose vibration can be computed."""
 
     physics: Physics
     half: DrivenBody
 
     def respond(self, input_mm: Array) -> Response:
-        """Answer statically."""
+        """Compute the static response."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GripperMotion:
-    """A gripper over time.
+    """Motion of a gripper over time.
 
     Parameters
     ----------
     motion : Motion
-        Gap and force, the static answer with the same physics, damping.
+        Gap and force, the static response with the same physics, and the damping.
     method : str
-        How it was computed, for the reader.
+        Method of computation, in words for the report.
     """
 
     motion: Motion
@@ -61,7 +64,7 @@ class GripperMotion:
 
     @property
     def response(self) -> Response:
-        """Both measuring points and the force."""
+        """Positions of both measuring points, and the force."""
         return Response(-0.5 * self.gap_mm, 0.5 * self.gap_mm, self.motion.force_n)
 
 
@@ -77,18 +80,18 @@ def gripper_motion(
     Parameters
     ----------
     model : LumpedGripper or FiniteElementGripper
-        With its physics.
+        Model of the gripper, with its physics.
     drive : DriveHistory
-        Inputs over time, straight between samples.
+        Inputs over time, linear between samples.
     damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
-        Modal damping of 0.025 where None.
+        Damping law; None is a modal damping ratio of 0.025.
     modes : int
-        How many of the held body.
+        Number of modes with the drive held.
 
     Raises
     ------
     ModelError
-        Where large rotation or contact meets vibrations that neither way can follow.
+        If large rotation or contact occurs together with vibrations that neither method can compute.
     """
     law = damping or ModalDamping()
     small = modal_motion(gripper_modes(model.half, modes), drive, law)
@@ -132,11 +135,11 @@ def about_equilibria(
     Parameters
     ----------
     small : Motion
-        By small displacements.
+        Motion for small displacements.
     static_mm, force_n
-        Lengths and force at rest at each input, in the deformed shape or with contact.
+        Observed lengths and force in static equilibrium at each input, in the deformed shape or with contact.
     apart : ndarray of bool, shape (n,), or None
-        Where the modes vibrate: where nothing touches; everywhere where None.
+        Samples at which the modes vibrate, because nothing touches; None for all.
     """
     free = np.ones(force_n.shape, dtype=bool) if apart is None else apart
     shaken = {name: np.where(free, small.observed_mm[name] - small.static_mm[name], 0.0) for name in static_mm}

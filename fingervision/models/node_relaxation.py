@@ -1,7 +1,7 @@
-"""Nodes inside a body: seeded by the size field, moved by forces along the edges, settled at circumcentres.
+"""Place the nodes inside a body: seeded by the size field, moved by forces along the edges, settled at circumcentres.
 
-Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329; Alliez et al., Variational tetrahedral
-meshing, ACM Trans. Graphics 24 (2005) 617, in the plane.
+Sources: Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329; Alliez et al., Variational
+tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane.
 """
 
 import numpy as np
@@ -17,19 +17,21 @@ Indices = NDArray[np.int64]
 
 MOST_NODES = 60_000
 _OF_SQUARE = 0.93
-"""Side of a square that holds as much as one node of equilateral triangles of edge 1: sqrt(sqrt(3) / 2)."""
+"""Side of the square whose area is that of one node in a mesh of equilateral triangles with edge 1: sqrt(sqrt(3) /
+2)."""
 _PRESSURE = 1.2
-"""Rest length over wanted length: the nodes press on the outline (Persson and Strang)."""
+"""Ratio of an edge's rest length to its wanted length: above 1 the nodes press against the outline (Persson and
+Strang)."""
 _STEP = 0.2
 _ROUNDS, _MOVES_A_ROUND = 5, 6
 _SETTLING = 3
 _MENDING = 12
 _CLEAR = 0.55
-"""Of the edge length: how far a node inside stays from the outline's nodes at first."""
+"""Initial distance of inner nodes from the outline's nodes, as a share of the edge length."""
 
 
 def seeded_nodes(region: PlanarRegion, field: SizeField, outline: Array) -> Array:
-    """Initial inner nodes: centres of squares that are divided until they are as small as the size field requires."""
+    """Initial inner nodes: centres of squares that are divided down to the size that the size field requires."""
     low, high = outline.min(axis=1), outline.max(axis=1)
     side = float(field.body_mm)
     counts = np.ceil((high - low) / side).astype(int)
@@ -64,7 +66,7 @@ def _clear_of(points: Array, outline: Array, field: SizeField) -> Array:
 
 
 def relaxed_nodes(region: PlanarRegion, field: SizeField, outline: Array, inside: Array) -> tuple[Array, Indices]:
-    """Move the inner nodes until the triangles are good; return all nodes, the outline's first, and the triangles."""
+    """Move the inner nodes until the triangles are well shaped; return all nodes (outline first) and triangles."""
     fixed = outline.shape[1]
     points = np.concatenate([outline, inside], axis=1)
     for _ in range(_ROUNDS):
@@ -101,7 +103,7 @@ def relaxed_nodes(region: PlanarRegion, field: SizeField, outline: Array, inside
 
 
 def _mended(points: Array, bad: Indices, fixed: int) -> Array | None:
-    """Remove the inner node nearest to each flat triangle's longest side; None where there is none to remove."""
+    """Remove the inner node nearest to each flat triangle's longest side; return None if none can be removed."""
     if bad.shape[1] == 0:
         return None
     inner = np.unique(bad[bad >= fixed])

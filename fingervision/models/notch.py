@@ -1,4 +1,4 @@
-"""The shape of a two-sided notch: circular, or elliptic."""
+"""Shape of a notch on both sides of a bar: circular or elliptic."""
 
 from dataclasses import dataclass
 from math import inf, sqrt
@@ -12,12 +12,12 @@ from fingervision.domain.gripper import Gripper, Material
 Array = NDArray[np.float64]
 
 _FINE = 400
-"""Points along half a notch at which shares in its bending are counted."""
+"""Points along half a notch at which the bending compliance is accumulated."""
 
 
 @dataclass(frozen=True, slots=True)
 class Notch:
-    """A notch in a bar of constant depth, thinned from both sides; x along the bar's axis from the middle.
+    """A notch that thins a bar of constant depth from both sides; x runs along the bar's axis from the middle.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ class Notch:
     half_length_mm : float
         Half axis of the ellipse along the bar; the radius R of a circular notch.
     depth_mm : float
-        Half axis of the ellipse across the bar; the radius again of a circular one.
+        Half axis of the ellipse across the bar; also the radius R for a circular notch.
     plate_mm : float
         Depth b of the bar, out of the plane.
     web_mm : float
-        Height of the bar, where it is less than the notch's own at its ends: the notch then ends where it reaches the
-        bar's faces, short of its half axis.
+        Height of the bar, if it is less than the notch's height at its ends: the notch then ends where it reaches the
+        bar's faces, before its half axis.
     """
 
     thickness_mm: float
@@ -58,7 +58,7 @@ class Notch:
 
     @property
     def curvature_ratio(self) -> float:
-        """Thickness over radius of curvature at the neck: t / R of a circular notch, t c / a^2 of an elliptic one."""
+        """Thickness over radius of curvature at the neck: t / R for a circular notch, t c / a^2 for an elliptic one."""
         return self.thickness_mm * self.depth_mm / self.half_length_mm**2
 
     @property
@@ -68,9 +68,10 @@ class Notch:
         return self.half_length_mm * sqrt(1.0 - max(share, 0.0) ** 2)
 
     def stations_mm(self, pieces: int) -> Array:
-        """Ends of pieces along the notch, closer together where it bends; shape (pieces + 1,), odd about the middle.
+        """Ends of pieces along the notch, more densely where it bends; shape (pieces + 1,), symmetric about the middle.
 
-        Half of the pieces are spaced by their share of the bending, the integral of 1 / h^3, the other half by length.
+        The pieces have equal amounts of the mean of two shares: of the bending compliance (the integral of 1 / h^3) and
+        of the length.
         """
         # x = a tan-like spacing near the neck: the bending part is sqrt(t R) long, and must be sampled finely.
         fine = np.sinh(np.linspace(0.0, np.arcsinh(20.0 * self.reach_mm / self._bending_mm), _FINE))
@@ -83,7 +84,7 @@ class Notch:
 
     @property
     def _bending_mm(self) -> float:
-        """Length over which the notch bends: sqrt(t R), with R the radius of curvature at the neck (mm)."""
+        """Length over which the notch mainly bends: sqrt(t R), with R the radius of curvature at the neck (mm)."""
         return min(sqrt(self.thickness_mm * self.half_length_mm**2 / self.depth_mm), self.reach_mm)
 
     @property
@@ -103,7 +104,7 @@ def circular_notch(radius_mm: float, thickness_mm: float, plate_mm: float) -> No
 
 
 def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:
-    """The notches of hinge 1, in the pillar, and hinge 2, in the shuttle."""
+    """The notches of hinge 1 (in the pillar) and of hinge 2 (in the shuttle)."""
     hinge, links = gripper.hinge, gripper.links
     x0, x1, _, _ = links.pillar_and_root_mm
     first, second = (
@@ -114,7 +115,7 @@ def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:
 
 
 def masses_t(notch: Notch, material: Material, edges_mm: Array) -> Array:
-    """Masses between stations of the notch by equation (1) of Hricko & Havlik (2015): density times depth times area.
+    """Masses between positions along the notch, by equation (1) of Hricko & Havlik (2015): density x depth x area.
 
     The integral of h has a closed form; int sqrt(1 - s^2) ds = (s sqrt(1 - s^2) + asin s) / 2.
     """

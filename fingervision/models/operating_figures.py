@@ -1,4 +1,4 @@
-"""Figures for a designer of grippers: leverage, parasitic motion, limits, effects of weight and temperature."""
+"""Characteristic numbers for a designer: leverage, parasitic motion, effects of weight and temperature."""
 
 from dataclasses import dataclass
 
@@ -15,21 +15,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class OperatingFigures:
-    """Operating figures of one gripper, for small displacements.
+    """Characteristic numbers of one gripper in operation, for small displacements.
 
     Parameters
     ----------
     mechanical_advantage : float or None
-        Grip of each finger by the drive's force, N/N, beyond the input at which the fingers touch.
+        Increase of each finger's gripping force per drive force, N/N, once the fingers touch.
     tip_along_per_input : float
-        Parasitic motion: of the measuring point along the fingers by 1 mm of input, mm/mm.
+        Parasitic motion of the measuring point along the fingers per 1 mm of input, mm/mm.
     tip_turn_deg_per_mm : float
-        Parasitic turn of the tip's inner face by 1 mm of input; positive turns the right finger's tip outwards, its
-        gap then opening more at the top.
+        Parasitic rotation of the tip's inner face per 1 mm of input; a positive value rotates the right finger's tip
+        outwards, so that the gap opens more at the top.
     gap_by_weight_mm, midline_by_weight_mm : float
-        Under one standard gravity: of the gap with the plate upright, and of the midline with the plate on its side.
+        Change under one standard gravity of the gap (plate upright) and of the midline (plate on its side).
     gap_per_kelvin_mm, force_per_kelvin_n : float or None
-        Of the gap and of the force at the held drive, where the material states its thermal expansion.
+        Change of the gap and of the force at the held drive per kelvin; None if the material states no thermal
+        expansion.
     """
 
     mechanical_advantage: float | None
@@ -42,14 +43,14 @@ class OperatingFigures:
 
 
 def operating_figures(gripper: Gripper, body: DrivenBody) -> OperatingFigures:
-    """Compute them.
+    """Compute the characteristic numbers of a gripper in operation.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     body : DrivenBody
-        Its right half, by any kind of model: `LumpedGripper(gripper).half`.
+        Right half of the gripper from any kind of model, such as `LumpedGripper(gripper).half`.
     """
     moved = body.unit_displacement_mm
     along = np.zeros(body.unknowns, dtype=np.int64)

@@ -1,7 +1,7 @@
 """Out-of-plane motion of a mechanism with its drive fixed: natural modes, and the sag of a horizontal plate.
 
-Fixed faces and the drive's face are fixed in all directions. A sliding face is fixed in its own direction at every
-depth, which on a plane of symmetry selects the symmetric modes.
+Fixed faces and the drive's face are fixed in all directions. A sliding face is fixed in its constrained direction at
+every depth, which on a plane of symmetry selects the symmetric modes.
 """
 
 from collections.abc import Mapping
@@ -21,23 +21,25 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 MODE_ERROR, SAG_ERROR = 0.01, 0.02
-"""Relative: frequencies are within 0.2 % of CalculiX's wedges for hinges 1 to 20 times as wide as thick
-(`tests/benchmarks/models_three_dimensions.py`); materials that are not alike in all directions are not in it."""
+"""Relative errors of frequency and sag: frequencies are within 0.2 % of CalculiX's wedge elements for hinges 1 to 20
+times as wide as thick (`tests/benchmarks/models_three_dimensions.py`); anisotropic materials are not covered by this
+comparison."""
 
 _ACROSS, _BODY = 2.0, 0.05
-"""Triangles across what is thin, and edge length over the size: within 0.1 % of a mesh twice as fine."""
+"""Triangles across thin parts, and edge length over the body's size: the result is within 0.1 % of that of a mesh twice
+as fine."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutOfPlane:
-    """Results for motion out of the plane.
+    """Results for out-of-plane motion of a mechanism.
 
     Parameters
     ----------
     modes_hz : tuple of float
-        First natural frequencies, the drive held.
+        First natural frequencies with the drive held.
     sag_mm : mapping of str to float
-        Sag of every probe of a horizontal plate under its own weight, the drive held.
+        Sag of every probe of a horizontal plate under its own weight, with the drive held.
     """
 
     modes_hz: tuple[float, ...]
@@ -54,16 +56,16 @@ def out_of_plane(
     mechanism : Mechanism
         The drawing.
     count : int
-        How many modes.
+        Number of modes.
     mesh : PlaneMesh or None
-        Its triangles; made where None.
+        Triangles of the mechanism; None makes them.
     order : int or None
-        Of the polynomials through the depth, odd; as `DeepPlate` has it where None.
+        Odd order of the polynomials through the depth; None for the default of `DeepPlate`.
 
     Raises
     ------
     DataError, ModelError
-        Where a face holds no part of the outline.
+        If no part of the outline lies on a face.
     """
     region = mechanism.region
     size_mm = region.size_mm

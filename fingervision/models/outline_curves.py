@@ -9,9 +9,11 @@ from scipy.optimize import brentq
 Array = NDArray[np.float64]
 
 _WITHIN = 1e-9
-"""Relative: how far beyond its ends a curve may still be met, so that curves that share a corner meet there."""
+"""Relative tolerance beyond a curve's ends within which it is still met, so that curves that share a corner meet
+there."""
 _SAMPLES = 181
-"""Along an arc, where crossings of two arcs are looked for: two crossings closer than 2 degrees are one."""
+"""Samples along an arc at which crossings of two arcs are searched: crossings closer than 2 degrees are not
+separated."""
 _PARALLEL = 1e-12
 
 
@@ -26,7 +28,7 @@ class Curve:
     v : ndarray of float, shape (2,), or None
         Second half axis of an arc; None for a segment.
     t0, t1 : float
-        Ends; t1 < t0 runs backwards.
+        Parameters at the start and the end; with t1 < t0 the curve runs backwards.
     """
 
     origin: Array
@@ -42,16 +44,16 @@ class Curve:
 
     @property
     def start_mm(self) -> Array:
-        """First point."""
+        """First point of the curve (mm)."""
         return self.at(np.array([self.t0]))[:, 0]
 
     @property
     def end_mm(self) -> Array:
-        """Last point."""
+        """Last point of the curve (mm)."""
         return self.at(np.array([self.t1]))[:, 0]
 
     def at(self, t: Array) -> Array:
-        """Points, shape (2, n)."""
+        """Points at given parameters, shape (2, n)."""
         if self.v is None:
             return np.asarray(self.origin[:, None] + np.outer(self.u, t))
         return np.asarray(self.origin[:, None] + np.outer(self.u, np.cos(t)) + np.outer(self.v, np.sin(t)))
@@ -74,13 +76,13 @@ class Curve:
         return np.asarray(np.sum(first**2, axis=0) ** 1.5 / cross)
 
     def part(self, t0: float, t1: float) -> "Curve":
-        """Return the part of the curve between two other ends."""
+        """Return the part of the curve between two other parameters."""
         return Curve(self.origin, self.u, self.v, t0, t1)
 
     def level(self, points: Array) -> Array:
-        """Signed measure of the side: zero on the infinite line or the whole ellipse, shape (n,).
+        """Signed distance measure of points from the extended curve (line or whole ellipse), zero on it, shape (n,).
 
-        The distance in mm from a line, the relative squared radius less 1 for an ellipse.
+        For a line it is the distance in mm; for an ellipse, the squared relative radius minus 1.
         """
         apart = points - self.origin[:, None]
         if self.v is None:
@@ -89,7 +91,7 @@ class Curve:
         return np.asarray(np.sum(unit**2, axis=0) - 1.0)
 
     def holds(self, point: Array) -> bool:
-        """Whether a point of the extended curve lies between the ends."""
+        """Whether a point on the extended curve lies between the curve's ends."""
         apart = point - self.origin
         if self.v is None:
             t = float(apart @ self.u / (self.u @ self.u))
@@ -101,7 +103,7 @@ class Curve:
 
 
 def crossings(curve: Curve, other: Curve) -> list[float]:
-    """Parameters of a curve, strictly between its ends, at which it meets another curve or passes along its ends."""
+    """Parameters of a curve, strictly between its ends, at which it meets another curve or the end of another."""
     found = _meetings(curve, other)
     for corner in (other.start_mm, other.end_mm):
         # Curves that lie on each other are divided at each other's ends.

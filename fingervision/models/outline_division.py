@@ -1,4 +1,4 @@
-"""The outline of a body divided into edges by the size field."""
+"""Division of a body's outline into edges of the lengths that the size field requires."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -77,7 +77,7 @@ def halved(sides: list[OutlineSide], missing: set[int]) -> list[OutlineSide]:
 
 
 def missing_sides(sides: list[OutlineSide], triangles: Indices) -> set[int]:
-    """Edges of the outline that belong to no triangle, or that have triangles on both sides."""
+    """Indices of outline edges that belong to no triangle, or that have triangles on both sides."""
     pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
     count = int(triangles.max()) + 1
     numbers, times = np.unique(pairs[0] * count + pairs[1], return_counts=True)
@@ -100,7 +100,7 @@ def flat_sides(sides: list[OutlineSide], points: Array, triangles: Indices) -> s
 
 
 def with_middles(points: Array, triangles: Indices, sides: list[OutlineSide]) -> PlaneMesh:
-    """Renumber the nodes that are used and add midside nodes, which lie on the arcs where the outline is curved."""
+    """Renumber the used nodes and add midside nodes, which lie on the arcs where the outline is curved."""
     used, packed = np.unique(triangles, return_inverse=True)
     place_of = np.full(points.shape[1], -1)
     place_of[used] = np.arange(used.size)

@@ -1,4 +1,4 @@
-"""A grid over dimensions of a drawing: the lumped model's figures, changed by the ratio that a bar model computes."""
+"""Sweep over a grid of dimensions: figures of the lumped model, scaled by ratios that a faster bar model computes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ COLUMNS = (
 )
 _MOST_VARIANTS = 2000
 _MOST_MECHANISMS = 400
-"""Of half a second each."""
+"""Most mechanisms in a sweep; each takes half a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Variation:
     name : str
         Dotted name as in `gripper.toml`, such as `hinge.thickness_mm`.
     values : tuple of float
-        In its own unit.
+        Values in the dimension's own unit.
     """
 
     name: str
@@ -55,12 +55,12 @@ class Variation:
 
 
 def parse_variation(text: str) -> Variation:
-    """Read `NAME=A:B:N`.
+    """Parse the text `NAME=A:B:N`.
 
     Raises
     ------
     UsageError
-        Where the text is no such thing.
+        If the text does not have this form.
     """
     name, _, span = text.partition("=")
     parts = span.split(":")
@@ -77,7 +77,7 @@ def parse_variation(text: str) -> Variation:
 
 
 def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[float]) -> Gripper:
-    """Return a gripper with some dimensions at given values, and all dependent ones adapted."""
+    """Return a gripper with some dimensions at given values, and dependent dimensions adapted."""
     for variation, value in zip(variations, values, strict=True):
         try:
             now = attrgetter(variation.name)(gripper)
@@ -93,28 +93,28 @@ def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[f
 
 
 def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: HingeTheory) -> tuple[Array, Array]:
-    """Compute the responses for every combination of the values.
+    """Compute the responses for every combination of the varied dimensions.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     variations : sequence of Variation
-        Each an axis of the grid; the last runs fastest.
+        Axes of the grid; the last one varies fastest.
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
 
     Returns
     -------
     values : ndarray of float, shape (n, k)
-        Of the numbers varied.
+        Values of the varied dimensions.
     answers : ndarray of float, shape (n, 6)
-        In the order of `COLUMNS`; a contact that never comes is infinite.
+        Responses in the order of `COLUMNS`; infinite for a contact that never occurs.
 
     Raises
     ------
     DataError, ModelError, UsageError
-        Where a corner of the grid is no gripper, or the grid is too large.
+        If a corner of the grid is not a valid gripper, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))
     if len(grid) > _MOST_VARIANTS:
@@ -134,7 +134,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
 
 def _figures(model: LumpedGripper) -> dict[str, float]:
-    """Figures of a drawing under the names of `COLUMNS`."""
+    """Figures of a drawing by the names in `COLUMNS`."""
     stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
     at_yield = model.gripper.material.yield_mpa / stress
     mode = model.modes_hz(drive_held=False, count=1)[0]
@@ -146,28 +146,28 @@ def _figures(model: LumpedGripper) -> dict[str, float]:
 def mechanism_sweep_answers(
     redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
 ) -> tuple[Array, tuple[str, ...], Array]:
-    """Compute the responses for every combination of the values, for a mechanism drawn by bodies.
+    """Compute the responses for every combination of the varied dimensions of a mechanism drawn by bodies.
 
     Parameters
     ----------
     redrawn_to : callable
-        Numbers by dotted name to the drawing that has them.
+        Maps values of dimensions, by dotted name, to the drawing with these values.
     variations : sequence of Variation
-        Each an axis of the grid; the last runs fastest.
+        Axes of the grid; the last one varies fastest.
 
     Returns
     -------
     values : ndarray of float, shape (n, k)
-        Of the numbers varied.
+        Values of the varied dimensions.
     columns : tuple of str
-        Names of the figures, of `mechanism_figures`.
+        Names of the figures computed by `mechanism_figures`.
     answers : ndarray of float, shape (n, columns)
-        Infinite where a variant has no such figure.
+        Figures of every drawing; infinite if a drawing has no such figure.
 
     Raises
     ------
     DataError, ModelError, UsageError
-        Where a variant is no mechanism, or the grid is too large.
+        If a drawing of the grid is not a valid mechanism, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))
     if len(grid) > _MOST_MECHANISMS:
@@ -184,7 +184,7 @@ def mechanism_sweep_answers(
             else:
                 rows.append({})
         except FingervisionError as error:
-            raise ModelError(f"The variant {_spelt(variations, values)} has no answer: {error}") from error
+            raise ModelError(f"The variant {_spelt(variations, values)} could not be computed: {error}") from error
     found = rows[len(corners) :]
     columns = tuple(dict.fromkeys(name for row in found for name in row if not name.startswith("model_error")))
     return np.array(grid), columns, np.array([[row.get(name, np.inf) for name in columns] for row in found])

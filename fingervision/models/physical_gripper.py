@@ -32,21 +32,22 @@ from fingervision.models.small_answer import SmallAnswer, ratio_curves, small_an
 Array = NDArray[np.float64]
 
 _SHORTER, _LONGER = -0.26, 0.5
-"""Of the lever's length: the amplification then changes by 30 % either way."""
+"""Range of relative changes of the lever's length: the amplification then changes by 30 % in either direction."""
 
 
 class PhysicalGripper:
-    """One kind of model of a drawing, with small displacements unless an effect changes that.
+    """One kind of model of a drawn gripper, for small displacements unless an effect adds large rotation or contact.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     kind : str
-        Kind of model. Changed links and hinges change its answer in the ratio in which they change the frame's
-        (`lumped`); large rotation and contact are the kind's own, and the frame's for `stiffness_matrix`.
+        Kind of model. For changed links and hinges its response is scaled by the ratio of the `lumped` model's
+        responses; large rotation and contact are computed by this kind itself (by the lumped model for
+        `stiffness_matrix`).
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
     """
 
     def __init__(self, gripper: Gripper, kind: str, theory: HingeTheory = HingeTheory.CORRECTED) -> None:
@@ -57,14 +58,14 @@ class PhysicalGripper:
         self._drawn = self.answer = _own_answer(self._model)
 
     def respond(self, input_mm: Array) -> Response:
-        """Respond by small displacements, with two identical halves."""
+        """Compute the response for small displacements, with two identical halves."""
         answer = self.answer
         right = 0.5 * (answer.rest_gap_mm + answer.gap_per_input * np.asarray(input_mm, dtype=float))
         return Response(-right, right, answer.force_per_input_n_mm * np.asarray(input_mm, dtype=float))
 
     @cached_property
     def laws(self) -> Mapping[str, PhysicalLaw]:
-        """Laws by the effect's name in the catalogue."""
+        """Laws of the catalogue's effects that this drawing determines, by name of effect."""
         body = getattr(self._model, "half", None)
         if not isinstance(body, DrivenBody):  # a model of small displacements alone: the frame of the same members
             body = half_frame(self.gripper, skeleton_of(self.gripper, self.theory, 0))
@@ -79,12 +80,12 @@ class PhysicalGripper:
 
     @cached_property
     def places(self) -> PlaceAnswers:
-        """Predictions for both halves with a hinge or link changed, by condensed bodies for every kind of model."""
+        """Predictions for changes of single hinges or links of both halves, by condensed bodies for every kind."""
         return PlaceAnswers(whole_mechanism(self.gripper, self.gripper, "gripper"))
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may change each within it."""
+        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may vary each within it."""
         return {
             name: Estimate(attrgetter(name)(self.gripper), u)
             for name, u in self.gripper.uncertainties.items()
@@ -92,7 +93,7 @@ class PhysicalGripper:
         }
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalGripper":
-        """Return the gripper with some dimensions changed, in the ratio of the frame's answers; its laws stay."""
+        """Return the gripper with changed dimensions, its response scaled by that of the frame; laws are unchanged."""
         if not changes:
             return self._with(self._drawn)
         new, old, drawn = small_answer(self._changed(changes), self.theory), self._frame, self._drawn
@@ -105,7 +106,10 @@ class PhysicalGripper:
         )
 
     def drawn_anew(self, changes: Mapping[str, float]) -> "PhysicalGripper":
-        """Return the same, with the kind's own answer to the changed drawing; the ratio is off by some 1e-4 of it."""
+        """Return the gripper with changed dimensions, computed by this kind of model itself.
+
+        The scaled response of `redrawn` differs from this one by about 1e-4.
+        """
         if not changes:
             return self._with(self._drawn)
         return self._with(_own_answer(build_model(self._kind, self._changed(changes), LINEAR, self.theory)))

@@ -1,18 +1,19 @@
-"""Physics that a model includes beyond small displacements."""
+"""Options of a mechanical model for physics beyond small displacements."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """Options of a mechanical model; with all of them off it is the linear model of Hricko & Havlik (2015).
+    """Options of a mechanical model; with all options off it is the linear model of Hricko & Havlik (2015).
 
     Parameters
     ----------
     large_rotation : bool
-        Equilibrium in the deformed shape. For the reference gripper +0.3 % of gap and +6 % of force at 18 mm.
+        Compute the equilibrium in the deformed shape. For the reference gripper this changes the gap by +0.3 % and the
+        force by +6 % at a gap of 18 mm.
     contact : bool
-        The fingers cannot pass through the symmetry plane.
+        Prevent the fingers from passing through the symmetry plane.
     """
 
     large_rotation: bool = False

@@ -1,8 +1,8 @@
-"""Response of a mechanism with one place changed: the stiffness or position of a hinge, or a slip in a pivot.
+"""Response of a mechanism with a local change: stiffness or position of a hinge, or slip in a pivot.
 
-Bodies keep their condensed stiffness; a displaced flexure is joined to them by a rigid arm, and a flexure of another
-thickness keeps its ends. A changed response then costs one small system of equations, a thousandth of the time for a
-new mesh.
+Bodies keep their condensed stiffness; a displaced flexure is joined to them by a rigid arm, and a flexure of changed
+thickness keeps its ends. A changed response then requires one small system of equations, which takes a thousandth of
+the time of a new mesh.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,27 +23,29 @@ from fingervision.models.mechanism_frame import MechanismFrame
 Array = NDArray[np.float64]
 
 PARTS = ("x_mm", "y_mm", "angle_mrad")
-"""Of a body's pose."""
+"""Components of a body's pose."""
 _SIMPSON = (1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0)
-"""Weights of an edge's ends and middle: exact for what is quadratic along it, as displacements are."""
+"""Simpson weights of an edge's two ends and its middle: exact for quadratic functions along the edge, as displacements
+are."""
 _UNIT = 1e-3
-"""Motion by which a linear functional of the motions is told, in mm and rad: any would do."""
+"""Unit motion, in mm and rad, by which the coefficients of a linear functional are computed; its size is arbitrary."""
 _THINNEST, _THICKEST = 0.3, 2.5
-"""Of a flexure's drawn thickness: its bending stiffness then lies between 0.03 and 15 times the drawn one."""
+"""Range of a flexure's thickness relative to the drawn one: its bending stiffness is then between 0.03 and 15 times the
+drawn one."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceChanges:
-    """Changes of a mechanism relative to its drawing.
+    """Local changes of a mechanism relative to its drawing.
 
     Parameters
     ----------
     stiffness : mapping of int to float
-        Relative change of a flexure's bending stiffness, by its thickness; by the flexure's number.
+        Relative change of a flexure's bending stiffness, through its thickness; the key is the flexure's number.
     moved_mm : mapping of int to (float, float)
-        How far a flexure sits from where it is drawn.
+        Displacement of a flexure from its drawn position; the key is the flexure's number.
     probes_mm : mapping of str to (float, float)
-        How far a probe sits from where it is drawn.
+        Displacement of a probe from its drawn position; the key is the probe's name.
     """
 
     stiffness: Mapping[int, float]
@@ -56,17 +58,17 @@ AS_DRAWN = PlaceChanges({}, {}, {})
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearAnswer:
-    """Small-displacement response of a mechanism.
+    """Small-displacement response of all outputs (channels) of a mechanism.
 
     Parameters
     ----------
     by_input : ndarray of float, shape (channels,)
-        Every channel by 1 mm of input.
+        Change of every channel per 1 mm of input.
     by_slip : ndarray of float, shape (flexures, channels, 2)
-        Every channel by 1 mm that the far body of a flexure slips along x and y against its near one, at its middle,
-        the drive held.
+        Change of every channel per 1 mm of slip along x and y in a flexure, between the two bodies that it joins, at
+        its middle, with the drive held.
     load_by_input : ndarray of float, shape (flexures, 2)
-        Force on the slip of each flexure by 1 mm of input, in N: what its pivot carries.
+        Force in the direction of each flexure's slip per 1 mm of input, in N: the force that its pivot carries.
     slip_stiffness : ndarray of float, shape (flexures, 2, 2)
         Force against a slip, in N/mm.
     """
@@ -85,7 +87,7 @@ class PlaceAnswers:
     mechanism : Mechanism
         The drawing.
     model : MechanismFrame or None
-        Its lumped model, where it was built already.
+        Lumped model of the mechanism, if already built.
     """
 
     def __init__(self, mechanism: Mechanism, model: MechanismFrame | None = None) -> None:
@@ -95,14 +97,14 @@ class PlaceAnswers:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Names of the outputs: poses of bodies, angles of hinges, probes, pairs, the force at the drive."""
+        """Names of the outputs: poses of bodies, angles of hinges, probes, pairs of probes, the force at the drive."""
         bodies = [f"{name}.{part}" for name in self._weights for part in PARTS]
         hinges = [f"{flexure.name}.angle_mrad" for flexure in self.mechanism.flexures]
         probes = [f"{name}_{axis}_mm" for name in self.mechanism.probes for axis in "xy"]
         return (*bodies, *hinges, *probes, *(f"{name}_mm" for name in self.mechanism.pairs), "force_n")
 
     def _make_observers(self) -> None:
-        """Outputs as linear functionals of the frames' motions; angles of hinges are derived from these."""
+        """Express the outputs as linear functionals of the frames' motions; hinge angles are derived from these."""
         model, plate = self.model, self.model.plate
         self._weights = body_weights(plate, model.bodies)
         size = model.frame.unknowns
@@ -150,7 +152,7 @@ class PlaceAnswers:
 
     @property
     def moving_bodies(self) -> tuple[str, ...]:
-        """Names of the bodies that have a pose."""
+        """Names of the bodies whose pose is computed."""
         return tuple(self._weights)
 
     def numbered_bodies(self) -> dict[int, LinkBody]:
@@ -164,10 +166,10 @@ class PlaceAnswers:
 
     @cached_property
     def by_edges(self) -> Array:
-        """How much more each channel changes by 1 mm of input where poses are those of edges, shape (channels,).
+        """Extra change of each channel per 1 mm of input if poses are measured from edges, shape (channels,).
 
-        A body that bends moves its outline otherwise than its area: a picture shows the rigid motion nearest to the
-        displacements of its edges along their normals.
+        If a body bends, the mean motion of its outline differs from that of its area. In a picture only the edges are
+        seen: their pose is the rigid motion nearest to the displacements of the edges along their normals.
         """
         model, plate = self.model, self.model.plate
         moved = model.driven.equilibrium(1.0, large_rotation=False, contact=False).displacement
@@ -199,7 +201,7 @@ class PlaceAnswers:
         return np.array([own_of[name] for name in self.channels])
 
     def body_of_frame(self, frame: int) -> int:
-        """Number of the body that a frame belongs to."""
+        """Number of the body to which a coordinate frame belongs."""
         return next(n for n, body in enumerate(self.model.assembly.bodies) if frame in body.frames)
 
     def ends(self, flexure: int) -> tuple[int, int]:
@@ -229,7 +231,7 @@ class PlaceAnswers:
         return np.asarray(own)
 
     def answer(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
-        """Compute all outputs with some places changed."""
+        """Compute all outputs with the given local changes."""
         model, frame = self.model, self.model.frame
         size = frame.unknowns
         compliance = frame.end_compliance.copy()
@@ -266,7 +268,7 @@ class PlaceAnswers:
         return LinearAnswer(seen[:, 0], by_slip, load_by_input, slip_stiffness)
 
     def _slips(self, frame: CorotationalFrame) -> tuple[Array, Array]:
-        """Loads of a unit slip at the middle of every flexure, shape (unknowns, 2 n), and the slip's own stiffness."""
+        """Loads of a unit slip at the middle of every flexure, shape (unknowns, 2 n), and stiffness against slip."""
         loads, own = [], []
         for segments in self.model.segments:
             element = segments[len(segments) // 2 - 1]
@@ -299,7 +301,7 @@ class PlaceAnswers:
 
 
 def attachments(answers: PlaceAnswers) -> Sequence[Mapping[str, PointMm]]:
-    """Points of every body at which it is supported or driven: its flexures' middles, then supports and the drive."""
+    """Points at which each body is supported or driven: middles of its flexures, then supports and drive."""
     model = answers.model
     found: list[dict[str, PointMm]] = [{} for _ in model.assembly.bodies]
     for number, flexure in enumerate(answers.mechanism.flexures):

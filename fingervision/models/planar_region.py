@@ -1,7 +1,7 @@
-"""A plane body as shapes that are added and cut in sequence, with its exact outline of segments and arcs.
+"""A plane body as a sequence of shapes that are added or removed, with its exact outline of segments and arcs.
 
-Every shape's outline is divided where it meets another shape's; the pieces with material on exactly one side form the
-body's outline. Nothing is approximated: a notch stays an arc.
+The outline of every shape is divided where it meets that of another shape; the pieces with material on exactly one side
+form the body's outline. Arcs are kept exactly, not replaced by chords.
 """
 
 from dataclasses import dataclass
@@ -18,13 +18,14 @@ from fingervision.models.plane_shapes import Point, Polygon, Shape
 Array = NDArray[np.float64]
 
 _BESIDE = 1e-6
-"""Of the body's size: how far beside a piece its two sides are looked at. Finer details than this do not exist."""
+"""Distance on either side of an outline piece at which material is tested, as a share of the body's size. Finer details
+are not resolved."""
 _TURNS_IN = -0.2
-"""Sine of the turn to the right beyond which a corner turns into the body."""
+"""Sine of the angle of a turn to the right beyond which a corner counts as re-entrant."""
 _CHORDS = 33
 _MOST_KEPT = 64
 _SAME = 1e-8
-"""Of the body's size: corners closer than this are one."""
+"""Distance below which two corners count as one, as a share of the body's size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +35,9 @@ class Loop:
     Parameters
     ----------
     curves : tuple of Curve
-        In order, the body on their left: the outside runs anticlockwise, a hole clockwise.
+        Curves in order, with the body on their left: the outer loop runs anticlockwise, a hole clockwise.
     area_mm2 : float
-        Enclosed; negative for a hole.
+        Enclosed area; negative for a hole.
     """
 
     curves: tuple[Curve, ...]
@@ -51,12 +52,12 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class PlanarRegion:
-    """A body as a sequence of steps, each of which adds or cuts a shape.
+    """A body as a sequence of steps, each of which adds or removes a shape.
 
     Parameters
     ----------
     steps : tuple of (bool, Shape)
-        Whether the shape is added, and the shape; in order.
+        Steps in order, each (whether the shape is added, the shape).
     marks_mm : tuple of (float, float)
         Points that must be corners where they lie on the outline.
     """
@@ -80,12 +81,12 @@ class PlanarRegion:
 
     @cached_property
     def loops(self) -> tuple[Loop, ...]:
-        """The outline.
+        """Closed loops of the body's outline.
 
         Raises
         ------
         DataError
-            Where two parts of it touch in a point, so that the body is not defined there.
+            If two parts of the outline touch in a point, where the body is not defined.
         """
         return _loops_of(self.steps, self.marks_mm)
 
@@ -145,7 +146,7 @@ def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
 
 
 def _box_mm(curve: Curve) -> tuple[Array, Array]:
-    """Lower and upper corner of a box that contains a curve; for an arc, that of the whole ellipse (mm)."""
+    """Lower and upper corner of the bounding box of a curve; for an arc, of the whole ellipse (mm)."""
     if curve.v is None:
         points = np.stack([curve.start_mm, curve.end_mm])
     else:

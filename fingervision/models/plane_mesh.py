@@ -12,19 +12,20 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 LEAST_QUALITY = 0.3
-"""Twice the inscribed over the circumscribed radius, 1 for an equilateral triangle: a 30-degree angle has 0.7."""
+"""Least quality of a triangle: twice the ratio of inscribed to circumscribed radius, which is 1 for an equilateral
+triangle and 0.7 for one with a 30-degree angle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneMesh:
-    """Quadratic triangles in the plane; curved edges follow the notches.
+    """Mesh of quadratic triangles in the plane; edges on the notches are curved.
 
     Parameters
     ----------
     nodes_mm : ndarray of float, shape (2, n)
-        Places of corners and edge midpoints.
+        Positions of corners and edge midpoints.
     triangles : ndarray of int, shape (6, m)
-        Corners 0, 1, 2 and the midpoints of the edges 01, 12, 02.
+        Node indices: corners 0, 1, 2 and the midpoints of the edges 01, 12, 02.
     """
 
     nodes_mm: NDArray[np.float64]

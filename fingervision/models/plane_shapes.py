@@ -19,19 +19,19 @@ class Polygon:
     Parameters
     ----------
     corners_mm : tuple of (float, float)
-        In order, either way round.
+        Corners in order, clockwise or anticlockwise.
     """
 
     corners_mm: tuple[Point, ...]
 
     def curves(self) -> list[Curve]:
-        """Sides."""
+        """Sides of the polygon, as curves."""
         corners = np.array(self.corners_mm)
         pairs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
         return [Curve(a, b - a, None, 0.0, 1.0) for a, b in pairs if np.hypot(*(b - a)) > 0.0]
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points, shape (2, n), lie inside: an odd number of sides to the right of them."""
+        """Whether points, shape (2, n), lie inside, which holds if an odd number of sides is to their right."""
         x, y = points
         inside = np.zeros(x.shape, dtype=bool)
         corners = np.array(self.corners_mm)
@@ -48,11 +48,11 @@ class Ellipse:
     Parameters
     ----------
     centre_mm : (float, float)
-        Its middle.
+        Centre of the ellipse.
     half_axes_mm : (float, float)
-        Along its own axis and across it; equal for a disc.
+        Half axes, along the ellipse's axis and across it; equal for a disc.
     axis_deg : float
-        Direction of its own axis from x.
+        Angle of the ellipse's axis from x.
     """
 
     centre_mm: Point
@@ -65,7 +65,7 @@ class Ellipse:
         return self.half_axes_mm[0] * along, self.half_axes_mm[1] * np.array([-along[1], along[0]])
 
     def curves(self) -> list[Curve]:
-        """Four arcs."""
+        """Outline of the ellipse as four arcs."""
         u, v = self._axes()
         quarters = np.pi / 2.0 * np.arange(5.0)
         return [Curve(np.array(self.centre_mm), u, v, a, b) for a, b in pairwise(quarters.tolist())]
@@ -91,7 +91,7 @@ def crosses_itself(corners_mm: tuple[Point, ...]) -> bool:
 
 
 def bar(x0: float, y0: float, x1: float, y1: float, width_mm: float) -> Polygon:
-    """A straight bar about the line between two points."""
+    """A straight bar whose axis joins two points."""
     length = float(np.hypot(x1 - x0, y1 - y0))
     nx, ny = -(y1 - y0) / length * width_mm / 2.0, (x1 - x0) / length * width_mm / 2.0
     return Polygon(((x0 - nx, y0 - ny), (x1 - nx, y1 - ny), (x1 + nx, y1 + ny), (x0 + nx, y0 + ny)))

@@ -1,6 +1,6 @@
-"""An elastic plate in plane stress: quadratic triangles, small or large displacements.
+"""An elastic plate in plane stress, meshed with quadratic triangles, for small or large displacements.
 
-In a flexure restrained by its width, the law lies between plane stress and plane strain (`width_effect`).
+In a flexure restrained by its width, the material law lies between plane stress and plane strain (`width_effect`).
 """
 
 from functools import cached_property
@@ -23,7 +23,10 @@ _CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _stress(strain: Any, moduli: Any) -> Any:
-    """Stress in plane stress, where the thickness is free: Timoshenko and Goodier, Theory of Elasticity, chapter 2."""
+    """Stress in plane stress, where the thickness is free to change.
+
+    Source: Timoshenko and Goodier, Theory of Elasticity, chapter 2.
+    """
     E, nu = moduli
     return E / (1.0 + nu) * strain + E * nu / (1.0 - nu**2) * eye(trace(strain), 2)
 
@@ -40,11 +43,12 @@ class PlaneStressPlate:
     mesh : PlaneMesh
         Quadratic triangles.
     material : Material
-        Linear elastic; the St. Venant-Kirchhoff law in large displacements, right where strains are a few per cent.
+        Linear elastic material; for large displacements the St. Venant-Kirchhoff law, which holds for strains of a few
+        per cent.
     plate_mm : float
         Thickness.
     zones : tuple of ConstrainedZone
-        Flexures that the width holds back; none for plane stress everywhere.
+        Flexures restrained by the plate's width; empty for plane stress everywhere.
     """
 
     def __init__(
@@ -89,7 +93,7 @@ class PlaneStressPlate:
 
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
-        """Derivatives of six shape functions at quadrature points, shape (m, q, 2, 6), and weights, shape (m, q)."""
+        """Derivatives of the six shape functions at quadrature points, shape (m, q, 2, 6); weights, shape (m, q)."""
         scalar = skfem.Basis(self._mesh, skfem.ElementTriP2(), intorder=4)
         slopes = np.stack([np.asarray(shape[0].grad) for shape in scalar.basis])  # (6, 2, m, q)
         return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
@@ -159,7 +163,7 @@ class PlaneStressPlate:
         return self._collected(*self._deformed(displacement_mm))
 
     def _deformed(self, displacement_mm: Array) -> tuple[Array, Array]:
-        """Deformation gradient (m, q, direction, component) and second Piola-Kirchhoff stress (m, q, 3)."""
+        """Deformation gradient, shape (m, q, 2, 2), and second Piola-Kirchhoff stress, shape (m, q, 3)."""
         slopes, weights = self._slopes
         triangles, points = weights.shape
         moved = np.swapaxes(displacement_mm[self.unknowns_of_triangles].reshape(-1, 2, 6), 1, 2)
@@ -209,7 +213,7 @@ class PlaneStressPlate:
         displacement_mm : ndarray of float, shape (unknowns,)
             Displacement components.
         large : bool
-            Cauchy stress of the deformed plate; small displacements otherwise.
+            Whether to compute the Cauchy stress of the deformed plate; if False, the stress for small displacements.
         """
         corners = skfem.Basis(self._mesh, self._element, quadrature=(_CORNERS, np.full(3, 1.0 / 6.0)))
         gradient = corners.interpolate(displacement_mm).grad
@@ -226,7 +230,7 @@ class PlaneStressPlate:
         return np.asarray(np.sqrt(0.5 * squares + 3.0 * txy**2)).T
 
     def at_corners(self, values: Array) -> Array:
-        """Mean over the triangles that meet at each corner node; shape (number of corners,)."""
+        """Mean, over the triangles that meet at each corner node, of their values; shape (number of corner nodes,)."""
         triangles = self.corner_triangles
         size = int(self._basis.nodal_dofs.shape[1])
         total = np.bincount(triangles.ravel(), weights=values.ravel(), minlength=size)

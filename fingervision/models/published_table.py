@@ -1,4 +1,4 @@
-"""Table 1 of Hricko & Havlik (2015): both published models and the only measurement of the real gripper.
+"""Table 1 of Hricko & Havlik (2015): the two published models and the only measurement of the real gripper.
 
 Source: Am. J. Mech. Eng. 3(6) 2015, 201-206, table 1, with the digits as printed. Nothing is fitted to these values.
 """

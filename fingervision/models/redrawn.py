@@ -1,4 +1,4 @@
-"""A drawing with one dimension changed, and all dependent ones adapted so that the links still meet."""
+"""Change one dimension of a drawing, and adapt the dependent dimensions so that the links still meet."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,7 +8,7 @@ from fingervision.domain.gripper import Gripper, Lever, Links, PointMm
 
 
 def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
-    """Change one dimension of a drawing.
+    """Change one dimension of a drawing, with its dependent dimensions.
 
     Parameters
     ----------
@@ -19,12 +19,12 @@ def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
         hinge 1 with its pillar; `lever.l3_mm` the drive; `lever.l4_mm` both hinges with their links; `body.rest_gap_mm`
         the tips.
     by : float
-        Change in the number's own unit.
+        Change in the dimension's own unit.
 
     Raises
     ------
     DataError
-        Where the name is not that of a number.
+        If the name is not that of a dimension.
     """
     section, _, key = name.partition(".")
     record: Any = getattr(gripper, section, None)

@@ -1,4 +1,4 @@
-"""Pose of a body: the rigid motion nearest to the motion of many of its points."""
+"""Pose of a body: the rigid motion that fits the motions of many of its points best."""
 
 from dataclasses import dataclass
 
@@ -30,20 +30,20 @@ class BodyPose:
 def rigid_motion(places_mm: Array, moved_mm: Array, weights: Array, about_mm: Array, *, large: bool) -> BodyPose:
     """Fit the rigid motion that leaves the smallest weighted sum of squared distances.
 
-    In large displacements the rotation is that of Kabsch (1976), Acta Crystallographica A 32, 922, DOI
-    10.1107/S0567739476001873, in the plane. In small displacements it is the linear part of that rotation, so that the
-    pose is proportional to the displacements.
+    For large displacements the rotation is that of Kabsch (1976), Acta Crystallographica A 32, 922, DOI
+    10.1107/S0567739476001873, in the plane. For small displacements the linear part of that rotation is used, so that
+    the pose is proportional to the displacements.
 
     Parameters
     ----------
     places_mm, moved_mm : ndarray of float, shape (2, n)
-        Places at rest and displacements.
+        Positions of the points at rest, and their displacements.
     weights : ndarray of float, shape (n,)
-        Of each point, such as the area that it stands for; not all zero.
+        Weight of each point, such as the area that it represents; not all zero.
     about_mm : ndarray of float, shape (2,)
-        Reference point, whose motion is told.
+        Reference point whose motion is returned.
     large : bool
-        Whether displacements are large.
+        Whether the displacements are large.
     """
     share = weights / weights.sum()
     middle = places_mm @ share

@@ -1,4 +1,4 @@
-"""Frictionless contact with a rigid plane (Signorini's problem), condensed to the points that may touch."""
+"""Frictionless contact with a rigid plane (Signorini's problem), reduced to the points that may touch."""
 
 import numpy as np
 import scipy.linalg
@@ -11,8 +11,8 @@ Array = NDArray[np.float64]
 def contact_forces_n(compliance_mm_n: Array, free_gap_mm: Array) -> Array:
     """Find the forces that keep every point on its side of the plane.
 
-    Solves gap = free_gap + C force with gap >= 0, force >= 0, gap * force = 0. This is the optimum of the quadratic
-    programme min f' C f / 2 + g' f over f >= 0, written as a non-negative least squares problem by C = L L'.
+    Solves gap = free_gap + C force with gap >= 0, force >= 0, gap * force = 0. The solution minimises f' C f / 2 + g' f
+    over f >= 0, a quadratic programme; with C = L L' it is solved as a non-negative least-squares problem.
 
     Parameters
     ----------

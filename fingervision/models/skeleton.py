@@ -1,9 +1,9 @@
 """The half gripper as a tree of bars, hinges and stiff joints, from the clamp to the drive and to the tip.
 
-Bars bend over their whole axes, up to where the axes meet, except the finger inside the cross bar. The drive block is
-elastic under the shuttle (`drive_block_root`); the connection from a bar's axis to a point on its face is rigid.
-Compared with finite elements for nine grippers that were not used in the tuning, the gap per input agrees within 0.41
-%, the force within 1.5 % (`tests/benchmarks/models_held_out.py`).
+Bars bend over the whole length of their axes, up to the point where the axes meet, except the finger inside the cross
+bar. The drive block is elastic under the shuttle (`drive_block_root`); the connection from a bar's axis to a point on
+its face is rigid. For nine grippers that were not used in developing these rules, the gap per input agrees with finite
+elements within 0.41 %, the force within 1.5 % (`tests/benchmarks/models_held_out.py`).
 """
 
 from dataclasses import dataclass, replace
@@ -26,27 +26,28 @@ _RIGID = np.zeros((6, 6))
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _PIECES_PER_BAR = 4
 _LEAST_BAR = 0.01
-"""Of what is left between a notch and the cross bar's axis: a bar must have some length."""
+"""Least length of a bar between a notch and the axis of the cross bar, as a share of the distance between the two."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Member:
-    """One member of the tree: fixed to its parent's end at its start, loaded at its own end.
+    """One member of the tree: its start is joined to its parent's end, its own end is loaded.
 
     Parameters
     ----------
     name : str
-        What it is.
+        Name of the member.
     parent : int
-        Place of the parent in the tree; -1 for the clamp.
+        Index of the parent in the tree; -1 for the clamp.
     start_mm, end_mm : (float, float)
-        Its axis.
+        Ends of the member's axis.
     compliance : ndarray of float, shape (6, 6)
-        At its end, x along its axis, y to the left of it, z towards the viewer; zero where rigid.
+        Compliance at the member's end, with x along its axis, y to the left of it and z towards the viewer; zero for a
+        rigid member.
     mass_t : float
-        Mass, spread along the axis.
+        Mass, distributed uniformly along the axis.
     width_mm : float
-        Extent across the axis, for the rotational inertia.
+        Extent across the axis, used for the rotational inertia.
     """
 
     name: str
@@ -60,14 +61,14 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """The tree, parents before children.
+    """The tree of members, with parents before children.
 
     Parameters
     ----------
     members : tuple of Member
-        The links.
+        All members in order.
     drive, corner, heel, measured : int
-        Members whose ends are the drive point, the tip's corner and heel, and the measuring point.
+        Indices of the members whose ends are the drive point, the tip's corner, the tip's heel and the measuring point.
     """
 
     members: tuple[Member, ...]
@@ -104,7 +105,7 @@ class _Tree:
     def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
         """Divide a notch into segments.
 
-        If another body begins before its full length, its segments are shorter there.
+        If another body begins before the end of the notch, the segments on that side are shorter.
         """
         material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
         centre = self.gripper.lever.hinge1_mm if name == "hinge 1" else self.gripper.lever.hinge2_mm
@@ -146,21 +147,21 @@ def skeleton_of(
     gripper : Gripper
         The drawing.
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
     segments : int
-        Pieces per hinge, close together at the neck, each with its own integral; 0 for one piece with the
-        whole hinge's own compliance.
+        Segments per hinge, shorter near the neck, each with its own integral; 0 for one segment with the compliance of
+        the whole hinge.
     rigid_links : bool
-        Whether only the hinges yield, as in the paper's equations.
+        Whether only the hinges are elastic, as in the equations of Hricko & Havlik (2015).
     block : ndarray of float, shape (3, 3), or None
-        `drive_block_root.unit_compliance`, where known already.
+        Result of `drive_block_root.unit_compliance`, if already computed.
     ends_mm : (float, float) or None
-        Ways from the middle of either hinge to where the finger begins, where that is no more than the notch's reach.
+        Distances from the middles of the two hinges to where the finger begins, if these are within the notches.
 
     Raises
     ------
     DataError, ModelError
-        Where the members do not follow each other.
+        If the members do not form a connected chain.
     """
     links, lever = gripper.links, gripper.lever
     first, second = notches_of(gripper)
@@ -243,7 +244,7 @@ def _bending_out_of_plane(member: Member, gripper: Gripper) -> Member:
 
 
 def _yielding(member: Member, at_start: Array) -> Member:
-    """Give a rigid member an elastic joint at its start, by a compliance (x, y, rotation) in global axes."""
+    """Add an elastic joint, given by its compliance (x, y, rotation) in global axes, at a rigid member's start."""
     way = np.subtract(member.end_mm, member.start_mm)
     c, s = way / np.hypot(*way)
     carried = np.array([[1.0, 0.0, -way[1]], [0.0, 1.0, way[0]], [0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Small-displacement response of a drawing's frame: three numbers, for drawings that are changed many times."""
+"""Small-displacement response of a drawing's frame, reduced to three numbers: fast enough for many changed drawings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ _WITHIN = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class SmallAnswer:
-    """A linear gripper.
+    """Small-displacement response of a gripper: a linear relation of gap and force to the input.
 
     Parameters
     ----------
     rest_gap_mm, gap_per_input, force_per_input_n_mm : float
-        Gap at input zero; gap and force of both halves per millimetre of input.
+        Gap at zero input; gap per millimetre of input; force of both halves per millimetre of input.
     """
 
     rest_gap_mm: float
@@ -38,21 +38,21 @@ class SmallAnswer:
 
 
 def small_answer(gripper: Gripper, theory: HingeTheory) -> SmallAnswer:
-    """Compute the response by the frame of the lumped model, in a few milliseconds."""
+    """Compute the response by the lumped model's frame, in a few milliseconds."""
     half = half_frame(gripper, skeleton_of(gripper, theory, _SEGMENTS))
     return SmallAnswer(2.0 * half.measured_rest_mm, gap_per_input(half), half.equilibrium(1.0).force_n)
 
 
 @dataclass(frozen=True, eq=False)
 class RatioCurves:
-    """Gap and force relative to the drawing, as functions of a change of one of its dimensions.
+    """Ratios of gap and force to those of the drawing, as functions of a change of one dimension.
 
     Parameters
     ----------
     change : ndarray of float, shape (k,)
-        The number's change.
+        Change of the dimension.
     gap, force : ndarray of float, shape (k,)
-        Ratio of gap and of force per input to the drawing's own.
+        Ratio of gap per input, and of force per input, to those of the unchanged drawing.
     """
 
     change: Array
@@ -60,11 +60,11 @@ class RatioCurves:
     force: Array
 
     def force_at_gap(self, gap_ratio: float) -> float:
-        """Force ratio of the change that gives a gap ratio; both ratios are 1 without change."""
+        """Force ratio at the change for which the gap ratio has a given value; both ratios are 1 without change."""
         return float(self._force(np.clip(gap_ratio, self.gap.min(), self.gap.max())))
 
     def gap_at_force(self, force_ratio: float) -> float:
-        """Gap ratio of the change that gives a force ratio."""
+        """Gap ratio at the change for which the force ratio has a given value."""
         return float(self._gap(np.clip(force_ratio, self.force.min(), self.force.max())))
 
     @cached_property
@@ -87,17 +87,17 @@ def ratio_curves(gripper: Gripper, theory: HingeTheory, change: Callable[[float]
     gripper : Gripper
         The drawing.
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
     change : callable
-        Gives the drawing changed by so much.
+        Maps an amount of change to the changed drawing.
     low, high : float
-        Range of changes, about zero.
+        Range of the change, which includes zero.
 
     Returns
     -------
     RatioCurves or None
-        None where there is nothing to change, where the changed drawings are no grippers, or where the ratios turn
-        back: no change could then be told from its ratio.
+        None if there is nothing to change, if the changed drawings are not valid grippers, or if a ratio is not
+        monotonic, so that it does not determine the change.
     """
     if not low < 0.0 < high:
         return None

@@ -21,14 +21,14 @@ _SAMPLES_BEYOND_TOUCH = 200
 
 
 def symmetric_response(body: DrivenBody, physics: Physics, input_mm: Array) -> Response:
-    """Respond statically at each input, with two identical halves.
+    """Compute the static response at each input, with two identical halves.
 
     Parameters
     ----------
     body : DrivenBody
         The right half.
     physics : Physics
-        What goes beyond small displacements.
+        Which effects beyond small displacements are included.
     input_mm : ndarray of float, shape (n,)
         Inputs.
     """
@@ -37,7 +37,7 @@ def symmetric_response(body: DrivenBody, physics: Physics, input_mm: Array) -> R
 
 
 def gap_per_input(body: DrivenBody) -> float:
-    """Millimetres of gap per millimetre of input at rest."""
+    """Millimetres of gap per millimetre of input, at zero input."""
     return 2.0 * (body.measured_mm(body.unit_displacement_mm) - body.measured_rest_mm)
 
 
@@ -60,7 +60,7 @@ def equilibria(body: DrivenBody, physics: Physics, inputs_mm: Sequence[float]) -
 
 
 def contact_onset_mm(body: DrivenBody, physics: Physics) -> float | None:
-    """Input at which the fingers first touch, in the deformed shape if requested (mm); None where they never touch."""
+    """Input at which the fingers first touch (mm), in the deformed shape if requested; None if they never touch."""
     touch_mm = body.first_touch_mm()
     if touch_mm is None or not physics.large_rotation:
         return touch_mm
@@ -90,7 +90,7 @@ def _right_and_force(body: DrivenBody, physics: Physics, inputs: Array) -> tuple
 
 
 def _large(body: DrivenBody, inputs: Array, touch_mm: float | None) -> tuple[Array, Array]:
-    """Equilibria along the path from rest, with a cubic spline between them."""
+    """Gap and force over the inputs, from a cubic spline through equilibria along the path from rest."""
     lowest = min(float(inputs.min(initial=0.0)), -_LEAST_MM)
     highest = max(float(inputs.max(initial=0.0)), _LEAST_MM)
     touching: list[Equilibrium] = []

@@ -11,16 +11,17 @@ STANDARD_GRAVITY_MM_S2 = 9806.65
 
 
 def weight_displacement_mm(body: DrivenBody, direction: tuple[float, float], *, swaying: bool = False) -> Array:
-    """Displacements under one standard gravity in the plane, with the drive fixed.
+    """Displacements under one standard gravity acting in the plane, with the drive fixed.
 
     Parameters
     ----------
     body : DrivenBody
         The right half.
     direction : (float, float)
-        Unit vector along which gravity pulls.
+        Unit vector of the direction in which gravity acts.
     swaying : bool
-        Whether both halves move the same way sideways, the drive with them; else they mirror each other.
+        Whether both halves and the drive move sideways in the same direction; if False, the halves move as mirror
+        images.
     """
     pulled = np.zeros(body.unknowns)
     pulled[body.nodes[:, 0]], pulled[body.nodes[:, 1]] = direction
@@ -37,22 +38,22 @@ def weight_displacement_mm(body: DrivenBody, direction: tuple[float, float], *, 
 def thermal_displacement_mm(body: DrivenBody, strain: float, held_mm: Array) -> tuple[Array, Array]:
     """Displacements and nodal forces under a uniform thermal strain.
 
-    A free body expands by `strain` times its nodes' positions, without stress: K (u - strain x) = 0 where nothing is
-    fixed.
+    A free body expands without stress, each node by `strain` times its position x: K (u - strain x) = 0 at every
+    unknown that is not fixed.
 
     Parameters
     ----------
     body : DrivenBody
         The right half.
     strain : float
-        Expansion times change of temperature.
+        Thermal expansion coefficient times change of temperature.
     held_mm : ndarray of float, shape (unknowns,)
-        Displacements of what is not free: zero for supports that do not grow.
+        Displacements of the unknowns that are not free; zero for supports that do not expand.
 
     Returns
     -------
     displacement_mm, force_n : ndarray of float, shape (unknowns,)
-        Forces are those of the supports on the body.
+        Displacements, and forces of the supports on the body.
     """
     grown = np.zeros(body.unknowns)
     grown[body.nodes[:, 0]], grown[body.nodes[:, 1]] = strain * body.nodes_mm.T
@@ -64,14 +65,14 @@ def thermal_displacement_mm(body: DrivenBody, strain: float, held_mm: Array) -> 
 
 
 def gap_by_weight_mm(body: DrivenBody) -> float:
-    """Change of a gripper's gap when its plate stands upright, fingers up, drive fixed: under gravity (mm)."""
+    """Change of the gap by gravity when the plate stands upright with the fingers up, with the drive fixed (mm)."""
     return 2.0 * (body.measured_mm(weight_displacement_mm(body, (0.0, -1.0))) - body.measured_rest_mm)
 
 
 def midline_by_weight_mm(body: DrivenBody) -> float:
     """Shift of the midline when the plate stands on its side (mm): both halves sway in the same direction.
 
-    The drive is fixed along its axis and free across it, because the actuator guides nothing there.
+    The drive is fixed along its axis and free across it, because the actuator does not guide it sideways.
     """
     return body.measured_mm(weight_displacement_mm(body, (1.0, 0.0), swaying=True)) - body.measured_rest_mm
 
@@ -79,10 +80,10 @@ def midline_by_weight_mm(body: DrivenBody) -> float:
 def gap_and_force_by_strain(body: DrivenBody, drive_face_y_mm: float) -> tuple[float, float]:
     """Change of the gap (mm), and of the force at the fixed drive (N), for a thermal strain of one.
 
-    Clamp and actuator stay in place: the gripper expands between them. The actuator holds the drive's face. A model
-    that is driven at a point above the face moves that point by the expansion of the block in between. In a frame of
-    bars, the bars end where their axes meet, which causes an error of some millimetres times the strain: use finite
-    elements instead.
+    Clamp and actuator stay in place, and the gripper expands between them. The actuator holds the drive's face; in a
+    model that is driven at a point above the face, that point moves by the expansion of the block in between. In a
+    frame of bars, the bars end where their axes meet, which causes an error of a few millimetres times the strain: use
+    finite elements for this result.
     """
     held = np.zeros(body.unknowns)
     height = np.zeros(body.unknowns)

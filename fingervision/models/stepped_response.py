@@ -16,20 +16,22 @@ from fingervision.models.physics import Physics
 Array = NDArray[np.float64]
 
 _PENALTY = 20.0
-"""Stiffness of each face point over the finger's own: grip of 1 N then sinks a twentieth of the finger's own yielding
-in (0.02 mm for the paper's sample)."""
+"""Ratio of each face point's contact stiffness to the finger's own stiffness: under a grip of 1 N the face penetrates
+by a twentieth of the finger's own deflection (0.02 mm for the published sample)."""
 _A_PERIOD = 60
-"""Steps in the period of the lowest mode: the gap is then within 0.1 % of its travel of the exact modes'."""
+"""Time steps per period of the lowest mode: the gap is then within 0.1 % of its travel of the exact modal solution."""
 _RESOLVED_MODES = 3
-"""The third of the sample has six times the first one's frequency: ten steps a period."""
+"""Number of modes that the time step resolves. The third mode of the published sample has six times the frequency of
+the first: ten steps per period."""
 _OVERDAMPED = 1.0
-"""Damping ratio of the first mode that the step does not resolve, more above it."""
+"""Damping ratio of the first mode that the time step does not resolve; it is larger for higher modes."""
 _RADIUS = 0.5
-"""What the step cannot resolve dies in a few steps: kinks of the drive excite it, no mechanism does."""
+"""Spectral radius at infinite frequency: vibrations too fast for the step decay within a few steps; they are excited by
+kinks of the drive history, not by the mechanism."""
 
 
 def step_for(body: DrivenBody) -> float:
-    """Time step (s): a twentieth of the shortest relevant period, that of the lowest mode with the drive fixed."""
+    """Time step (s): a sixtieth of the period of the lowest mode with the drive fixed."""
     rad_s, _ = body.modes(drive_held=True, count=1)
     return float(2.0 * pi / rad_s[0] / _A_PERIOD)
 
@@ -44,18 +46,19 @@ def stepped_motion(
     body : DrivenBody
         The right half.
     drive : DriveHistory
-        Inputs over time; straight between samples.
+        Inputs over time, linear between samples.
     physics : Physics
         Large rotation, contact (by a penalty), both or neither.
     damping : Damping
-        Of the modes at rest; it acts on what moves beside the static shape, as in `modal_response`.
+        Damping of the modes at rest; it acts on the motion relative to the static shape, as in `modal_response`.
     step_s : float
-        Time step; a twentieth of the shortest period of interest.
+        Time step, as from `step_for`.
 
     Returns
     -------
     gap_mm, force_n : ndarray of float, shape (n,)
-        At the drive's samples. The drive's own inertia is not in the force: its speed jumps from piece to piece.
+        Gap and force at the drive's samples. The drive's own inertia is not in the force, because the speed of the
+        drive jumps between straight pieces of its history.
     """
     usual_s = float(np.median(np.diff(drive.time_s))) if drive.time_s.size > 1 else step_s
     # Steps that divide the samples' spacing put the kinks of the drive at their ends.

@@ -1,4 +1,4 @@
-"""The gripper by its stiffness matrix: equations (5) to (15) of Hricko & Havlik (2015) in six dimensions, corrected.
+"""Stiffness-matrix model of the gripper: equations (5) to (15) of Hricko & Havlik (2015) in six dimensions, corrected.
 
 Corrections of the published equations, each with its reason:
 
@@ -10,7 +10,7 @@ Corrections of the published equations, each with its reason:
   rotating, which the other half does: 2 (C^-1)_yy, instead of 2 / C_yy of a free shuttle.
 
 The links are elastic too, as Timoshenko bars; `rigid_links` gives the published model with elastic hinges only, which
-has 0.9 % more slope and some 10 % more force for the published gripper.
+for the published gripper has a 0.9 % larger slope and about 10 % more force.
 """
 
 from functools import cached_property
@@ -41,23 +41,24 @@ TRUST, SMALL_DISPLACEMENTS_ALONE = 1, True
 _X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z = range(6)
 _ALL = (_X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z)
 _SLOPE_ERROR, _FORCE_ERROR = 0.01, 0.03
-"""Of bars joined at points, as of `lumped`."""
+"""Relative errors of slope and force of a model of bars joined at points, as in `lumped`."""
 _OUT_OF_PLANE_ERROR, _SAG_ERROR = 0.4, 0.5
-"""Of bars joined at points, beside CalculiX (`tests/benchmarks/models_three_dimensions.py`): frequencies from 34 % too
-low for a hinge 20 times as wide as thick to 17 % too high for a stiff variant."""
+"""Relative errors out of the plane of a model of bars joined at points, by comparison with CalculiX
+(`tests/benchmarks/models_three_dimensions.py`): frequencies are from 34 % too low for a hinge 20 times as wide as thick
+to 17 % too high for a stiff variant."""
 
 
 class StiffnessMatrixGripper:
-    """Two halves in parallel, with small displacements in and out of the plane.
+    """Stiffness-matrix model of a gripper with two halves in parallel, for small displacements in and out of the plane.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     theory : HingeTheory
-        Of the hinges.
+        Theory of the hinges' compliance.
     rigid_links : bool
-        Whether only the hinges yield.
+        Whether only the hinges are elastic.
     """
 
     name = KIND
@@ -71,12 +72,12 @@ class StiffnessMatrixGripper:
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input for which the model is meant (mm)."""
+        """Smallest and largest input for which the model is valid (mm)."""
         return covered_inputs_mm(self.gripper, self.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero (mm)."""
+        """The gap at zero input (mm)."""
         return 2.0 * self.gripper.measuring_point_mm[0]
 
     @cached_property
@@ -123,7 +124,7 @@ class StiffnessMatrixGripper:
         return 1.0 / float(self._held_flexibility(corner, corner, _ALL)[_X, _X])
 
     def grip_force_n(self, input_mm: float, part: Part) -> float:
-        """Force of each finger on a part between the tips' corners (N); 0 where it is not touched."""
+        """Force of each finger on a part between the tips' corners (N); 0 if the part is not touched."""
         corner_mm = 2.0 * self.gripper.tip_corner_mm[0] + 2.0 * self._corner_per_input * input_mm
         yielding_mm_n = 1.0 / self.finger_stiffness_n_mm + 0.5 / part.stiffness_n_mm
         return max(0.0, 0.5 * (part.width_mm - corner_mm) / yielding_mm_n)
@@ -134,12 +135,12 @@ class StiffnessMatrixGripper:
         Parameters
         ----------
         drive_held : bool
-            Whether the actuator carries the drive point out of the plane.
+            Whether the actuator supports the drive point against motion out of the plane.
 
         Returns
         -------
         sag_mm, twist_rad : float
-            Both under one standard gravity.
+            Sag and rotation under one standard gravity.
         """
         held = _ALL if drive_held else tuple(direction for direction in _ALL if direction != _Z)
         sag = np.zeros(6)
@@ -157,8 +158,9 @@ class StiffnessMatrixGripper:
     def out_of_plane_modes_hz(self, *, count: int = 1) -> tuple[float, ...]:
         """First natural frequencies out of the plane, with the drive fixed (Hz).
 
-        The eigenvalues of flexibility times mass, over the members' centres, are 1 / omega^2. Bars joined at points are
-        too stiff out of the plane: 72 Hz for the published gripper, compared with 62 Hz for three-dimensional bricks.
+        The eigenvalues of the flexibility matrix times the mass matrix, both for the members' centres, are 1 / omega^2.
+        Bars joined at points are too stiff out of the plane: 72 Hz for the published gripper, compared with 62 Hz for
+        three-dimensional brick elements.
         """
         heavy = [place for place, member in enumerate(self.skeleton.members) if member.mass_t > 0.0]
         flexibility = np.block([[self._held_flexibility(i, j, _ALL)[_Z:_ABOUT_Z, _Z:_ABOUT_Z] for j in heavy]
@@ -170,7 +172,7 @@ class StiffnessMatrixGripper:
         return tuple((1.0 / (2.0 * np.pi * np.sqrt(inverse))).tolist())
 
     def respond(self, input_mm: Array) -> Response:
-        """Respond statically at each input."""
+        """Compute the static response at each input."""
         inputs = np.asarray(input_mm, dtype=float)
         right = 0.5 * (self.rest_gap_mm + self.gap_per_input * inputs)
         return Response(left_mm=-right, right_mm=right, force_n=self.input_stiffness_n_mm * inputs)
@@ -185,17 +187,17 @@ class StiffnessMatrixGripper:
 
     @cached_property
     def _corner_per_input(self) -> float:
-        """Motion of one tip's corner across the gap per 1 mm of input."""
+        """Motion of one tip's corner perpendicular to the symmetry plane per 1 mm of input."""
         flexibility = self._chain.flexibility(self.skeleton.corner, self.skeleton.drive)
         return float((flexibility @ self._load_by_input)[_X])
 
     def first_touch_mm(self) -> float | None:
-        """Input at which the tip's corner meets the symmetry plane (mm); None where the corner does not move."""
+        """Input at which the tip's corner meets the symmetry plane (mm); None if the corner does not move."""
         slope = self._corner_per_input
         return -self.gripper.tip_corner_mm[0] / slope if slope > 0.0 else None
 
     def figures(self) -> ModelFigures:
-        """Figures of the model for the comparison table."""
+        """Characteristic numbers of the model for the comparison table."""
         return ModelFigures(
             self.gap_per_input,
             self.input_stiffness_n_mm,
@@ -212,7 +214,7 @@ class StiffnessMatrixGripper:
 def _lifted_mass(member: Member, plate_mm: float) -> Array:
     """Mass of a member at its end, for motion along z and rotation about x and y.
 
-    A bar's mass, rotated and transferred.
+    The mass matrix of a bar is rotated to global axes and transferred to the member's end.
     """
     axis = np.subtract(member.end_mm, member.start_mm)
     length = float(np.hypot(*axis))
@@ -229,5 +231,5 @@ def _lifted_mass(member: Member, plate_mm: float) -> Array:
 def build(gripper: Gripper, physics: Physics, theory: HingeTheory) -> StiffnessMatrixGripper:
     """Build the model; see `fingervision.models.kinds`."""
     if physics != LINEAR:
-        raise UsageError("The stiffness matrix knows small displacements alone; take --kind lumped or finite_element.")
+        raise UsageError("The stiffness matrix handles small displacements only; take --kind lumped or finite_element.")
     return StiffnessMatrixGripper(gripper, theory)

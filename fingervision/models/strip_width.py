@@ -1,8 +1,9 @@
-"""How far its width holds back a flat strip between two bodies: a plate clamped at two sides, free at the others.
+"""Effect of its width on the bending stiffness of a flat strip: a plate clamped at two sides, free at the others.
 
-A bar that bends narrows where it is stretched and widens where it is pressed, and so bends across its length too. Its
-bodies keep it from that at both ends, as far along as it is wide. The plate's energy (Timoshenko and Woinowsky-Krieger,
-Theory of Plates and Shells, article 22) is minimised by Ritz's method for a unit turn of one end.
+A bar in bending becomes narrower on the stretched side and wider on the compressed side, and so also curves across its
+length (anticlastic bending). The bodies at its ends prevent this over a length of about its width. The plate's energy
+(Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, article 22) is minimised by Ritz's method for a unit
+rotation of one end.
 """
 
 from functools import lru_cache
@@ -15,27 +16,29 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _ALONG, _ACROSS = 9, 6
-"""Terms: half as many again change the share by less than 0.01 for widths of a tenth of the length to twenty."""
+"""Terms of Ritz's method along and across the strip: half as many again change the share by less than 0.01 for widths
+of a tenth to twenty times the length."""
 _NARROW = 0.1
-"""Width over length below which the share goes with the width: what the bodies hold back is as long as it is wide."""
+"""Ratio of width to length below which the share is proportional to the width, because the bodies restrain a length
+equal to the width."""
 _DIGITS = 3
 
 
 def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]:
-    """Share of plane strain in a strip's bending, 0 where narrow and 1 where wide: E' = E / (1 - share nu^2).
+    """Share of plane strain in a strip's bending, 0 if narrow and 1 if wide: E' = E / (1 - share nu^2).
 
     Parameters
     ----------
     width_over_length : float
-        Of the strip: plate thickness over free length.
+        Width over length of the strip: plate thickness over free length.
     poisson : float
         Poisson's ratio of the material.
 
     Returns
     -------
     (float, float)
-        Of a strip whose ends turn against each other, and of one whose ends keep their direction, as in a stage: its
-        moments are largest at its ends, where it is held.
+        Share for a strip whose ends rotate against each other, and for a strip whose ends stay parallel, as in a
+        parallel-spring stage: there the moments are largest at the ends, where the width is restrained.
     """
     if poisson <= 0.0:
         return 0.0, 0.0
@@ -46,7 +49,7 @@ def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]
 
 @lru_cache(maxsize=512)
 def _shares(log_width: float, poisson: float) -> tuple[float, float]:
-    """The same for a strip of length 1, not narrow."""
+    """Compute the two shares of `strip_share` for a strip of length 1, not narrow."""
     width = float(np.exp(log_width))
     x, x_weights = (0.5 * (part + 1.0) if i == 0 else 0.5 * part for i, part in enumerate(legendre.leggauss(24)))
     y, y_weights = legendre.leggauss(24)
@@ -77,7 +80,7 @@ def _shares(log_width: float, poisson: float) -> tuple[float, float]:
 
 
 def _shifted(degree: int) -> Array:
-    """Legendre's polynomial on 0 to 1."""
+    """Legendre polynomial shifted to the interval from 0 to 1."""
     found: Array = np.zeros(1)
     power: Array = np.ones(1)
     for coefficient in legendre.leg2poly(np.eye(degree + 1)[degree]):

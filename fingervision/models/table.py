@@ -1,4 +1,4 @@
-"""A simulation table as a model, linear between its rows."""
+"""A simulation table as a model, linearly interpolated between its rows."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,11 +16,11 @@ class TableModel:
     Parameters
     ----------
     name : str
-        How the report calls it.
+        Name of the model in the report.
     input_mm : ndarray of float, shape (n,)
-        Strictly increasing.
+        Inputs, strictly increasing.
     left_mm, right_mm : ndarray of float, shape (n,)
-        The measuring points; symmetric halves of the gap where the table knows no more.
+        Positions of the measuring points; symmetric halves of the gap if the table has the gap only.
     force_n : ndarray of float, shape (n,), or None
         Force at the drive.
     """
@@ -37,9 +37,9 @@ class TableModel:
         return float(self.input_mm[0]), float(self.input_mm[-1])
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Interpolate linearly.
+        """Interpolate the table linearly.
 
-        Beyond an end, extrapolate the straight line through the last quarter of the rows there.
+        Beyond an end of the table, a straight line fitted to the quarter of the rows at that end is extrapolated.
         """
         lowest, highest = self.input_range_mm
         inside = input_mm.min() >= lowest and input_mm.max() <= highest
@@ -63,7 +63,7 @@ class TableModel:
 
     @cached_property
     def _end_slopes(self) -> dict[str, tuple[float, float]]:
-        """Slope of each column at the lower and the upper end; computed once, as a diagnosis needs it very often."""
+        """Slope of each column at the lower and upper end of the table; cached, because a diagnosis uses it often."""
         columns = {"left": self.left_mm, "right": self.right_mm, "force": self.force_n}
         rows = max(2, -(-self.input_mm.size // 4))
 

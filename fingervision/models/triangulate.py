@@ -25,7 +25,7 @@ __all__ = ["LEAST_QUALITY", "PlaneMesh", "triangulate"]
 
 _MENDING = 12
 _REFINED = 4
-"""Rounds of dividing the outline where triangles are flat; at sharp corners they must stay so."""
+"""Rounds of dividing the outline at flat triangles; at sharp corners of the outline triangles must stay flat."""
 
 
 def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMesh:
@@ -36,14 +36,14 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
     region : PlanarRegion
         The body.
     across : float
-        Triangles across thin material.
+        Number of triangles across thin material.
     body_mm : float
         Largest edge length.
 
     Raises
     ------
     ModelError
-        Where the body is so fine beside its size that no sensible number of triangles fills it.
+        If the body's finest part is so small compared with its size that too many triangles would be needed.
     """
     field = size_field(region, across, body_mm)
     sides = divided_outline(region, field)
@@ -53,7 +53,7 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
         if inside.shape[1] + len(sides) > MOST_NODES:
             raise ModelError(
                 f"The body must be meshed by at most {MOST_NODES} nodes, but {inside.shape[1] + len(sides)} are "
-                "needed: its thinnest part is too thin beside its length."
+                "needed: its thinnest part is too thin for the size of the body."
             )
         corners, triangles = relaxed_nodes(region, field, outline_points(sides), inside)
         missing = missing_sides(sides, triangles)

@@ -1,9 +1,9 @@
-"""Uncertainty of figures from the stated uncertainties of a drawing's dimensions.
+"""Uncertainty of computed quantities from the stated uncertainties of a drawing's dimensions.
 
 Linear propagation (JCGM 100:2008, 5.1), by central differences of one standard uncertainty in either direction. The
-second differences measure the nonlinearity. If it would shift a figure's mean, or widen its uncertainty, by more than a
-tenth of the uncertainty, the figure is sampled instead (JCGM 101:2008) at Sobol points. The dimensions are assumed
-normal and independent of each other.
+second differences measure the nonlinearity. If the nonlinearity would shift the mean of a quantity, or widen its
+uncertainty, by more than a tenth of the uncertainty, the quantity is sampled instead at Sobol points (Monte Carlo
+method, JCGM 101:2008). The dimensions are assumed normal and independent of each other.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,34 +22,34 @@ Array = NDArray[np.float64]
 Evaluate = Callable[[Mapping[str, float]], Mapping[str, float | None]]
 
 _BENDS = 0.1
-"""Of the uncertainty: a shift of the mean or a widening that linear propagation misses. It states its own uncertainty
-no better than that."""
+"""Largest shift of the mean, or widening, that linear propagation may miss, as a share of the uncertainty; an
+uncertainty is itself not known better than that."""
 _NAMED = 3
 _MOST_REFUSED = 0.05
-"""Of the samples: more that are no drawing would cut the distribution off."""
+"""Largest share of samples that may be invalid drawings: more would truncate the distribution."""
 _ROUNDING = 1e-9
 _LEAST_STEP = 1e-4
-"""Of a number: smaller steps are lost in the rounding of a mesh."""
+"""Least step of a difference, as a share of the dimension: smaller steps are lost in the rounding of a mesh."""
 
 
 @dataclass(frozen=True, slots=True)
 class FigureUncertainty:
-    """One figure with its uncertainty.
+    """One computed quantity with its uncertainty.
 
     Parameters
     ----------
     value : float
-        As drawn.
+        Value for the drawing as given.
     u : float
         Standard uncertainty.
     sampled : bool
-        Whether by samples; linear otherwise.
+        Whether the uncertainty comes from samples; if False, from linear propagation.
     mean : float
-        Of the samples; the value where linear.
+        Mean of the samples; `value` for linear propagation.
     interval : (float, float)
-        Of 95 %: between the samples' quantiles, or 1.96 u either way.
+        Interval of 95 % coverage: quantiles of the samples, or `value` +- 1.96 u.
     shares : tuple of (str, float)
-        The three numbers that contribute most, and their shares of the variance to second order, falling.
+        The three dimensions that contribute most, and their shares of the variance to second order, in falling order.
     """
 
     value: float
@@ -63,28 +63,29 @@ class FigureUncertainty:
 def propagate(
     evaluate: Evaluate, numbers: Mapping[str, Estimate], *, samples: int = 128, seed: int = 1
 ) -> dict[str, FigureUncertainty]:
-    """Return every figure with its uncertainty.
+    """Return every computed quantity with its uncertainty.
 
     Parameters
     ----------
     evaluate : callable
-        Changes of some numbers, each in its own unit, to figures; None for a figure that is not known.
+        Maps changes of some dimensions, each in its own unit, to the quantities; None for an unknown quantity.
     numbers : mapping of str to Estimate
-        The uncertain numbers with their standard uncertainties.
+        The uncertain dimensions with their standard uncertainties.
     samples : int
-        How many drawings to sample where linear propagation is not enough; a power of two.
+        Number of drawings to sample if linear propagation is not sufficient; a power of two.
     seed : int
-        Of the samples.
+        Seed of the random samples.
 
     Returns
     -------
     dict of str to FigureUncertainty
-        Figures that are known for every drawing asked for and that depend on some number.
+        Quantities that are known for every drawing evaluated and that depend on some dimension.
 
     Raises
     ------
     ModelError
-        Where a number cannot be redrawn by its uncertainty, or too many samples are no drawings.
+        If the drawing is not valid with a dimension changed by its uncertainty, or too many samples are invalid
+        drawings.
     """
     used = {name: estimate.u or 0.0 for name, estimate in numbers.items() if estimate.u}
     base = evaluate({})
@@ -142,7 +143,7 @@ def _is_bent(u: float, bends: list[float], value: float) -> bool:
 def _samples(
     evaluate: Evaluate, used: Mapping[str, float], figures: list[str], count: int, seed: int
 ) -> dict[str, Array]:
-    """Figures of drawings whose dimensions are drawn at random, normal and independent."""
+    """Quantities of drawings whose dimensions are sampled from independent normal distributions."""
     points = qmc.Sobol(len(used), seed=seed).random(count)
     # A point far out in the first or last slice of a number would count for the whole of it: 18 % of a bent figure's u.
     normal = ndtri(np.clip(points, 0.5 / count, 1.0 - 0.5 / count))
@@ -163,6 +164,6 @@ def _samples(
     if refused > _MOST_REFUSED * count:
         raise ModelError(
             f"The stated uncertainties must leave a drawing that works, but {refused} of {count} drawings within them "
-            f"do not; state smaller ones. The last: {last}"
+            f"do not; state smaller uncertainties. The last failure: {last}"
         )
     return {figure: np.array(values) for figure, values in rows.items()}

@@ -1,8 +1,8 @@
-"""Width effect: how strongly the width of a plate restrains its flexures, between plane stress and plane strain.
+"""Width effect: restraint of flexures by the width of the plate, between plane stress and plane strain.
 
-A bar in bending becomes narrower on its stretched side and wider on the compressed one. A flexure that is short
+A bar in bending becomes narrower on its stretched side and wider on the compressed side. A flexure that is short
 compared with its width cannot do so, because of the thick material at its ends: it is stiffer than in plane stress, by
-up to 1 / (1 - nu^2) in plane strain. The position w between the two (0 to 1) comes from brick elements
+a factor of up to 1 / (1 - nu^2) in plane strain. The share w of plane strain (0 to 1) comes from brick elements
 (`hinge_correction`).
 """
 
@@ -19,9 +19,9 @@ from fingervision.models.notch import notches_of
 Array = NDArray[np.float64]
 
 SHARE_UNCERTAINTY = 0.05
-"""Of w, standard. Bending is within 0.42 % of bricks between elastic blocks for width over thickness 1 to 20 and t / R
-0.0125 to 0.5 (`tests/benchmarks/models_width.py`), which is 0.04 of w at nu = 0.34. Of the force it is 0.05 nu^2,
-0.6 %."""
+"""Standard uncertainty of w. The bending stiffness is within 0.42 % of brick elements between elastic blocks for width
+over thickness 1 to 20 and t / R 0.0125 to 0.5 (`tests/benchmarks/models_width.py`), which is 0.04 of w at nu = 0.34.
+The resulting uncertainty of the force is 0.05 nu^2, 0.6 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +31,13 @@ class ConstrainedZone:
     Parameters
     ----------
     centre_mm : (float, float)
-        Its middle.
+        Centre of the rectangle.
     axis_deg : float
-        Direction of the flexure's axis from x.
+        Angle of the flexure's axis from x.
     half_length_mm, half_height_mm : float
         Half extents along the axis and across it.
     share : float
-        0 plane stress, 1 plane strain.
+        Share of plane strain: 0 for plane stress, 1 for plane strain.
     """
 
     centre_mm: PointMm
@@ -68,7 +68,7 @@ def gripper_zones(gripper: Gripper) -> tuple[ConstrainedZone, ...]:
 
 
 def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
-    """Share of plane strain at points, shape (2, n); 0 outside the zones."""
+    """Share of plane strain at given points, shape (2, n); 0 outside the zones."""
     share = np.zeros(points.shape[1])
     for zone in zones:
         share = np.where(zone.holds(points), np.maximum(share, zone.share), share)
@@ -76,7 +76,7 @@ def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
 
 
 def held_moduli(material: Material, share: Array) -> tuple[Array, Array]:
-    """Young's modulus and Poisson's ratio of the plane law with a share w of plane strain.
+    """Young's modulus and Poisson's ratio of the in-plane material law for a share w of plane strain.
 
     With sigma_z = w nu (sigma_x + sigma_y), Hooke's law in the plane is that of plane stress with E' = E / (1 - w nu^2)
     and nu' = nu (1 + w nu) / (1 - w nu^2); the shear modulus is unchanged.

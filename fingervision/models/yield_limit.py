@@ -9,7 +9,8 @@ from fingervision.models.answer_figures import LoadedState, PeakStress
 from fingervision.models.physics import Physics
 
 _REFINEMENTS = 3
-"""In the deformed shape stress is nearly proportional to the input: three secant steps settle to 1e-4."""
+"""Secant steps: in the deformed shape the stress is nearly proportional to the input, so that three steps converge to
+1e-4."""
 _PLACES = 9
 
 
@@ -28,7 +29,7 @@ class StressedModel(Protocol):
 
 
 def opening_at_yield_mm(model: StressedModel, yield_mpa: float) -> float:
-    """Input on the side without contact at which the largest stress reaches the yield stress (mm)."""
+    """Input, on the side where the fingers do not touch, at which the largest stress reaches yield (mm)."""
     travel_mm = yield_mpa / model.peak_stress().mpa_per_mm
     if model.physics.large_rotation:
         for _ in range(_REFINEMENTS):
@@ -37,7 +38,7 @@ def opening_at_yield_mm(model: StressedModel, yield_mpa: float) -> float:
 
 
 def input_at_yield_mm(model: StressedModel, end_mm: float, yield_mpa: float) -> float:
-    """Input between rest and a yielding end at which the largest stress exceeds the yield stress (mm)."""
+    """Input between zero and an end of the range at which the largest stress reaches the yield stress (mm)."""
     if not model.physics.large_rotation and not (model.physics.contact and end_mm < 0.0):
         return float(np.copysign(yield_mpa / model.peak_stress().mpa_per_mm, end_mm))
     inputs = np.linspace(0.0, end_mm, _PLACES)

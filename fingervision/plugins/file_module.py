@@ -26,15 +26,17 @@ def check_file(path: Path, what: str) -> Origin:
     Raises
     ------
     PluginFileError
-        There is no such file, or it is no Python file.
+        The file does not exist, or is not a Python file.
     PluginVersionError
-        Its inline metadata ask for another version of fingervision.
+        The file's inline metadata require another version of fingervision.
     """
     origin = of_file(str(path))
     if not path.exists():
         raise PluginFileError(f"There is no file {path}: {what} must come from a Python file that exists.")
     if not path.is_file() or path.suffix.lower() != SUFFIX:
-        raise PluginFileError(f"{what.capitalize()} must come from a file NAME.py, but {path} is none: name one.")
+        raise PluginFileError(
+            f"{what.capitalize()} must come from a file NAME.py, but {path} is not one: name a Python file."
+        )
     try:
         source = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

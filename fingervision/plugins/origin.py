@@ -28,7 +28,7 @@ class Origin:
 
 
 BUILT_IN = Origin("built in", "report it")
-SESSION = Origin("this session", "mend it where it is registered")
+SESSION = Origin("this session", "correct it where it is registered")
 
 
 def of_distribution(name: str, version: str) -> Origin:
@@ -38,4 +38,4 @@ def of_distribution(name: str, version: str) -> Origin:
 
 def of_file(path: str) -> Origin:
     """Return the origin of a part from a file that the user named."""
-    return Origin(path, "mend the file, or leave it out")
+    return Origin(path, "correct the file, or leave it out")

@@ -87,9 +87,9 @@ class Registry(Generic[T]):
         Raises
         ------
         PluginError
-            It is a plug-in that cannot be used.
+            The part is a plug-in that cannot be used.
         KeyError
-            There is none of that name.
+            No part has that name.
         """
         for entry in self._added:
             if entry.name == name:
@@ -155,7 +155,7 @@ class Registry(Generic[T]):
         Raises
         ------
         PluginError
-            It is not what the group asks for.
+            The object does not meet the requirements of its entry-point group.
         """
         return watched(who, origin, lambda: self._parts_of(held))
 
@@ -170,7 +170,7 @@ class Registry(Generic[T]):
         Raises
         ------
         PluginError, PluginFileError
-            It cannot be read or imported, or holds nothing of this kind.
+            The file cannot be read or imported, or defines no part of this kind.
         """
         origin = check_file(path, f"{self.noun}s")
         found = watched(f"{path}", origin, lambda: self._parts_of(load_file(path)))

@@ -62,7 +62,7 @@ def within(seconds: float, act: Callable[[], T]) -> T:
     Raises
     ------
     OutOfTimeError
-        It took longer.
+        The call took longer than the limit.
     BaseException
         Whatever `act` raises.
     """

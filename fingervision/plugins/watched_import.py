@@ -38,7 +38,7 @@ def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
     Raises
     ------
     PluginError
-        It raised an exception, did not end, or is not what its group asks for.
+        The plug-in raised an exception, did not finish, or does not meet the requirements of its group.
     """
     seconds = longest_s()
 

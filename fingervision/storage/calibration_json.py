@@ -105,7 +105,7 @@ def read_calibration(path: Path) -> Calibration:
     Raises
     ------
     DataError, InputFileError
-        There is no such file, it is from a newer schema, or it makes no sense.
+        The file does not exist, has a newer schema, or its values are inconsistent.
     """
     try:
         content = json.loads(plain(path).read_text(encoding="utf-8-sig"), parse_constant=_no_constant)
@@ -119,7 +119,7 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} stands where a number must be")
+    raise ValueError(f"{name} is given where a number is needed")
 
 
 class _Reader:

@@ -24,7 +24,7 @@ def refuse_foreign(out: Path) -> None:
     except (OSError, ValueError):
         content = None
     if not (isinstance(content, dict) and "px_per_mm" in content):
-        raise OutputError(f"{out} stands there already and is no calibration; name another file with -o.")
+        raise OutputError(f"{out} exists already and is not a calibration; name another file with -o.")
 
 
 def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
@@ -33,7 +33,7 @@ def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
     Raises
     ------
     OutputError
-        It cannot be written.
+        The file or folder cannot be written.
     """
     import cv2
 

@@ -40,7 +40,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     wanted = [name for name in (*required, *known) if name in names]
     for name in wanted:
         if names.count(name) > 1:
-            raise DataError(f"{path} must have each column once, but {name} stands twice: remove one.")
+            raise DataError(f"{path} must have each column only once, but {name} occurs twice: remove one of them.")
     plain = _without_quotes(text, names, wanted)
     if plain is not None:
         return plain
@@ -50,7 +50,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     for number, cells in lines:
         if len(cells) != wide:
             raise DataError(
-                f"Line {number} of {path} must have {wide} cells like the header, but has {len(cells)}: mend it."
+                f"Line {number} of {path} must have {wide} cells like the header, but has {len(cells)}: correct it."
             )
         for place, add in adders:
             add(cells[place].strip())

@@ -12,7 +12,7 @@ def decimal_number(cell: str) -> float:
     Raises
     ------
     ValueError
-        It is none, or none that is written so in a table.
+        The cell is not a decimal number in a notation that tables use.
 
     Examples
     --------
@@ -24,7 +24,7 @@ def decimal_number(cell: str) -> float:
     ValueError: 1_0 is no decimal number
     """
     if not are_decimal((cell,)):
-        raise ValueError(f"{cell} is no decimal number")
+        raise ValueError(f"{cell} is not a decimal number")
     return float(cell)
 
 

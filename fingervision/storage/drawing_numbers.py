@@ -50,7 +50,8 @@ def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any],
                 )
             if isinstance(value, list | dict):
                 raise DataError(
-                    f"The uncertainty of {name} in {origin} must belong to a single number, but its value is {value!r}."
+                    f"The uncertainty of {name} in {origin} can be given for a single number only, but the "
+                    f"value is {value!r}."
                 )
             _put(bare, path, value)
             if u > 0.0:

@@ -74,7 +74,8 @@ class DrawingReader:
         fine = x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0
         if not fine:
             raise DataError(
-                f"{what} in {self.origin} must be x from, x to, y from, y to, both growing, but is "
+                f"{what} in {self.origin} must be [x from, x to, y from, y to], each range from the smaller "
+                "to the larger number, but is "
                 f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
             )
         return x0, x1, y0, y1

@@ -80,7 +80,7 @@ def drive_rows(
         at = int(back[0]) + 1
         raise DataError(
             f"time_s must increase from row to row, but in line {lines[at]} of {path} it is {times[at]:g} "
-            f"after {times[at - 1]:g}: put all runs on the recording's clock, in order."
+            f"after {times[at - 1]:g}: state the times of all runs on the recording's clock, in rising order."
         )
     seen: set[str] = set()
     for at in range(1, len(runs) if runs is not None else 0):
@@ -88,7 +88,8 @@ def drive_rows(
             seen.add(runs[at - 1])
             if runs[at] in seen:
                 raise DataError(
-                    f"The rows of a run must stand together, but run {runs[at]} comes back in line {lines[at]} of "
+                    f"The rows of one run must follow each other, but run {runs[at]} starts again in line "
+                    f"{lines[at]} of "
                     f"{path}."
                 )
     return DriveHistory(times, values["input_mm"], runs, values.get("force_n"))

@@ -26,7 +26,7 @@ class FolderLock:
     Raises
     ------
     FingervisionError
-        Another program holds it, or it cannot be written.
+        Another program uses the folder, or the folder cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -36,7 +36,7 @@ class FolderLock:
                 self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
             except OSError as error:
                 raise OutputError(
-                    f"The folder {path} cannot be written ({error.strerror}): name another with --out."
+                    f"The folder {path} cannot be written ({error.strerror}): name another folder with --out."
                 ) from error
             try:
                 if fcntl is not None:
@@ -44,7 +44,7 @@ class FolderLock:
             except OSError:
                 os.close(self._file)
                 raise OutputError(
-                    f"The folder {path} is in use by another run: wait for its end, or name another with --out."
+                    f"The folder {path} is in use by another run: wait for its end, or name another folder with --out."
                 ) from None
             if self._is_there():
                 return

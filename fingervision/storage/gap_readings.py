@@ -31,12 +31,17 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
     try:
         lines = [line for line in plain(path).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(error)(f"The table {path} could not be read: {why(error)}; give a gaps.csv.") from error
+        raise unreadable(error)(
+            f"The table {path} could not be read: {why(error)}; give a gaps.csv written by fingervision."
+        ) from error
     table = csv.DictReader(lines)
     needed = {"gap_mm"} | ({"input_mm"} if by_input else set())
     missing = needed - set(table.fieldnames or ())
     if missing:
-        raise DataError(f"The table {path} must have a column {min(missing)}, but has none: give a gaps.csv.")
+        raise DataError(
+            f"The table {path} must have a column {min(missing)}, but has none: give a gaps.csv written by "
+            "fingervision."
+        )
     for number, row in enumerate(table, start=2):
         if not row["gap_mm"] or (by_input and not row["input_mm"]):
             continue

@@ -23,7 +23,7 @@ def text_of(path: Path) -> str | None:
     Raises
     ------
     DataError, InputFileError
-        It cannot be read.
+        The file cannot be read.
     """
     try:
         return plain(path).read_text(encoding="utf-8-sig")
@@ -96,7 +96,7 @@ def write_gauges_text(path: Path, text: str) -> None:
     Raises
     ------
     OutputError
-        It cannot be written; what was there stays.
+        The file cannot be written; its earlier version is kept.
     """
     part = path.with_name(f".{path.name}.part")
     try:
@@ -107,5 +107,6 @@ def write_gauges_text(path: Path, text: str) -> None:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise OutputError(
-            f"{path} could not be written ({error.strerror}); nothing is lost here: make room there, and save again."
+            f"{path} could not be written ({error.strerror}); nothing is lost here: free disk space there, "
+            "and save again."
         ) from error

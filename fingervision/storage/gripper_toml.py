@@ -199,7 +199,7 @@ def _check(gripper: Gripper, origin: str) -> None:
     if hinge.web_mm > _STATED * widest_mm:
         raise DataError(
             f"hinge.web_mm in {origin} must be no more than the links that the notches cut, {widest_mm:g} mm, but is "
-            f"{hinge.web_mm:g}; correct the one or the other."
+            f"{hinge.web_mm:g}; correct one of the two."
         )
     if body.plate_mm > body.height_mm:
         raise DataError(
@@ -265,9 +265,9 @@ def _check_links(gripper: Gripper, origin: str) -> None:
                 f"but ends at ({x1:g}, {y1:g})."
             )
     if links.cross_bar_mm[0] == links.cross_bar_mm[2]:
-        raise DataError(f"links.cross_bar_mm in {origin} must reach across, but begins and ends at one x.")
+        raise DataError(f"links.cross_bar_mm in {origin} must span some width, but begins and ends at the same x.")
     if len(set(links.tip_polygon_mm)) < len(links.tip_polygon_mm):
-        raise DataError(f"links.tip_polygon_mm in {origin} must be different points, but one stands there twice.")
+        raise DataError(f"links.tip_polygon_mm in {origin} must be different points, but one of them occurs twice.")
     if crosses_itself(links.tip_polygon_mm):
         raise DataError(
             f"links.tip_polygon_mm in {origin} must go round the tip without crossing itself, but two of its sides "
@@ -275,7 +275,7 @@ def _check_links(gripper: Gripper, origin: str) -> None:
         )
     if not gripper.tip_corner_mm[1] > gripper.tip_heel_mm[1]:
         raise DataError(
-            f"links.tip_polygon_mm in {origin} must have an upright inner face, but its smallest x, "
+            f"links.tip_polygon_mm in {origin} must have a vertical inner face, but its smallest x, "
             f"{gripper.tip_corner_mm[0]:g} mm, is that of a single point."
         )
 

@@ -106,9 +106,9 @@ def iso230_rows(
     kinds = sorted(set(quantities.values()))
     if len(kinds) != 1:
         raise DataError(
-            f"{path} must have its readings as one of {', '.join(QUANTITIES)}, but has "
-            f"{' and '.join(kinds) or ','.join(header)}: name the column of the readings so, or one column a cycle "
-            "up_1_deviation_um, down_1_deviation_um and so on."
+            f"{path} must have a readings column named one of {', '.join(QUANTITIES)}, but has "
+            f"{' and '.join(kinds) or ','.join(header)}: rename that column, or use one column for each "
+            "cycle and direction (up_1_deviation_um, down_1_deviation_um and so on)."
         )
     sided = bool(blocks) and all(match["side"].lower() != UNSIDED for match in blocks.values())
     if not sided and "direction" not in header:
@@ -205,8 +205,8 @@ def _readings(
             cycle = seen.get(key, 0)
         elif key in seen:
             raise DataError(
-                f"A target must stand once a cycle and direction, but {target:g} mm, cycle {cell.cycle}, "
-                f"{cell.direction} stands twice in {path}: number the cycles, or name the runs in a column run."
+                f"Each target must occur once in each cycle and direction, but {target:g} mm, cycle {cell.cycle}, "
+                f"{cell.direction} occurs twice in {path}: number the cycles, or name the runs in a column run."
             )
         seen[key] = seen.get(key, 0) + 1
         position = None if value is None else factor * value + (target if relative else 0.0)

@@ -41,7 +41,9 @@ class LineFile:
             self._file = path.open("ab" if go_on else "wb", buffering=0)
             self._whole_bytes = path.stat().st_size
         except OSError as error:
-            raise OutputError(f"{path} could not be written ({error.strerror}): name another --out.") from error
+            raise OutputError(
+                f"{path} could not be written ({error.strerror}): name another folder with --out."
+            ) from error
         if not go_on:
             self._pending.append(header)
         self._write()
@@ -79,7 +81,7 @@ class LineFile:
             self._file.close()
             raise OutputError(
                 f"{self._path} could not be written any further ({error.strerror}); the rows until then are in it: "
-                "make room and measure again."
+                "free disk space and measure again."
             ) from error
         self._whole_bytes += len(block)
 

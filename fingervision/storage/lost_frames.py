@@ -31,7 +31,7 @@ class LostFrames:
     Raises
     ------
     FingervisionError
-        It cannot be written; from every method.
+        The table cannot be written; every method may raise this error.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,7 +59,7 @@ class LostFrames:
     def _failed(self, error: OSError) -> FingervisionError:
         return OutputError(
             f"{self._path} could not be written any further ({error.strerror}); what was recorded until then is valid: "
-            "make room, or name another --out."
+            "free disk space, or name another folder with --out."
         )
 
 
@@ -79,7 +79,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
     Raises
     ------
     DataError, InputFileError
-        There should be a table, and it is not there or cannot be read.
+        The run's table of lost frames is missing or cannot be read.
     """
     if len(files) != 1:
         return ()
@@ -93,8 +93,8 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
     path = files[0].parent / LOST
     if not path.exists():
         raise DataError(
-            f"{path} must say which frames of {files[0].name} were damaged when they came, but is missing: put it "
-            "back, or measure a copy of the video in another folder, where damaged frames may look whole."
+            f"{path} must list the frames of {files[0].name} that were damaged on arrival, but is missing: put the "
+            "file back, or measure a copy of the video in another folder, where damaged frames may look whole."
         )
     columns = read_columns(path, ("time_s", "status", "words"), ())
     found = []

@@ -195,7 +195,7 @@ class _Reader(DrawingReader):
         if key == "bar_mm":
             width_mm = self.positive(table, "width_mm", what)
             if hypot(values[2] - values[0], values[3] - values[1]) == 0.0:
-                raise DataError(f"{what}.bar_mm in {self.origin} must have some length, but has none.")
+                raise DataError(f"{what}.bar_mm in {self.origin} must have two different end points, but has not.")
             return bar(values[0], values[1], values[2], values[3], width_mm)
         if key == "box_mm":
             return box(*self.grown(values, f"{what}.box_mm"))
@@ -237,8 +237,8 @@ class _Reader(DrawingReader):
         self.known(table, ("name", "box_mm", "against_box_mm", "wall_mm"), what)
         if ("against_box_mm" in table) == ("wall_mm" in table):
             raise DataError(
-                f"{what} in {self.origin} must be against one of against_box_mm, a face, and wall_mm, two points of a "
-                f"rigid wall, but has {'both' if 'wall_mm' in table else 'none'}."
+                f"{what} in {self.origin} must have either against_box_mm (the other face) or wall_mm (two points of a "
+                f"rigid wall), but has {'both' if 'wall_mm' in table else 'none'}."
             )
         face = self.face({**table, "name": name}, what)
         if "wall_mm" in table:
@@ -255,7 +255,7 @@ class _Reader(DrawingReader):
         x, y = self.numbers(table, "direction", 2, "drive")
         across = table.get("across", "held")
         if hypot(x, y) == 0.0:
-            raise DataError(f"drive.direction in {self.origin} must point somewhere, but is [0, 0].")
+            raise DataError(f"drive.direction in {self.origin} must be a direction, but is [0, 0].")
         if across not in ("held", "free") or (across == "free" and x * y != 0.0):
             raise DataError(
                 f"drive.across in {self.origin} must be held, or free where drive.direction is along x or y, "

@@ -71,15 +71,16 @@ def read_model(
         return _gripper(path, kind)
     if document.get("schema", 1) != 1:
         raise DataError(
-            f"schema in {path} must be 1, but is {document['schema']!r}: a newer fingervision wrote it; use that one."
+            f"schema in {path} must be 1, but is {document['schema']!r}: the file was written by a newer "
+            "fingervision; update this one."
         )
     place = path.resolve()
     if place in inside:
-        raise DataError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
+        raise DataError(f"The base of {path} must be another model, but leads back to itself: correct `base`.")
     kind = str(document.get("kind", kind))
     named = document["base"]
     if not (isinstance(named, str) and named.strip() and "\0" not in named):
-        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: mend it.")
+        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: correct it.")
     base = read_model(path.parent / named, kind, (*inside, place), table)
     names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
     if names and isinstance(base.base, FunctionModel):
@@ -88,7 +89,7 @@ def read_model(
     origins: dict[str, str] = {}
     entries = document.get("effect", [])
     if not isinstance(entries, list):
-        raise DataError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
+        raise DataError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: correct it.")
     for entry in entries:
         try:
             parameters = dict(entry["parameters"])
@@ -104,7 +105,7 @@ def read_model(
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise DataError(
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
-                f"but is {entry}: mend it."
+                f"but is {entry}: correct it."
             ) from error
     for key, values in effects.items():
         name = split_key(key)[0]
@@ -127,7 +128,9 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -
         advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
         if origin == str(SESSION):
             advice = "register it with @fingervision.effect, or keep it in a file for --effects"
-        raise DataError(f"The effect {name} in {path} must be known here, but is not; it came from {origin}: {advice}.")
+        raise DataError(
+            f"The effect {name} in {path} must be installed here, but is not; it came from {origin}: {advice}."
+        )
     if name not in catalogue():
         near = get_close_matches(name, catalogue(), n=1)
         hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
@@ -145,12 +148,12 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -
         if not parameter.lower - slack <= estimate.value <= parameter.upper + slack:
             raise DataError(
                 f"{parameter.name} of the effect {name} in {path} must be {parameter.lower:g} to {parameter.upper:g}, "
-                f"but is {estimate.value:g}: mend it."
+                f"but is {estimate.value:g}: correct it."
             )
         if estimate.u is not None and not 0.0 <= estimate.u < float("inf"):
             raise DataError(
                 f"The u of {parameter.name} of the effect {name} in {path} must be a number from 0, but is "
-                f"{estimate.u:g}: mend it, or leave it out."
+                f"{estimate.u:g}: correct it, or leave it out."
             )
 
 
@@ -165,7 +168,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
     ):
         raise DataError(
             f"{POINTS} of the effect {name} in {path} must be two or more pairs of finite numbers with rising inputs, "
-            f"but the inputs are {inputs.tolist()}: mend them."
+            f"but the inputs are {inputs.tolist()}: correct them."
         )
 
 

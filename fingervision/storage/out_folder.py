@@ -14,7 +14,7 @@ def out_folder(path: Path) -> Iterator[None]:
     Raises
     ------
     OutputError
-        It cannot be made or written.
+        The folder cannot be created or written.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -25,7 +25,7 @@ def out_folder(path: Path) -> Iterator[None]:
         raise
     except OSError as error:
         raise OutputError(
-            f"The folder {path} cannot be written ({error.strerror}): name another with --out."
+            f"The folder {path} cannot be written ({error.strerror}): name another folder with --out."
         ) from error
 
 

@@ -22,7 +22,7 @@ def plain(path: Path) -> Path:
     Raises
     ------
     OSError
-        It is a pipe, a socket or a device.
+        The path is a pipe, a socket or a device.
     """
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise OSError(errno.ESPIPE, "it is a pipe or a device: save it as a file first", str(path))

@@ -17,7 +17,7 @@ def read_recipe(path: Path) -> Recipe[Section]:
     Raises
     ------
     DataError, InputFileError
-        There is no such file, it is no TOML, it is from a newer schema, it has no step, or a key is unknown.
+        The file does not exist, is not TOML, has a newer schema, has no step, or has an unknown key.
     """
     document, text = read_document(path, "recipe")
     top = Section(path, text, "", document)

@@ -124,7 +124,7 @@ class RecordedVideo:
         if kept < frames:
             raise DataError(
                 f"To resume the run, {self._path} must hold at least {frames} frames, but holds {kept}: start the run "
-                "anew in another folder."
+                "from the beginning in another folder."
             )
         self._first_s = 0.0
 
@@ -176,7 +176,8 @@ class RecordedVideo:
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)
         return OutputError(
-            f"{self._path} could not be written any further ({why}); what was recorded until then is in it: make room, "
+            f"{self._path} could not be written any further ({why}); what was recorded until then is in it: "
+            "free disk space, "
             "or name another --out."
         )
 

@@ -23,7 +23,7 @@ def response_named(name: str) -> CameraResponse | None:
     Raises
     ------
     UsageError
-        It is neither.
+        The name is neither a standard response nor an existing file.
     DataError
         The file is no response.
     """
@@ -68,7 +68,7 @@ def read_response(path: Path) -> CameraResponse:
 def _response(name: str, level: NDArray[np.float64], light: NDArray[np.float64], top: int) -> CameraResponse:
     span = float(light[-1] - light[0])
     if not span > 0.0:
-        raise DataError(f"The light of the camera response {name} must rise, but does not.")
+        raise DataError(f"The second column (light) of the camera response {name} must rise, but does not.")
     try:
         return CameraResponse(name, level / top, (light - light[0]) / span, top)
     except CalibrationError as error:

@@ -68,5 +68,5 @@ class RunFiles:
         """Return the error that the run could not be written."""
         return OutputError(
             f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
-            "in it: make room, or name another --out."
+            "in it: free disk space, or name another folder with --out."
         )

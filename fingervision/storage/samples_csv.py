@@ -127,10 +127,11 @@ def read_samples(path: Path) -> list[SampleRow]:
         return []
     except (OSError, ValueError, IndexError) as error:
         raise DataError(
-            f"{path} must be the table of a run on the bed to go on with it, but is not ({error}): name another --out."
+            f"{path} must be the table of a run on the test bed to go on with it, but is not ({error}): name "
+            "another folder with --out."
         ) from error
     if columns != COLUMNS:
-        raise DataError(f"{path} must be the table of a run on the bed, but its header is another.")
+        raise DataError(f"{path} must be the table of a run on the test bed, but has another header.")
     return rows
 
 

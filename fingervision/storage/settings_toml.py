@@ -36,7 +36,7 @@ def read_settings(path: Path) -> dict[str, Any]:
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, or a key is unknown or has no such value.
+        The file cannot be read, or a key is unknown or has a value that is not allowed.
     """
     values, text = read_document(path, "settings")
     top = Section(path, text, "", values)
@@ -82,7 +82,7 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     Raises
     ------
     OutputError
-        It cannot be written.
+        The file or folder cannot be written.
     """
     lines = [
         "# For `fingervision live SOURCE --settings FILE`, and `measure` alike.",
@@ -104,4 +104,4 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
         part.write_text(text, encoding="utf-8")
         part.replace(path)
     except OSError as error:
-        raise OutputError(f"{path} could not be written ({error.strerror}): make room.") from error
+        raise OutputError(f"{path} could not be written ({error.strerror}): free disk space.") from error

@@ -48,11 +48,11 @@ def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
     column = {name: each.value for name, each in columns.items()}
     inputs = column["input_mm"]
     if inputs.size < 2:
-        raise DataError(f"{path} must have at least two rows, but has {inputs.size}: simulate more inputs.")
+        raise DataError(f"{path} must have at least two rows, but has {inputs.size}: simulate the gap at more inputs.")
     order = np.argsort(inputs)
     if np.any(np.diff(inputs[order]) == 0.0):
         twice = inputs[order][np.flatnonzero(np.diff(inputs[order]) == 0.0)[0]]
-        raise DataError(f"input_mm must be unique, but {twice:g} stands twice in {path}: remove one row.")
+        raise DataError(f"input_mm must be unique, but {twice:g} occurs twice in {path}: remove one row.")
     if np.ptp(column["gap_mm"]) == 0.0:
         raise DataError(
             f"gap_mm must depend on the input, but is {column['gap_mm'][0]:g} in every row of {path}: "

@@ -44,7 +44,8 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
         )
     if not (cycles[1] > cycles[0] >= 1.0 and amplitude[0] > amplitude[1] > 0.0):
         raise DataError(
-            f"{what} must fall from few cycles to many, but goes from {amplitude[0]:g} MPa at {cycles[0]:g} cycles to "
+            f"{what} must fall as the number of cycles rises, but goes from {amplitude[0]:g} MPa at "
+            f"{cycles[0]:g} cycles to "
             f"{amplitude[1]:g} MPa at {cycles[1]:g}."
         )
     return SNLine(cycles, amplitude, float(ratio))
@@ -56,7 +57,7 @@ def check_below_yield(line: SNLine, yield_mpa: float, origin: str) -> None:
     if mean + line.amplitude_mpa[0] > yield_mpa * (1.0 + 1e-9):
         raise DataError(
             f"material.sn_line in {origin} must stay below the yield stress, {yield_mpa:g} MPa, but reaches "
-            f"{mean + line.amplitude_mpa[0]:g} MPa at {line.cycles[0]:g} cycles; begin it at more cycles."
+            f"{mean + line.amplitude_mpa[0]:g} MPa at {line.cycles[0]:g} cycles; begin the line at more cycles."
         )
 
 

@@ -50,7 +50,7 @@ def read_steps(path: Path) -> StepData:
     sections = top.tables("step")
     if not 1 <= len(sections) <= MOST_STEPS:
         raise DataError(
-            f"{path} must hold 1 to {MOST_STEPS} tables [[step]], which is what the controller keeps, "
+            f"{path} must hold 1 to {MOST_STEPS} tables [[step]], which is how many the controller stores, "
             f"but holds {len(sections)}."
         )
     steps: dict[int, Step] = {}

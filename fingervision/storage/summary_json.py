@@ -35,7 +35,8 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
     except OSError as error:
         part.unlink(missing_ok=True)
         raise OutputError(
-            f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
+            f"{path} could not be written ({error.strerror}): free disk space or name another folder with "
+            "--out, and measure again."
         ) from error
 
 
@@ -66,7 +67,7 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
     Raises
     ------
     UsageError
-        It holds those of another.
+        The folder holds the results of another recording.
     """
     of = recording_of(folder)
     if of is None or Path(of).resolve() == Path(recording).resolve():

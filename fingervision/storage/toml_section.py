@@ -31,7 +31,7 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
     Raises
     ------
     DataError, InputFileError
-        There is no such file, or it is not TOML.
+        The file does not exist, or is not TOML.
     """
     try:
         text = plain(path).read_text(encoding="utf-8-sig")

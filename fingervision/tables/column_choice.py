@@ -125,5 +125,5 @@ def _named_column(raw: RawTable, role: str, name: str, given: Entry) -> int:
         return int(name) - 1
     raise DataError(
         f"columns.{role} of {given.source} must name a column of {raw.path} "
-        f"({', '.join(column.name for column in raw.columns)}), but is {name}: mend it."
+        f"({', '.join(column.name for column in raw.columns)}), but is {name}: correct it."
     )

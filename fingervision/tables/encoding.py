@@ -44,8 +44,8 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
             return content.decode(given).removeprefix("\ufeff"), given
         except (LookupError, UnicodeDecodeError) as error:
             raise DataError(
-                f"encoding must be that of the table, but {given} does not fit ({error}): leave the key out, or name "
-                "another."
+                f"encoding must be the encoding of the table, but {given} does not fit ({error}): leave "
+                "this setting out, or name another encoding."
             ) from error
     for mark, name in MARKS:
         if content.startswith(mark):

@@ -113,7 +113,7 @@ def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
         if len(found) != 1:
             raise DataError(
                 f"columns.{role} of {given.source} must name a column ({', '.join(n.text for n in names)}), but is "
-                f"{stated}: mend it."
+                f"{stated}: correct it."
             )
         return found
     return [k for k, name in enumerate(names) if name.role == role]
@@ -220,7 +220,7 @@ def _plain(raw: RawTable, place: int) -> Numbers:
         at = int(odd[0])
         raise DataError(
             f"'{raw.columns[place].name}' of {raw.path} must hold numbers, but holds '{content[at][:40]}' in "
-            f"{raw.place(at)}: mend the cell, or leave it empty."
+            f"{raw.place(at)}: correct the cell, or leave it empty."
         )
     return values
 

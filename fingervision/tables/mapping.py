@@ -142,7 +142,7 @@ def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
     Raises
     ------
     DataError
-        One is no key, or has no value.
+        A setting has an unknown key, or no value.
     """
     document: dict[str, Any] = {}
     for setting in settings:
@@ -195,7 +195,7 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
     Raises
     ------
     OutputError
-        It cannot be read or written.
+        The file cannot be read or written.
     """
     block = in_utf8(path, entry_text(table, kind, entry))
     try:

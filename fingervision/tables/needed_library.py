@@ -22,7 +22,7 @@ def needed_library(name: str, path: Path, what: str) -> Any:
     Raises
     ------
     MissingLibraryError
-        It is not installed.
+        The library is not installed.
     """
     try:
         return importlib.import_module(name)

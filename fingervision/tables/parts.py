@@ -26,7 +26,7 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
     Raises
     ------
     DataError
-        There is none, or not the stated one.
+        The file has no part with columns of numbers, or not the stated part.
     OpenQuestionError
         Several may be meant.
     """

@@ -39,9 +39,9 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, or not be worked with.
+        The table cannot be read, or its content cannot be used.
     OpenQuestionError
-        It can be read in more than one way.
+        The table can be interpreted in more than one way.
     """
     given = entry_for(path, "measured", columns)
     if is_own(path, "measured", given):
@@ -72,9 +72,9 @@ def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, or not be worked with.
+        The table cannot be read, or its content cannot be used.
     OpenQuestionError
-        It can be read in more than one way.
+        The table can be interpreted in more than one way.
     """
     given = entry_for(path, "drive", columns)
     if is_own(path, "drive", given):
@@ -129,9 +129,9 @@ def read_simulation_table(path: Path, columns: Path | None = None) -> TableModel
     Raises
     ------
     DataError, InputFileError
-        It cannot be read, or not be worked with.
+        The table cannot be read, or its content cannot be used.
     OpenQuestionError
-        It can be read in more than one way.
+        The table can be interpreted in more than one way.
     """
     given = entry_for(path, "simulation", columns)
     if is_own(path, "simulation", given):

@@ -79,7 +79,7 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
         if names is None:
             raise DataError(
                 f"header_line must name the line with {dialect.wide} names of columns, but line {at + 1} is "
-                f"'{lines[at][:80] if at < len(lines) else 'not there'}': mend it."
+                f"'{lines[at][:80] if at < len(lines) else 'not there'}': correct it."
             )
         units = names_in(lines[at + 1], dialect) if at + 1 < first else None
         return Header(names, units if units is not None and _all_units(units) else (), at)

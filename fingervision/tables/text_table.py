@@ -45,7 +45,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     Raises
     ------
     DataError
-        There is no table, or too many rows are none.
+        The lines contain no table, or too many lines do not fit its columns.
     OpenQuestionError
         A mark may be a decimal comma or set thousands apart.
     """
@@ -176,7 +176,7 @@ class _Rows:
         if len(odd) > max(1.0, MOST_ODD * len(rows)):
             raise DataError(
                 f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
-                f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): mend them, or state the "
+                f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
                 "key separator in columns.toml."
             )
         left_out = []

@@ -149,7 +149,7 @@ def read_configuration(name: str) -> Section:
     Raises
     ------
     DataError, InputFileError, UsageError
-        There is no such file, or it is no bed's.
+        The file does not exist, or does not describe a test bed.
     """
     if name == SIMULATED:
         with resources.as_file(resources.files("fingervision.testbed").joinpath("simulated.toml")) as path:

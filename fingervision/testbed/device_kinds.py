@@ -61,7 +61,7 @@ class PluggedKind:
         Raises
         ------
         PluginShapeError
-            It could not be built, or lacks what its protocol asks for.
+            The device could not be built, or lacks a member of its protocol.
         """
         name = "" if str(self._entry.origin) == self._entry.name else f"{self._entry.name} of "
         who = f"The {NOUNS[self._part]} {name}{self._entry.origin}"
@@ -84,7 +84,7 @@ def kind_of(part: str, section: Section) -> Kind:
     Raises
     ------
     FingervisionError
-        There is no such kind, or it cannot be imported, or a key is unknown.
+        The kind of device is unknown, its module cannot be imported, or the section has an unknown key.
     """
     registry = REGISTRIES[part]
     name = section.word("kind")

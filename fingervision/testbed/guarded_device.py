@@ -32,7 +32,7 @@ def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) 
     Raises
     ------
     PluginShapeError
-        It could not be built, or is not what the protocol asks for; it is closed then.
+        The device could not be built, or does not meet its protocol; it is closed in that case.
     """
     try:
         device = build()

@@ -51,7 +51,7 @@ class Terminal:
             except Empty:
                 if self._ended():
                     self._asked = False
-                    raise StateError("The question was not answered, because the run was stopped.") from None
+                    raise StateError("The operator gave no answer before the run was stopped.") from None
 
     def say(self, words: str) -> None:
         """Write on the screen."""

@@ -185,7 +185,7 @@ class ActuatorContract(_BedContract):
 
     def _needs_motor(self) -> None:
         if not self.has_motor:
-            raise NotApplicable("a hand has its own speed, and stands when it has answered")
+            raise NotApplicable("a stage turned by hand has no set speed, and is at rest once its reading is typed")
 
 
 class ForceSensorContract(_BedContract):

@@ -130,7 +130,7 @@ class EffectContract:
     def test_memory_starts_each_run_at_rest(self) -> None:
         """An effect with memory has none at the first sample of a run."""
         if not self.effect.memory:
-            raise NotApplicable(f"{self.effect.name} has no memory")
+            raise NotApplicable(f"{self.effect.name} does not depend on earlier inputs")
         bare = self._chain().respond({})
         moved = self._chain().respond({self.effect.name: usual_values(self.effect, bench())})
         for number, run in enumerate(bench().runs, start=1):
@@ -175,7 +175,7 @@ class EffectContract:
     def test_without_times_it_works_unless_it_says_that_it_needs_them(self) -> None:
         """An effect that reads times declares `needs_times`."""
         if self.effect.needs_times or self.effect.needs_shared_clock:
-            raise NotApplicable(f"{self.effect.name} says that it needs times")
+            raise NotApplicable(f"{self.effect.name} states that it needs times")
         chain = MeasuringChain(MODEL, replace(bench(), time_s=None), {}, MIDLINE_MM)
         if isinstance(self.effect.search(chain.history), str):
             raise NotApplicable(f"{self.effect.name} is excluded without times")
@@ -187,7 +187,7 @@ class EffectContract:
     def test_along_curves_a_sine_is_late_as_a_whole(self) -> None:
         """A delay that interpolates along curves delays a sine more exactly than one along straight lines."""
         if not (isinstance(self.effect, DriveEffect | PointEffect) and self.effect.act_curved is not None):
-            raise NotApplicable(f"{self.effect.name} makes no difference between curves and lines")
+            raise NotApplicable(f"{self.effect.name} has the same result for curved and straight models")
         time_s = np.arange(0.0, 20.0, 0.2)
         wave = History(np.sin(time_s), time_s, (slice(0, time_s.size),), rest_gap_mm=REST_GAP_MM, opening_mm=GAIN)
         late_mm = REST_GAP_MM + GAIN * np.sin(time_s - 0.07)
@@ -231,7 +231,7 @@ class _ChainOf:
 def _searched(effect: Effect, history: History) -> tuple:  # type: ignore[type-arg]  # of Parameter
     searched = effect.search(history)
     if isinstance(searched, str):
-        raise NotApplicable(f"{effect.name} is excluded on the bench of these tests: {searched}")
+        raise NotApplicable(f"{effect.name} cannot be tested on the input of these tests: {searched}")
     return searched
 
 

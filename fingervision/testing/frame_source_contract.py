@@ -75,7 +75,7 @@ class FrameSourceContract:
         """A recording that is opened again gives the same frames."""
         source = self.source()
         if not source.description.files:
-            raise NotApplicable("a live source is not the same twice")
+            raise NotApplicable("a live source gives other frames each time")
         first, again = self._frames(source), self._frames(self.source())
         alike = len(first) == len(again) and all(
             type(a) is type(b)

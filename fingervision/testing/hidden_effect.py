@@ -69,7 +69,7 @@ def hidden_values(effect: Effect, history: History) -> dict[str, float]:
     """
     searched = effect.search(history)
     if isinstance(searched, str):
-        raise NotApplicable(f"{effect.name} cannot be looked for on the motion of this test: {searched}")
+        raise NotApplicable(f"{effect.name} cannot be detected with the motion of this test: {searched}")
     return {each.name: _hidden(each) for each in searched if each.run is None}
 
 

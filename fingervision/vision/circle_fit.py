@@ -129,7 +129,7 @@ def fit_circle(
         if np.max(np.abs(step[:3])) < SETTLED_PX and abs(step[3]) < 0.05:
             break
     else:
-        raise NoCircleFitError("the fit does not settle")
+        raise NoCircleFitError("the fit does not converge")
     return _result(p, contrast, (design, found, inverse, scaled, scale), (xx, yy, seen), shared_pixels)
 
 

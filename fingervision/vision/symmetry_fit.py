@@ -90,7 +90,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
         across, down = (-y, x) if turned else (x, y)
         px, py = (across + np.float32(at_x)).reshape(1, -1), (down + np.float32(at_y)).reshape(1, -1)
         if px.min() < 2 or py.min() < 2 or px.max() >= width - 3 or py.max() >= height - 3:
-            raise NoSymmetryError("the mark leaves the part")
+            raise NoSymmetryError("the marker is partly outside its search region")
         return sampled(flat, begin, width, px, py).reshape(size + 2 * RIM, size + 2 * RIM)
 
     for _iteration in range(ITERATIONS):
@@ -110,7 +110,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
         if length < SETTLED_PX:
             break
     else:
-        raise NoSymmetryError("the search does not settle")
+        raise NoSymmetryError("the search does not converge")
     return _judged(window(), window(turned=True), (at_x, at_y), (normal, difference), half_px, shared_pixels)
 
 

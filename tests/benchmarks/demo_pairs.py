@@ -8,7 +8,7 @@ pictures' measurement has there; pictures themselves are left out, they cost ten
 """
 
 import argparse
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from itertools import pairwise
 
@@ -101,13 +101,15 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=300)
     parser.add_argument("--seed", type=int, default=41)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--first", type=int, default=0, help="number of the first draw")
     arguments = parser.parse_args()
-    seeds = [1000 * arguments.seed + k for k in range(arguments.draws)]
+    seeds = [1000 * arguments.seed + k for k in range(arguments.first, arguments.first + arguments.draws)]
+    results = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
-        results = list(pool.map(one, seeds))
-    for _, _, stands, line in results:
-        if stands:
-            print("STANDS", line)
+        for future in as_completed([pool.submit(one, seed) for seed in seeds]):
+            results.append(future.result())
+            _, inside, stands, line = results[-1]
+            print("STANDS" if stands else "      ", "in " if inside else "out", line, flush=True)
     verdicts = [verdict for verdict, _, _, _ in results]
     print({verdict: verdicts.count(verdict) for verdict in sorted(set(verdicts))})
     print(

@@ -96,8 +96,13 @@ def shifted(number: int, x_mm: float, y_mm: float) -> Mechanism:
     return replace(mechanism, flexures=tuple(flexures))
 
 
-def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
-    """Cut a neck and tie its faces: load by input, stiffness against a slip, and every channel by a slip."""
+@cache
+def slipping_fields(number: int) -> tuple[PlaneStressPlate, Array, Array]:
+    """Cut a neck and tie its faces.
+
+    Returned are the plate, its displacements by 1 mm of input and by slips of 1 mm along x and y, shape (unknowns, 3),
+    and the pull of the ties by the same three, shape (2, 3).
+    """
     mechanism = drawn()
     flexure = mechanism.flexures[number]
     h, w = flexure.thickness_mm, 0.5 * NECK_MM
@@ -110,17 +115,15 @@ def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
     )
     x, y = plate.nodes_mm
     near = 1e-6 * region.size_mm
-    held, drive = [], []
+    held = []
     for face in mechanism.fixed:
         x0, x1, y0, y1 = face.box_mm
         on = (x > x0 - near) & (x < x1 + near) & (np.abs(y - y0) < near)
         held += [plate.x_dofs[on], plate.y_dofs[on]]
         del y1
-    x0, x1, y0, _ = mechanism.drive.face.box_mm
-    on = (x > x0 - near) & (x < x1 + near) & (np.abs(y - y0) < near)
+    on = driven_nodes(plate)
     held.append(plate.x_dofs[on])
-    drive.append(plate.y_dofs[on])
-    fixed, driven = np.concatenate(held), np.concatenate(drive)
+    fixed, driven = np.concatenate(held), plate.y_dofs[on]
     along = (x - flexure.at_mm[0]) * np.cos(np.radians(flexure.axis_deg)) + (y - flexure.at_mm[1]) * np.sin(
         np.radians(flexure.axis_deg)
     )
@@ -155,9 +158,18 @@ def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
     moved = np.zeros((size, 3))
     moved[free] = solved[: free.size]
     moved[:, 0] += unit
-    forces = -solved[free.size : free.size + 2]
-    points = {body.name: body.centroid_mm for body in bodies_of(drawn())}
-    bodies = [replace(body, centroid_mm=points[body.name]) for body in bodies_of(drawn())]
+    return plate, moved, -solved[free.size : free.size + 2]
+
+
+def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
+    """Load on a cut neck by input, stiffness against a slip, and every channel by input and by a slip."""
+    plate, moved, forces = slipping_fields(number)
+    x, y = plate.nodes_mm
+    mechanism, driven = drawn(), driven_nodes(plate)
+    unit = np.zeros(plate.unknowns)
+    unit[plate.y_dofs[driven]] = 1.0
+    K = plate.stiffness_n_mm.tocsr()
+    bodies = bodies_of(drawn())
     tips = {}
     for probe in ("left tip", "right tip"):
         at = mechanism.probes[probe]
@@ -170,6 +182,14 @@ def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
         for name, value in _channels(plate, bodies, own, float(unit @ (K @ own)), probes).items():
             columns.setdefault(name, []).append(value)
     return -forces[:, 0], forces[:, 1:], {name: np.array(values) for name, values in columns.items()}
+
+
+def driven_nodes(plate: PlaneStressPlate) -> NDArray[np.bool_]:
+    """Nodes of the drive's face."""
+    mechanism, (x, y) = drawn(), plate.nodes_mm
+    near = 1e-6 * mechanism.region.size_mm
+    x0, x1, y0, _ = mechanism.drive.face.box_mm
+    return np.asarray((x > x0 - near) & (x < x1 + near) & (np.abs(y - y0) < near))
 
 
 def _mean(face: NDArray[np.bool_], dofs: NDArray[np.int64], weight: Array, size: int) -> Array:

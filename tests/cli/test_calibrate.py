@@ -134,16 +134,16 @@ def test_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: t
 def test_pictures_that_cannot_be_used(tmp_path: Path) -> None:
     text = tmp_path / "text.png"
     text.write_text("no picture")
-    assert "text.png is damaged or no image" in sentence_of(run("bar", f"{text}=5", "-o", tmp_path / "c.json"))
+    assert "text.png is damaged, or is not an image" in sentence_of(run("bar", f"{text}=5", "-o", tmp_path / "c.json"))
     small = save(tmp_path / "small.png", np.zeros((100, 100), np.uint8))
     words = sentence_of(run("bar", BARS[0], f"{small}=5", "-o", tmp_path / "c.json"))
-    assert "must be of one size, but small.png is 100x100 and bar_02mm.png is 640x480" in words
+    assert "must have the same size, but small.png is 100x100 and bar_02mm.png is 640x480" in words
 
 
 def test_only_a_calibration_is_overwritten(tmp_path: Path) -> None:
     out = tmp_path / "c.json"
     out.write_text("my notes")
-    assert "stands there already and is no calibration" in sentence_of(run("bar", BARS[0], "-o", out))
+    assert "exists already and is not a calibration" in sentence_of(run("bar", BARS[0], "-o", out))
     out.unlink()
     for _ in range(2):
         assert run("bar", BARS[0], "-o", out, "--no-picture").exit_code == 0

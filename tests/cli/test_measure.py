@@ -334,7 +334,7 @@ def test_a_full_disk_is_said_and_leaves_whole_rows(tmp_path: Path) -> None:
         )
         assert done.returncode == 1
         assert "No space left on device" in done.stderr
-        assert "make room" in done.stderr
+        assert "free disk space" in done.stderr
         assert "Traceback" not in done.stderr
         table = rows(disk / "out" / "gaps.csv")
         assert len(table) > 10

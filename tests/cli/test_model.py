@@ -82,7 +82,7 @@ def test_the_lumped_model_warns_with_its_nominal_stress(tmp_path: Path) -> None:
 
 
 def test_the_stiffness_matrix_knows_small_displacements_alone(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="knows small displacements alone"):
+    with pytest.raises(UsageError, match="handles small displacements only"):
         run(GRIPPER, "--kind", "stiffness_matrix", "--large-rotation", "--out", tmp_path)
 
 
@@ -157,7 +157,7 @@ def test_one_kinds_failure_leaves_the_others_their_results(tmp_path: Path, monke
     monkeypatch.setattr(finite_element, "mesh_of", refuse)
     given = drive(tmp_path / "drive.csv", [0.0, 1.0])
     output = run(GRIPPER, "--drive", given, "--out", tmp_path / "o")
-    assert "finite_element has no answer: The outline could not be meshed." in output
+    assert "finite_element could not be computed: The outline could not be meshed." in output
     assert (tmp_path / "o" / "lumped" / "simulation.csv").exists()
     assert not (tmp_path / "o" / "finite_element").exists()
     assert "lumped" in (tmp_path / "o" / "models.csv").read_text()
@@ -230,7 +230,7 @@ def test_a_part_is_gripped(tmp_path: Path) -> None:
         (("--object-mm", "nan"), "--object-mm must be the positive width"),
         (("--object-mm", "3000"), "is it in micrometres"),
         (("--object-mm", "3", "--object-n-mm", "0"), "--object-n-mm must be a positive stiffness"),
-        (("--object-n-mm", "5"), "--object-n-mm needs --object-mm"),
+        (("--object-n-mm", "5"), "--object-n-mm, the stiffness of the part, needs its width too: add --object-mm"),
     ],
 )
 def test_what_cannot_be_gripped_is_refused(tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:

@@ -196,7 +196,7 @@ def test_a_mechanism_is_varied(tmp_path: Path) -> None:
     ("text", "sentence"),
     [
         ("lengths.x=1:2:3", "has no number lengths.x"),
-        ("lengths.t=-1:2:3", "The variant lengths.t = -1 has no answer"),
+        ("lengths.t=-1:2:3", "The variant lengths.t = -1 could not be computed"),
         ("lengths.t=0.5:1:900", "must give at most 400 mechanisms, but gives 900"),
     ],
 )

@@ -70,7 +70,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tables: tuple[Path, Path]) -> N
         inside = tables[0] / "out"
         done = CliRunner().invoke(cli, [command, str(tables[0]), "--model", str(tables[1]), "--out", str(inside)])
         assert str(done.exception) == (
-            f"The folder {inside} cannot be written (Not a directory): name another with --out."
+            f"The folder {inside} cannot be written (Not a directory): name another folder with --out."
         )
 
 

@@ -170,6 +170,6 @@ def test_where_there_are_no_images_the_sentence_says_so(tmp_path: Path) -> None:
         open_source(str(tmp_path / "*.png"))
     (tmp_path / "0.png").write_text("no image")
     with pytest.raises(
-        FingervisionError, match=r"None of the 1 images of .* can be read: 0\.png is damaged or no image"
+        FingervisionError, match=r"None of the 1 images of .* can be read: 0\.png is damaged, or is not an image"
     ):
         open_source(str(tmp_path))

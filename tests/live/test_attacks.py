@@ -228,8 +228,8 @@ def test_who_only_looks_changes_nothing_and_may_stop_a_motor(page: Page, session
         for name in ("record", "zero", "scale", "region", "calibrate", "bed_move", "take_over", "snapshot", "measure"):
             assert "only looks" in reply(viewer, {"do": name, "px_per_mm": 3.0})["refused"]
         assert session.choices.scale == BareScale(34.0)
-        # There is no bed here; that is another refusal.
-        assert "no bed" in reply(viewer, {"do": "bed_stop"})["refused"]
+        # The live view has no test bed; that is another refusal.
+        assert "no test bed" in reply(viewer, {"do": "bed_stop"})["refused"]
 
 
 def test_one_page_writes_until_another_takes_over(page: Page, session: Session) -> None:

@@ -55,15 +55,15 @@ def refused(*arguments: str | Path) -> FingervisionError:
             ("simulated", "--host", "nowhere.invalid", "--password-file", "password"),
             "--host must be an address of this machine",
         ),
-        (("simulated", "--host", "0.0.0.0"), "--host 0.0.0.0 lets other machines in, which needs a password"),
+        (("simulated", "--host", "0.0.0.0"), "--host 0.0.0.0 lets other machines connect, which needs a password"),
         (("simulated", "--password-file", "short"), "The password in short must have at least 12 letters, but has 3."),
         (("simulated", "--password-file", "missing"), "The password cannot be read from missing"),
         (("simulated", "--tls-cert", "password"), "TLS needs both --tls-cert and --tls-key"),
         (("simulated", "--tls-cert", "missing", "--tls-key", "missing"), "There is no file missing"),
-        (("simulated", "--hide", "backlash"), "--hide and --allow-motion are for a bed"),
-        (("simulated", "--allow-motion"), "--hide and --allow-motion are for a bed"),
-        (("0", "--bed", "simulated"), "With --bed the bed's own camera is the source, but 0 is named too"),
-        (("--bed", "simulated", "--no-page"), "--bed needs the page"),
+        (("simulated", "--hide", "backlash"), "--hide and --allow-motion are for a test bed"),
+        (("simulated", "--allow-motion"), "--hide and --allow-motion are for a test bed"),
+        (("0", "--bed", "simulated"), "With --bed the test bed's own camera is the source, but 0 is named too"),
+        (("--bed", "simulated", "--no-page"), "--bed cannot be combined with --no-page"),
         (("--bed", "missing.toml"), "missing.toml"),
         (("simulated", "--drive-offset-s", "1"), "--drive-offset-s needs a --drive."),
         (("simulated", "--drive", "missing.csv"), "missing.csv"),
@@ -88,7 +88,7 @@ def test_a_camera_that_is_not_there_is_named_with_those_that_are() -> None:
 def test_a_source_without_a_scale_needs_the_page(tmp_path: Path) -> None:
     error = refused("7", "--no-page")
     assert error.exit_code == ExitCode.WRONG_USAGE
-    assert "Without a page the scale must be given" in str(error)
+    assert "Without the browser page the scale must be given" in str(error)
 
 
 def test_a_port_in_use_is_said(tmp_path: Path) -> None:

@@ -200,7 +200,7 @@ def test_a_scale_is_asked_for_and_found_on_a_reference(
     page = opened(view.address)
     page.locator("#alarm", has_text="The scale is not known").wait_for()
     page.locator("body").press("r")
-    says(page, "The scale is not known: give it before recording")
+    says(page, "The scale is not known: give the scale before recording")
     shown(page, "Number(document.querySelector('#picture').dataset.shown) > 2")
     page.click("#drag_reference")
     drag(page, (200, 100, 240, 280))

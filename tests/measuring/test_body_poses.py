@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from fingervision.domain.body_poses import COVERED, DAMAGED, OK
+from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
@@ -134,3 +134,19 @@ def test_points_of_another_scale_or_at_one_place_are_refused() -> None:
     same = GivenPoint(10.0, 10.0, 1.0, 1.0)
     with pytest.raises(UsageError, match="same"):
         by_points((same, same), SCALE)
+
+
+@pytest.mark.slow
+def test_a_body_that_looks_alike_is_never_taken_for_one_that_is_hidden(plate: MechanismPlate) -> None:
+    """The shuttle is painted over by the ground, and a copy of it lies 7 mm beside it."""
+    light = Scene().light.ground
+    box = np.array([[14.0, 22.0, 22.0, 14.0], [10.0, 10.0, 31.0, 31.0]])
+
+    def painted(by_mm: float, level: float) -> Patch:
+        return Patch((polygon(tuple(map(tuple, PLACE.to_px(box + np.array([[by_mm], [0.0]])).T.tolist()))),), level)
+
+    frames = [frame(plate, 0.0, 0), frame(plate, 0.2, 1, cover=(painted(0.0, light), painted(7.5, 50.0)))]
+    seen = list(BodyTracker(plate.mechanism, BareScale(SCALE)).poses(frames))
+    assert seen[0].poses["shuttle"].status == OK
+    assert seen[1].poses["shuttle"].status in {COVERED, NOT_FOUND}
+    assert seen[1].poses["finger"].status == OK

@@ -124,7 +124,7 @@ def test_a_python_function_is_driven_in_time(tmp_path):
         ("raise SystemExit(3)", "could not be loaded: SystemExit"),
         ("simulate = 3", r"must have a function simulate\(time_s, input_mm\)"),
         ("def simulate(t, u):\n    return 1 / 0", "failed in simulate: ZeroDivisionError"),
-        ("def simulate(t, u):\n    return u[:3]", "one a time, but gives shape"),
+        ("def simulate(t, u):\n    return u[:3]", "one for each time, but gives shape"),
         ("def simulate(t, u):\n    return u * float('nan')", "gives a NaN or infinity at 0 s"),
         (
             "def simulate(t, u):\n    return {'opening': u}",

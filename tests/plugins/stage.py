@@ -44,7 +44,9 @@ class Stage:
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         check_move(self.limits, to_mm, speed_mm_s)
         if self.busy:
-            raise FingervisionError("The stage must stand before it moves again, but is busy: stop it first.")
+            raise FingervisionError(
+                "The stage must be at rest before a new motion, but is still moving: stop it first."
+            )
         now_s = self._clock.now_s()
         self._from_mm, self._to_mm, self._speed_mm_s, self._began_s = self._at_mm(now_s), to_mm, speed_mm_s, now_s
 

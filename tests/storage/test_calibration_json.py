@@ -110,7 +110,7 @@ def test_nonsense_is_refused(tmp_path: Path, edit: dict[str, Any], sentence: str
     ("text", "sentence"),
     [
         ("{", "is not a calibration file: it is not JSON"),
-        ('{"schema": 1, "px_per_mm": NaN}', "NaN stands where a number must be"),
+        ('{"schema": 1, "px_per_mm": NaN}', "NaN is given where a number is needed"),
         ("[1, 2]", "it has no schema"),
         ("{}", "it has no schema"),
         ("\x00\xff", "it is not JSON"),

@@ -45,7 +45,7 @@ def test_runs_and_force_may_be_missing(tmp_path: Path) -> None:
         ("time_s,input_mm\n0,nan\n", "input_mm in line 2 of .* must be a number, but is 'nan'"),
         ("time_s,input_mm\n0,\n", "input_mm in line 2 of .* must be a number, but is ''"),
         ("time_s,input_mm\n0,1\n0,2\n", "time_s must increase from row to row, but in line 3 of .* it is 0 after 0"),
-        ("time_s,input_mm,run\n0,1,a\n1,1,b\n2,1,a\n", "but run a comes back in line 4"),
+        ("time_s,input_mm,run\n0,1,a\n1,1,b\n2,1,a\n", "but run a starts again in line 4"),
     ],
 )
 def test_a_bad_table_is_refused_in_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:

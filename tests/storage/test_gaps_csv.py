@@ -62,7 +62,9 @@ def test_a_full_disk_leaves_whole_rows_and_a_sentence(tmp_path: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (4000, limits[1]))
     try:
         table.add(rows)
-        with pytest.raises(FingervisionError, match=r"could not be written any further .* make room and measure again"):
+        with pytest.raises(
+            FingervisionError, match=r"could not be written any further .* free disk space and measure again"
+        ):
             table.close()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
@@ -76,5 +78,5 @@ def test_a_full_disk_leaves_whole_rows_and_a_sentence(tmp_path: Path) -> None:
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match=r"could not be written .* name another --out"):
+    with pytest.raises(FingervisionError, match=r"could not be written .* name another folder with --out"):
         GapsCsv(tmp_path / "nowhere" / "gaps.csv")

@@ -137,7 +137,9 @@ def test_a_camera_that_sees_no_fingers_lets_nothing_move(tmp_path: Path) -> None
     config = tmp_path / "blind.toml"
     config.write_text(BED.format(camera="off_centre_mm = 30.0", gap_mm=0.0))
     bed = open_bed(str(config))
-    with pytest.raises(FingervisionError, match="The camera must see both fingers before anything moves, but does not"):
+    with pytest.raises(
+        FingervisionError, match="The camera must show both fingers before anything moves, but does not"
+    ):
         run_recipe(read_recipe(recipe_at(tmp_path, steps(MOVE))), bed, tmp_path / "run")
     assert bed.actuator.readings()[-1].value == 0.0
     # Nothing was recorded: with the view mended, the same folder will do.
@@ -233,7 +235,7 @@ def test_two_programs_on_one_folder(tmp_path: Path) -> None:
 def test_a_full_disk_is_seen_before_anything_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda path: type("Usage", (), {"free": 1000})())
     with pytest.raises(
-        FingervisionError, match=r"needs up to \d+ MB, but .* has 0 MB free: make room.*Nothing was moved"
+        FingervisionError, match=r"needs up to \d+ MB, but .* has 0 MB free: free disk space.*Nothing was moved"
     ):
         run(tmp_path, steps(MOVE))
 
@@ -263,7 +265,7 @@ def test_a_disk_that_fills_up_ends_the_run_in_a_sentence(tmp_path: Path) -> None
         ("schema = \n", "{path} must be TOML, but is not"),
         (
             'schema = 1\n[actuator]\nkind = "simulated"\n[camera]\nkind = "simulated"\n',
-            "A simulated camera (line 5 of {path}) must have a simulated gripper, but the bed has none",
+            "A simulated camera (line 5 of {path}) must have a simulated gripper, but the test bed has none",
         ),
     ],
 )
@@ -278,5 +280,5 @@ def test_a_bed_that_makes_no_sense_is_said(tmp_path: Path, text: str, sentence: 
 def test_a_bed_without_a_camera_or_a_scale_is_said(tmp_path: Path) -> None:
     config = tmp_path / "bed.toml"
     config.write_text('schema = 1\n[actuator]\nkind = "simulated"\n')
-    with pytest.raises(FingervisionError, match=r"A run must be filmed, but the bed has no camera: add a \[camera\]"):
+    with pytest.raises(FingervisionError, match=r"A run needs a camera, but the test bed has none: add a \[camera\]"):
         run(tmp_path, steps(MOVE), bed_name=str(config))

@@ -86,5 +86,5 @@ def test_ctrl_c_ends_a_run_in_a_sentence(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
-    assert "The run was stopped; the motor stands. The same command goes on with it." in errors
+    assert "The run was stopped, and the motor is at rest. The same command continues the run." in errors
     assert "Traceback" not in errors

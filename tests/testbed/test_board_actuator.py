@@ -217,8 +217,8 @@ def test_a_controller_that_does_not_answer_is_said(bed: Bed, emulated: EmulatedB
     alarm = bed.actuator.alarm
     assert alarm is not None
     assert alarm.words == (
-        "A motion was broken off, because the motor controller has not become busy within 0.5 s: look at the wiring, "
-        "and home."
+        "A motion was interrupted, because the motor controller has not become busy within 0.5 s: check the wiring, "
+        "and home the stage."
     )
     assert emulated.wait_for(lambda edge: edge.level(6) == 0, since=len(emulated.edges) - 1)
 
@@ -270,7 +270,7 @@ def test_ctrl_c_stops_the_motor_before_anything_else(
 
     emulated.on_edge.append(press)
     done = CliRunner().invoke(cli, ["bed", "move", "9", "--speed-mm-s", "50", "--bed", str(bed_toml)])
-    assert str(done.exception).startswith("Stopped: the motor stands near ")
+    assert str(done.exception).startswith("Stopped: the motor has stopped near ")
     down = emulated.wait_for(lambda edge: edge.cycle > began[0] and edge.level(6) == 0)
     # The step takes 0.4 s; a word to the board some milliseconds.
     assert (down.cycle - began[0]) / HERTZ < 0.2
@@ -289,7 +289,7 @@ def test_steps_are_run_in_their_sequence_if_the_controller_keeps_these(
     assert done.output.splitlines()[-1] == "step 1: 5.500 to 0.000 mm, stands at 0.000 mm"
     (tmp_path / "sequence.toml").write_text(sequence.replace("target_mm = 5.0", "target_mm = 5.5"), encoding="utf-8")
     done = CliRunner().invoke(cli, words)
-    assert str(done.exception).startswith("Step 2 must be the one that the motor controller keeps, but ")
+    assert str(done.exception).startswith("Step 2 must be the same as in the motor controller, but ")
 
 
 def test_one_board_serves_both_parts_and_both_let_go(bed: Bed) -> None:

@@ -123,7 +123,9 @@ def test_a_stopped_simulation_goes_on_to_the_same_end(tmp_path: Path, whole: byt
 
 def test_a_stop_ends_a_pause(tmp_path: Path) -> None:
     for replays in (True, False):
-        with pytest.raises(StoppedError, match=r"^The run was stopped; the motor stands\. The same command goes on"):
+        with pytest.raises(
+            StoppedError, match=r"^The run was stopped, and the motor is at rest\. The same command continues the run"
+        ):
             pressed(tmp_path, SLOW, {UNDER_WAY: "p"}, replays=replays, on_say=Controls.stop)
 
 
@@ -190,5 +192,9 @@ def test_letters_on_a_terminal_pause_go_on_and_stop(tmp_path: Path, typed: tuple
     wait_until(lambda: frames_in(video) > frames + 10)
     os.write(typing, b"q\n")
     assert process.wait(PATIENCE_S) == 1
-    assert said().splitlines()[-1].endswith("The run was stopped; the motor stands. The same command goes on with it.")
+    assert (
+        said()
+        .splitlines()[-1]
+        .endswith("The run was stopped, and the motor is at rest. The same command continues the run.")
+    )
     assert "Traceback" not in said()

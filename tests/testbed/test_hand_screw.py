@@ -61,7 +61,8 @@ def test_nobody_at_the_terminal_is_said() -> None:
     with pytest.raises(FingervisionError) as raised:
         actuator.home()
     assert str(raised.value) == (
-        "The hand screw must be turned by somebody, but nobody is at the terminal: run it from one."
+        "The hand screw must be turned by an operator, but there is no terminal to ask one: "
+        "run the command from a terminal."
     )
 
 
@@ -70,7 +71,7 @@ def test_what_a_hand_cannot_do_is_refused() -> None:
     with pytest.raises(FingervisionError, match=r"a jog at 2 mm/s"):
         actuator.jog(2.0)
     with pytest.raises(
-        FingervisionError, match=r"^Step 3 must be kept by a motor controller, but a hand screw has none"
+        FingervisionError, match=r"^Step 3 must be stored in a motor controller, but a hand screw has none"
     ):
         actuator.run_step(3)
     with pytest.raises(FingervisionError, match=r"^The target must lie between -1 and 6 mm, but is 7 mm: nothing was"):

@@ -39,7 +39,7 @@ def test_a_jog_ends_after_its_time_or_at_the_limit_of_the_bed(bed: Bed) -> None:
 @pytest.mark.parametrize(
     ("to_mm", "speed_mm_s", "said"),
     [
-        (2.0, 1.0, "The target must lie within the bed's limits of -0.46 to 1.45 mm, but 2 mm is 0.55 mm beyond: "
+        (2.0, 1.0, "The target must lie within the test bed's limits of -0.46 to 1.45 mm, but 2 mm is 0.55 mm beyond: "
          "nothing was moved."),
         (float("nan"), 1.0, "The target must be a finite number of mm, but is nan: nothing was moved."),
         (1.0, 500.0, "The speed must be positive and at most 400 mm/s, but is 500: nothing was moved."),

@@ -66,7 +66,7 @@ def test_a_stop_ends_the_waiting_for_an_answer(keyboard: tuple[int, Terminal, St
     stopped.set()
     with (
         terminal.listening(lambda line: None, stopped.is_set),
-        pytest.raises(FingervisionError, match=r"^The question was not answered, because the run was stopped\."),
+        pytest.raises(FingervisionError, match=r"^The operator gave no answer before the run was stopped\."),
     ):
         terminal.ask(QUESTION)
 

@@ -54,7 +54,7 @@ class Bench:
     Raises
     ------
     FingervisionError
-        There is no camera, or no scale for its frames.
+        The test bed has no camera, or no scale for the camera's frames.
     """
 
     has_own_clock = True
@@ -132,14 +132,16 @@ class Bench:
 
     def _ask(self, task: Task) -> None:
         if self.doing:
-            raise StateError(f"The bed is {self.doing}: wait for it, or stop it first.")
+            raise StateError(f"The test bed is {self.doing}: wait until it has finished, or stop it first.")
         if self._ending.is_set():
-            raise StateError("The bed is closed: start the live view again.")
+            raise StateError("The test bed is closed: start the live view again.")
         self._stop_asked = False
         try:
             self._asked.put_nowait(task)
         except Full:
-            raise StateError("The bed was asked something already: wait for it, or stop it first.") from None
+            raise StateError(
+                "The test bed is still carrying out an earlier request: wait until it has finished, or stop it first."
+            ) from None
 
     # ---- the thread
     def _work(self) -> None:

@@ -25,7 +25,7 @@ def opened_bed(name: str, hide: tuple[str, ...], choices: Choices) -> tuple[Capt
     Raises
     ------
     DataError, InputFileError, UsageError
-        It cannot be opened, or has neither camera nor scale.
+        The test bed cannot be opened, or has neither camera nor scale.
     """
     hidden = hidden_from(hide)
     bed = open_bed(name, hidden, pace=1.0)

@@ -42,7 +42,7 @@ def obey(view: View, request: Request) -> Answer:
     Raises
     ------
     UsageError
-        It cannot be done, or is nothing that can be asked.
+        The request is unknown, or cannot be carried out.
     """
     name = request.get("do")
     command = _table().get(name) if isinstance(name, str) else None

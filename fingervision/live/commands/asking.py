@@ -44,7 +44,7 @@ def seen_of(view: View) -> Seen:
     Raises
     ------
     StateError
-        There is none yet.
+        No picture has arrived yet.
     """
     if view.seen is None:
         raise StateError("There is no picture yet: wait for the source.")
@@ -57,7 +57,7 @@ def number(request: Request, name: str) -> float:
     Raises
     ------
     UsageError
-        It is none.
+        The value is not a number.
     """
     value = request.get(name)
     if not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= GREATEST:
@@ -76,7 +76,7 @@ def whole(request: Request, name: str) -> int:
     Raises
     ------
     UsageError
-        It is none.
+        The value is not a whole number.
     """
     value = request.get(name)
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= GREATEST:
@@ -90,7 +90,7 @@ def words(request: Request, name: str) -> str:
     Raises
     ------
     UsageError
-        It is none, or one that is too long.
+        The value is not a text, or the text is too long.
     """
     value = request.get(name)
     if isinstance(value, str) and 0 < len(value) <= MOST_LETTERS and value.isprintable():
@@ -113,7 +113,7 @@ def box(request: Request) -> Region:
     Raises
     ------
     UsageError
-        It is none.
+        The value is not of the required type.
     """
     sides = request.get("box")
     if not (

@@ -19,7 +19,7 @@ READ_ONLY = "This page may look at the bed and not move it: start the live view 
 def _bench(view: View) -> Bench:
     bench = view.features.get(BED)
     if not isinstance(bench, Bench):
-        raise StateError("There is no bed here: start the live view with --bed.")
+        raise StateError("This live view has no test bed: start the live view with --bed.")
     return bench
 
 
@@ -52,7 +52,7 @@ def _jog(view: View, request: Request) -> Answer:
     bench = _movable(view)
     speed_mm_s, for_s = number(request, "speed_mm_s"), number(request, "for_s")
     if not 0.0 < for_s <= LONGEST_JOG_S:
-        raise UsageError(f"A jog must last more than 0 and at most {LONGEST_JOG_S:g} s, but {for_s:g} was asked.")
+        raise UsageError(f"A jog must last more than 0 s and at most {LONGEST_JOG_S:g} s, but {for_s:g} was asked.")
     bench.jog(speed_mm_s, for_s)
     return Answer()
 
@@ -70,7 +70,8 @@ def _inside(view: View, name: str) -> Path:
     path = Path(name).resolve()
     if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
         raise UsageError(
-            f"A recipe must lie below {Path.cwd()} or {view.out}, but {shown(name)} does not: copy it there."
+            f"A recipe file must lie inside the folder {Path.cwd()} or {view.out}, but {shown(name)} does "
+            "not: copy the file there."
         )
     return path
 

@@ -25,7 +25,7 @@ def _beside(view: View) -> GaugesBeside:
     if isinstance(view, Session):
         return put_live_gauges(view, USUAL_FILE)
     if not isinstance(view, Playback):
-        raise StateError("Gauges are drawn on a recording or a camera's picture, but this is neither.")
+        raise StateError("Gauges are drawn on a recording or a camera's picture, but this source is neither of them.")
     return put_gauges_beside(view, USUAL_FILE)
 
 
@@ -36,7 +36,7 @@ def _board(view: View) -> GaugeBoard:
 def _table(request: Request, name: str, *, may_lack: bool = False) -> dict[str, Any]:
     table = request.get(name)
     if not isinstance(table, dict) or len(table) > MOST_KEYS:
-        raise UsageError("A gauge must be a table of its keys, but is none.")
+        raise UsageError("A gauge must be a table of settings (name, kind, position), but is not.")
     for key, value in table.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= GREATEST
         is_word = isinstance(value, str) and len(value) <= MOST_LETTERS

@@ -50,13 +50,16 @@ def _height_at(view: View, request: Request) -> Answer:
     """Measure at the height of a point in the picture."""
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
-        raise StateError("The height is counted from the tips, which this frame does not show: mend the view.")
+        raise StateError(
+            "The measuring height is counted from the tips, which this frame does not show: bring both tips "
+            "into the picture."
+        )
     at_px = number(request, "y" if outcome.direction.is_vertical else "x")
     tips_px = 0.5 * (outcome.left.tip_px + outcome.right.tip_px)
     roots_are_after = outcome.direction in (Direction.UP, Direction.LEFT)
     below_px = at_px - tips_px if roots_are_after else tips_px - at_px
     if below_px <= 0.0:
-        raise UsageError(f"The height must be on the fingers, but is {-below_px:.0f} px beyond their tips.")
+        raise UsageError(f"The measuring height must lie on the fingers, but is {-below_px:.0f} px beyond their tips.")
     view.choose(below_tip_mm=round(below_px / scale.px_per_mm, 3))
     return Answer(f"Measured {view.choices.below_tip_mm:g} mm below the tips.")
 
@@ -72,7 +75,7 @@ def _zero(view: View, request: Request) -> Answer:
         return Answer()
     row = seen_of(view).row
     if row is None or row.gap_mm is None:
-        raise StateError("Zero needs a gap, but this frame has none: bring the fingers into view.")
+        raise StateError("Setting the zero needs a measured gap, but this frame has none: bring the fingers into view.")
     view.choose(zero_mm=row.gap_mm)
     return Answer(f"Gaps are shown less {row.gap_mm:.4f} mm; files hold them whole.")
 
@@ -122,7 +125,7 @@ def _free_name(folder: Path, stem: str) -> Path:
             continue
         except OSError as error:
             raise OutputError(
-                f"The folder {folder} cannot be written ({error.strerror}): name another with --out."
+                f"The folder {folder} cannot be written ({error.strerror}): name another folder with --out."
             ) from error
         return path
     raise AssertionError("names do not end")
@@ -131,7 +134,9 @@ def _free_name(folder: Path, stem: str) -> Path:
 def _steps(view: View, request: Request) -> Answer:
     task, frame = view.choices.task, seen_of(view).frame
     if task is None:
-        raise StateError("The steps need the scale, which is not known: give it first.")
+        raise StateError(
+            "Drawing the steps of the measurement needs the scale, which is not known: give the scale first."
+        )
     return Answer(
         pictures=tuple(
             (name, _png(in_eight_bits(picture) if picture.ndim == 2 else picture[:, :, ::-1]))

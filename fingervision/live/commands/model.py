@@ -14,9 +14,13 @@ MODEL, TYPED = "model", "typed_input"
 
 def _input(view: View, request: Request) -> Answer:
     if not isinstance(view, Session):
-        raise StateError("A recording's input is that of its drive: name it with --drive.")
+        raise StateError(
+            "The input of a recording is not typed: it is read from its stage's record, named with --drive."
+        )
     if "bed" in view.features:
-        raise StateError("The bed's own stage says where it is: nothing needs to be typed.")
+        raise StateError(
+            "The input cannot be typed while a test bed is connected: it is read from the test bed's stage."
+        )
     input_mm = number_or_none(request, "input_mm")
     view.features[TYPED] = input_mm
     if input_mm is None:

@@ -13,7 +13,7 @@ RANGE = "measured_range"
 
 def _playback(view: View) -> Playback:
     if not isinstance(view, Playback):
-        raise StateError("A live source cannot be scrubbed: record it, and open the recording.")
+        raise StateError("One cannot go back and forth in a live source: record it, and open the recording.")
     return view
 
 
@@ -45,7 +45,7 @@ def _measure(view: View, request: Request) -> Answer:
     playback = _playback(view)
     running = view.features.get(RANGE)
     if isinstance(running, RangeMeasurement) and running.is_running:
-        raise StateError("A range is being measured already: wait for it.")
+        raise StateError("A range is being measured already: wait until it is done.")
     measurement = RangeMeasurement(playback, playback.range if request.get("marked") else None)
     view.features[RANGE] = measurement
     return Answer(f"Measuring into {measurement.folder}.")

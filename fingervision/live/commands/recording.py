@@ -13,7 +13,7 @@ from fingervision.live.view import View
 
 def _session(view: View) -> Session:
     if not isinstance(view, Session):
-        raise StateError("Only a camera or stream can be recorded, but this is a recording already.")
+        raise StateError("Only a camera or a stream can be recorded, but this source is a recording itself.")
     return view
 
 
@@ -36,7 +36,7 @@ def _snapshot(view: View, request: Request) -> Answer:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(coded)
     except OSError as error:
-        raise OutputError(f"{path} could not be written ({error.strerror}): make room.") from error
+        raise OutputError(f"{path} could not be written ({error.strerror}): free disk space.") from error
     return Answer(f"Snapshot of frame {seen.frame.index}: {path}")
 
 

@@ -28,7 +28,7 @@ def _inspect(view: View, request: Request) -> Answer:
         view.play(on=True, speed=1.0)
     running = view.features.get(SET_UP)
     if isinstance(running, SetUp) and running.is_busy:
-        raise StateError("The set-up is being looked at already: wait for it.")
+        raise StateError("The set-up is being inspected already: wait until it is done.")
     view.features[SET_UP] = SetUp(view)
     return Answer()
 
@@ -53,7 +53,9 @@ def _save(view: View, request: Request) -> Answer:
 def _load(view: View, request: Request) -> Answer:
     path = Path(words(request, "path")).resolve()
     if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
-        raise UsageError(f"Settings must lie below {Path.cwd()} or {view.out}, but {shown(str(path))} does not.")
+        raise UsageError(
+            f"A settings file must lie inside the folder {Path.cwd()} or {view.out}, but {shown(str(path))} does not."
+        )
     found = read_settings(path)
     changes: dict[str, Any] = {}
     if "calibration" in found:

@@ -119,7 +119,7 @@ class VerdictSeeker:
             folder.mkdir(parents=True, exist_ok=True)
             write_table(table, rows)
         except OSError as error:
-            self._tell("verdict_failed", f"{table} could not be written ({error.strerror}): make room.")
+            self._tell("verdict_failed", f"{table} could not be written ({error.strerror}): free disk space.")
             return
         arguments = ("diagnose", str(table), "--model", str(self._model), "--kind", self._kind, "--out", str(folder))
         command = BackgroundCommand(*arguments)

@@ -104,7 +104,7 @@ class GaugeBoard:
         Raises
         ------
         DataError, InputFileError
-            It cannot be read, or holds what cannot be meant for these frames; the gauges then stay as they are.
+            The file cannot be read, or holds gauges that do not fit these frames; the present gauges are then kept.
         """
         before = text_of(self.path)
         entries: tuple[_Entry, ...] = ()
@@ -134,15 +134,15 @@ class GaugeBoard:
         ChangedMeanwhileError
             Somebody else has.
         DataError, InputFileError, OutputError
-            There is no gauge, or the file cannot be written; what was there stays.
+            There is no gauge to save, or the file cannot be written; its earlier version is then kept.
         """
         with self._lock:
             if not self._entries:
                 raise DataError("A gauge file must hold at least one gauge, but there is none: add one.")
             if not over and self._now() != self._before:
                 raise ChangedMeanwhileError(
-                    f"{self.path} was changed by somebody else since it was read here: load it and lose what is not "
-                    "saved, or save over it."
+                    f"{self.path} was changed by somebody else since it was read here: load that file and lose the "
+                    "changes made here, or save over it."
                 )
             text = gauges_text([(entry.table, entry.place) for entry in self._entries], self._before, SCHEMA)
             write_gauges_text(self.path, text)
@@ -154,7 +154,7 @@ class GaugeBoard:
         try:
             return text_of(self.path)
         except FingervisionError as error:
-            raise ChangedMeanwhileError(f"{error} Save over it, or mend it first.") from error
+            raise ChangedMeanwhileError(f"{error} Save over it, or correct the faults first.") from error
 
     # ---- one gauge
     def add(self, table: Mapping[str, Any]) -> None:
@@ -184,7 +184,7 @@ class GaugeBoard:
         Raises
         ------
         DataError, FieldError, StateError
-            There is no such gauge, or a value cannot be meant; the gauge then stays as it was.
+            No gauge has that name, or a value is not allowed; the gauge is then unchanged.
         """
         with self._lock:
             at = self._at(name)
@@ -201,7 +201,7 @@ class GaugeBoard:
         Raises
         ------
         StateError
-            There is none of that name.
+            No gauge has that name.
         """
         with self._lock:
             at = self._at(name)

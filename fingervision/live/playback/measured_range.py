@@ -32,7 +32,7 @@ class RangeMeasurement:
 
     def __init__(self, playback: Playback, frames: tuple[int, int] | None) -> None:
         if playback.choices.scale is None:
-            raise StateError("The scale is not known: give it before measuring.")
+            raise StateError("The scale is not known: give the scale before measuring.")
         beside = playback.features.get(GAUGES)
         gauges: tuple[str, ...] = ()
         if isinstance(beside, GaugesBeside) and beside.board.gauges:

@@ -118,7 +118,7 @@ class Playback:
         Raises
         ------
         LimitError
-            It is no range of this recording.
+            The range does not lie within the recording.
         """
         if first is None or last is None:
             self.range = None
@@ -135,7 +135,7 @@ class Playback:
         Raises
         ------
         DataError, UsageError
-            It cannot be meant for these frames.
+            The choice does not fit the recording's frames.
         """
         chosen, unzeroed = self.choices.changed(**changes)
         chosen.check(self.description)

@@ -64,7 +64,7 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
     Raises
     ------
     DataError, InputFileError, UsageError
-        It cannot be opened, or the run's folder has no video.
+        The recording cannot be opened, or the folder of the run has no video.
     """
     path = Path(name)
     folder = path if path.is_dir() else path.parent

@@ -1,4 +1,7 @@
-"""Effects of the catalogue computed by the physics of a drawn gripper, one per file; each states its EFFECT."""
+"""Effects computed by the mechanics of a drawn gripper, one per module.
+
+`EFFECT` of a module is the name of the effect in the catalogue that its `law` computes.
+"""
 
 import importlib
 import pkgutil
@@ -14,6 +17,6 @@ def _modules() -> list[ModuleType]:
 
 
 def laws_of(drawn: DrawnAnswer) -> dict[str, PhysicalLaw]:
-    """Compute the laws of a drawing, by the effect's name; effects that the drawing cannot show are omitted."""
+    """Compute the laws of a drawing by name of effect; effects that cannot occur in the drawing are omitted."""
     laws = {module.EFFECT: module.law(drawn) for module in _modules()}
     return {name: law for name, law in laws.items() if law is not None}

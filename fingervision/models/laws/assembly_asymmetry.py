@@ -1,4 +1,4 @@
-"""Unequal halves: a link of one half has another length, so that its finger opens by more or less than drawn."""
+"""Unequal halves: a link of one half differs in length, so that its finger opens by more or less than drawn."""
 
 from dataclasses import replace
 
@@ -13,15 +13,16 @@ _HALF = Parameter("changed_half", "", -1.0, 1.0, "half whose link differs: 1 rig
                   neutral=None, starts=2)  # fmt: skip
 
 _LEAST = 0.1
-"""A finger that hardly opens at all: the other's share of the opening goes no further."""
+"""Limit of the divisor 1 - 2 changed_half share: one finger then hardly opens, and the share cannot grow further."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change the links of the halves so that the right half has the stated share of the opening.
+    """Change the link lengths of the halves so that the right half has the given share of the opening.
 
-    The shares are 1/2 + share and 1/2 - share of an opening that is G times the drawn one. Only the right half is
-    changed if the left keeps its length: G (1 - 2 share) = 1; only the left one if G (1 + 2 share) = 1. Between the
-    two, G = 1 / (1 - 2 changed_half share); at changed_half = 0 the gap does not change, as with a table.
+    The right finger moves by 1/2 + share and the left finger by 1/2 - share of an opening that is G times the drawn
+    one. If only the right half is changed, the left finger moves as drawn: G (1 - 2 share) = 1; if only the left half
+    is changed, G (1 + 2 share) = 1. In general G = 1 / (1 - 2 changed_half share); at changed_half = 0 the gap does not
+    change, as for a model given as a table.
     """
     curves = drawn.lever
     if curves is None:

@@ -1,4 +1,4 @@
-"""Finger contact: Signorini's condition at the tips of the drawn body, and the force needed to close further."""
+"""Finger contact: Signorini's condition at the tips of the drawn body, and the drive force needed to close further."""
 
 from dataclasses import replace
 
@@ -13,16 +13,18 @@ from fingervision.models.static_answer import gap_per_input
 EFFECT = "finger_contact"
 _DEPTHS = 60
 _AS_DRAWN = 0.01
-"""Of the rest gap: tips as true to the drawing as this meet where it says."""
+"""Uncertainty of the gap at contact that is predicted from the drawing, as a share of the gap at rest: the accuracy to
+which tips are made."""
 _RIGID = 0.05
-"""Faces that yield by less than a twentieth of what the fingers are held back are rigid."""
+"""Largest yielding of faces that still count as rigid, as a share of the distance by which the fingers are held
+back."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
     """Stop the fingers as the drawn body does, and add the corresponding force at the drive.
 
-    The measuring point lies beside the contact point, so that a fraction of the closing continues there
-    (`remaining_slope`) even between rigid faces; soft faces let more of it continue and need less force, in proportion.
+    The measuring point lies beside the contact point, so that it keeps moving by a fraction of the closing
+    (`remaining_slope`) even between rigid faces. Soft faces let it move further, and need proportionally less force.
     """
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     touch_mm = body.first_touch_mm()

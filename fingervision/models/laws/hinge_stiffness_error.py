@@ -1,4 +1,4 @@
-"""Hinges of another thickness, or a material of another modulus: the force changes, the gap little or not at all."""
+"""Wrong hinge thickness or modulus of elasticity: the force changes, the gap hardly or not at all."""
 
 from dataclasses import replace
 
@@ -18,10 +18,11 @@ _LEAST = 1e-3
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change the thickness of all hinges so that the force has the stated ratio.
+    """Change the thickness of all hinges, and the modulus, so that the force changes by the given ratio.
 
-    The thickness contributes the factor (1 + ratio)^p, and the modulus, which does not affect the gap, the rest, (1 +
-    ratio)^(1 - p). For the published gripper, hinges thinner by 0.1 mm open 0.17 % wider with 22 % less force.
+    The thickness contributes the factor (1 + ratio)^p to the force. The modulus, which does not affect the gap,
+    contributes the remaining factor (1 + ratio)^(1 - p). For the published gripper, hinges thinner by 0.1 mm make the
+    opening 0.17 % wider and the force 22 % smaller.
     """
     thickness_mm = drawn.gripper.hinge.thickness_mm
     curves = ratio_curves(

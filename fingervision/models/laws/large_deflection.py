@@ -19,19 +19,20 @@ Array = NDArray[np.float64]
 
 EFFECT = "large_deflection"
 _BELOW, _ABOVE = 1, 4
-"""Equilibria below and above rest: a spline through them is good to 0.02 um for the paper's sample."""
+"""Number of equilibria computed below and above zero input: for the published sample a spline through them is accurate
+to 0.02 um."""
 _ROWS = 400
 _AS_DRAWN = 0.05
-"""Relative: links as true to the drawing as this bend as it says."""
+"""Relative uncertainty of the predicted arc parameters: the accuracy to which links are made."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Use the drawn body's own equilibria; the catalogue's parameters are those of the arc nearest to them.
+    """Use the equilibria of the drawn body; the effect's parameters are those of the best-fitting circular arc.
 
-    A body n times as large, with `reach_mm` n times as large, moves on the same curve n times as large. The difference
-    of `cross` from the drawn body's own value adds that fraction of the arc's height. The drawn physics thus lies at
-    the drawn arc's parameters, and a straight line at an infinite reach. For the published gripper these are 126 mm and
-    0.12, and the arc alone deviates from the equilibria by less than 0.3 µm.
+    Multiplying `reach_mm` by n multiplies the whole curve by n, as for a body n times as large. Changing `cross` by an
+    amount c adds c times the height of the arc. The parameters of the best-fitting arc therefore reproduce the
+    equilibria of the drawn body, and an infinite `reach_mm` gives a straight line. For the published gripper the best
+    fit is `reach_mm` = 126 mm and `cross` = 0.12, and the arc alone deviates from the equilibria by less than 0.3 µm.
     """
     try:
         opening_mm, bent_mm, force_ratio = _equilibria(drawn)
@@ -73,7 +74,7 @@ def _arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
 
 
 def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
-    """Opening with and without large rotation, and the ratio of the forces, over the inputs of the model."""
+    """Opening without and with large rotation, and ratio of the forces with to without, over the inputs."""
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     paths = []
     for end_mm, count in ((lowest_mm, _BELOW), (highest_mm, _ABOVE)):

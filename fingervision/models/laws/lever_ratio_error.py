@@ -1,4 +1,4 @@
-"""A link of another length: changing l2 alters the amplification, and the force nearly twice as much."""
+"""Wrong lever length: a change of l2 alters the amplification, and the force nearly twice as much."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ EFFECT = "lever_ratio_error"
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change the link so that the openings have the ratio stated by the catalogue's parameter."""
+    """Change the link so that the ratio of the opening to the drawn one is the effect's parameter."""
     curves = drawn.lever
     if curves is None:
         return None

@@ -39,8 +39,8 @@ def read(path: Path, given: Entry) -> RawTable:
         head = file.read(1024)
     if path.stat().st_size > MOST_BYTES:
         raise DataError(
-            f"{path} must have at most {MOST_BYTES / 1e9:g} GB, but has {path.stat().st_size / 1e9:.1f} GB: save the "
-            "table's variables alone."
+            f"{path} must have at most {MOST_BYTES / 1e9:g} GB, but has {path.stat().st_size / 1e9:.1f} GB: save only "
+            "the variables of the table."
         )
     passed: list[str] = []
     values = _hdf5(path, passed) if _is_hdf5(head) else _older(path, passed)
@@ -50,7 +50,7 @@ def read(path: Path, given: Entry) -> RawTable:
         held = f"only {', '.join(sorted(passed))}" if passed else "none"
         raise DataError(
             f"{path} must hold vectors or a matrix of real numbers, but holds {held} (tables, timetables, cells and "
-            "objects of MATLAB are no arrays): save its columns as vectors, save('run.mat', 'time', 'position', 'gap')."
+            "objects of MATLAB are not arrays): save vectors, save('run.mat', 'time', 'position', 'gap')."
         )
     part = chosen_part(path, {name: [c.name for c in columns] for name, columns in tables.items()}, given, "variable")
     columns = tables[part]

@@ -44,7 +44,9 @@ def read(path: Path, given: Entry) -> RawTable:
     kept = tuple(column for column in columns if column is not None)
     passed = [table.schema.field(k).name for k, column in enumerate(columns) if column is None]
     if not kept or not len(kept[0]):
-        raise DataError(f"{path} must hold columns of numbers, but has none with a row.")
+        raise DataError(
+            f"{path} must have a numeric column with at least one row, but has no numeric column with at least one row."
+        )
     notes = (f"Passed over, being no columns of numbers or texts: {', '.join(passed)}.",) if passed else ()
     return RawTable(path, "Parquet", kept, notes=notes)
 
@@ -54,7 +56,7 @@ def _check_size(path: Path, rows: int, unpacked_bytes: int) -> None:
     if rows > MOST_ROWS or unpacked_bytes > MOST_UNPACKED_BYTES:
         raise DataError(
             f"{path} must have at most {MOST_ROWS} rows and unpack to {MOST_UNPACKED_BYTES / 1e9:g} GB, but has {rows} "
-            f"rows and {unpacked_bytes / 1e9:.1f} GB: save fewer."
+            f"rows and {unpacked_bytes / 1e9:.1f} GB: save fewer rows or columns."
         )
 
 

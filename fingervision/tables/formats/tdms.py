@@ -51,7 +51,7 @@ def read(path: Path, given: Entry) -> RawTable:
         listed = ", ".join(f"{column.name} {len(column)}" for column in columns) or "none"
         raise DataError(
             f"The channels of group '{name}' of {path} must have the same number of values, but have: {listed}. Save "
-            "those of one rate in a group of their own."
+            "the channels of each rate in a group of their own."
         )
     notes = (f"Passed over, being no channels of numbers: {', '.join(passed)}.",) if passed else ()
     if warned:

@@ -103,7 +103,7 @@ class LibraryAxis(ABC):
 
     def run_step(self, number: int) -> None:
         """Refuse: such a device keeps no step data that a bed could use."""
-        raise LimitError(f"Step {number} must be kept by the controller, but {self._device} has none: use move.")
+        raise LimitError(f"Step {number} must be stored in the controller, but {self._device} has none: use move.")
 
     def stop(self) -> None:
         """Stop at once."""
@@ -129,7 +129,7 @@ class LibraryAxis(ABC):
 
     def _ready(self) -> None:
         if self.busy:
-            raise StateError("The stage must stand before it moves again, but is busy: stop it first.")
+            raise StateError("The stage must be at rest before a new motion, but is still moving: stop it first.")
 
     def _asked(self, act: Callable[[], T]) -> T:
         try:

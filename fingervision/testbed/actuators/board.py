@@ -114,7 +114,10 @@ class BoardActuator:
         """Return to the reference, by its own code or an absolute step to 0; clears the reason of an earlier stop."""
         self._stand()
         if wire.Levels.ALARM in self._board.levels:
-            raise DeviceError("The motor controller must have no alarm, but its alarm line is active: clear it there.")
+            raise DeviceError(
+                "The motor controller must have no alarm, but its alarm line is active: reset the alarm at "
+                "the controller."
+            )
         self._motions.failure = None
         if self._codes.home is not None:
             self._motions.begin([Run(self._codes.home, self._waits.home_s, None)])
@@ -124,8 +127,8 @@ class BoardActuator:
                 self._motions.begin([self._run_of(number, self._at_mm())])
                 return
         raise DeviceError(
-            "Homing must have a code of its own (home_code of the actuator) or an absolute step to 0 mm, but there is "
-            "neither: add one."
+            "Homing needs home_code in the actuator's configuration, or an absolute step to 0 mm, but there is "
+            "neither: add one of them."
         )
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
@@ -155,7 +158,7 @@ class BoardActuator:
         """Begin one of the step data blocks."""
         if number not in self._data.steps:
             there = ", ".join(str(each) for each in self._data.steps)
-            raise LimitError(f"The step must be one that the controller keeps ({there}), but is {number}.")
+            raise LimitError(f"The step must be one that is stored in the controller ({there}), but is {number}.")
         self._ready()
         self._check_known(number)
         self._begin_steps((number,))
@@ -187,7 +190,7 @@ class BoardActuator:
         # First of all, so that a stop that comes while the motion is prepared is not forgotten.
         self._motions.forget_stop()
         if self.busy:
-            raise StateError("The actuator must stand before it moves again, but is busy: stop it first.")
+            raise StateError("The actuator must be at rest before a new motion, but is still moving: stop it first.")
 
     def _ready(self) -> None:
         self._stand()

@@ -70,7 +70,7 @@ class HandScrew:
 
     def run_step(self, number: int) -> None:
         """Refuse: step data exist only in a motor controller."""
-        raise LimitError(f"Step {number} must be kept by a motor controller, but a hand screw has none: use move.")
+        raise LimitError(f"Step {number} must be stored in a motor controller, but a hand screw has none: use move.")
 
     def stop(self) -> None:
         """Do nothing: the screw does not move by itself."""
@@ -90,7 +90,8 @@ class HandScrew:
             line = self._terminal.ask(f"{words} (Enter alone: {wanted_mm:.3f}): ")
             if line is None:
                 raise StateError(
-                    "The hand screw must be turned by somebody, but nobody is at the terminal: run it from one."
+                    "The hand screw must be turned by an operator, but there is no terminal to ask one: run "
+                    "the command from a terminal."
                 )
             typed_mm = _number(line.strip().replace(",", "."), wanted_mm)
             if typed_mm is None:

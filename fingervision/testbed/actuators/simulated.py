@@ -102,7 +102,7 @@ class SimulatedActuator:
     def run_step(self, number: int) -> None:
         """Refuse: step data exist only in a motor controller."""
         raise LimitError(
-            f"Step {number} must be kept by a motor controller, but the simulated actuator has none: use move."
+            f"Step {number} must be stored in a motor controller, but the simulated actuator has none: use move."
         )
 
     def stop(self) -> None:
@@ -171,10 +171,11 @@ class SimulatedActuator:
     def _ready(self) -> None:
         if self._alarm is not None:
             raise DeviceError(
-                f"The actuator must have no alarm, but has {self._alarm.code} ({self._alarm.words}): clear it."
+                f"The actuator must have no alarm, but has {self._alarm.code} ({self._alarm.words}): reset "
+                "the alarm first."
             )
         if self.busy:
-            raise StateError("The actuator must stand before it moves again, but is busy: stop it first.")
+            raise StateError("The actuator must be at rest before a new motion, but is still moving: stop it first.")
 
 
 def _limits(section: Section) -> StageLimits:

@@ -255,5 +255,7 @@ def _wait_for_clock(board: Board, link: BoardLink, clock: Clock) -> None:
     until_s = clock.now_s() + JOINED_WITHIN_S
     while link.joined is None:
         if clock.now_s() > until_s:
-            raise DeviceError(f"{board.name} must answer steadily, but most answers are damaged: mend its cable.")
+            raise DeviceError(
+                f"{board.name} must send readable replies, but most of them are damaged: correct its cable."
+            )
         board.wait(ASK_EVERY_S)

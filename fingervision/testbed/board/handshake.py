@@ -105,7 +105,9 @@ class Handshake:
                 return False
             if self.clock.now_s() > until_s:
                 self.board.stop()
-                raise DeviceError(f"A motion was broken off, because {otherwise}: look at the wiring, and home.")
+                raise DeviceError(
+                    f"A motion was interrupted, because {otherwise}: check the wiring, and home the stage."
+                )
             self.board.wait(WAIT_S)
         return not self._ended()
 

@@ -14,7 +14,7 @@ def board_of(section: Section, context: BuildContext) -> Board:
     Raises
     ------
     DataError, DeviceError, InputFileError
-        Its file cannot be meant, or it cannot be opened.
+        The board's settings are invalid, or the board cannot be opened.
     """
     path = context.folder / section.word(KEY)
     name = f"{KEY} {path.resolve()}"

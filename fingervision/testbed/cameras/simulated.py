@@ -174,7 +174,7 @@ def build(section: Section, context: BuildContext) -> SimulatedCamera:
     """Build the camera from its section of the configuration."""
     if context.gripper is None:
         raise DataError(
-            f"A simulated camera ({section.at('kind')}) must have a simulated gripper, but the bed has none: "
+            f"A simulated camera ({section.at('kind')}) must have a simulated gripper, but the test bed has none: "
             "add a [gripper]."
         )
     width_px = section.whole("width_px", WIDTH_PX, low=160, high=4096)

@@ -67,7 +67,8 @@ class SourceCamera:
             if not self._waiting:
                 why = self._ended or f"it gave no frame for {self._patience_s:g} s"
                 raise DeviceError(
-                    f"The camera {self.description.name} must give frames while the bed works, but {why}: the motor "
+                    f"The camera {self.description.name} must give frames while the test bed works, but "
+                    f"{why}: the motor "
                     "was stopped; check its cable."
                 )
             received = self._waiting.popleft()

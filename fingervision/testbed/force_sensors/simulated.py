@@ -83,7 +83,8 @@ def build(section: Section, context: BuildContext) -> SimulatedForceSensor:
     """Build the sensor from its section of the configuration."""
     if context.gripper is None:
         raise DataError(
-            f"A simulated force sensor ({section.at('kind')}) must have a simulated gripper, but the bed has none: "
+            f"A simulated force sensor ({section.at('kind')}) must have a simulated gripper, but the test bed "
+            "has none: "
             "add a [gripper]."
         )
     full_scale_n = section.number("full_scale_n", FULL_SCALE_N, above=0.0)

@@ -84,7 +84,7 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
         beyond_mm = max(limits.lower_mm - to_mm, to_mm - limits.upper_mm)
         raise LimitError(
-            f"The target must lie within the bed's limits of {limits.lower_mm:g} to {limits.upper_mm:g} mm, but "
+            f"The target must lie within the test bed's limits of {limits.lower_mm:g} to {limits.upper_mm:g} mm, but "
             f"{to_mm:g} mm is {beyond_mm:.4g} mm beyond: nothing was moved."
         )
     _check_speed(bed, speed_mm_s)
@@ -137,7 +137,7 @@ def _watched(
             _check(bed, looking.force_n())
     except Interrupted:
         at_mm = looking.position_mm()
-        raise StateError(f"Stopped: the motor stands near {at_mm:.3f} mm.") from None
+        raise StateError(f"Stopped: the motor has stopped near {at_mm:.3f} mm.") from None
     except FingervisionError:
         bed.actuator.stop()
         raise

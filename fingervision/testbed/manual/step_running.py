@@ -75,6 +75,6 @@ def _check_kept(data: StepData, bed_name: str) -> None:
     for number, step in data.steps.items():
         if kept.steps.get(number) != step:
             raise DataError(
-                f"Step {number} must be the one that the motor controller keeps, but {path} has another: put these "
-                "steps into the controller with its maker's tool, and name them in the bed's configuration."
+                f"Step {number} must be the same as in the motor controller, but {path} states another: store these "
+                "steps in the controller with its maker's tool, and name them in the test bed's configuration."
             )

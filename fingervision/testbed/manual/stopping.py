@@ -38,8 +38,8 @@ def stop_bed(name: str) -> str:
         while find_holder is not None and find_holder(section, top.path.parent) is not None:
             if monotonic() > until_s:
                 raise DeviceError(
-                    f"Process {process} must let go of the bed within {LETS_GO_WITHIN_S:g} s, but does not: take the "
-                    "motor's supply away."
+                    f"Process {process} must release the test bed within {LETS_GO_WITHIN_S:g} s, but does "
+                    "not: switch off the motor's power supply."
                 )
             sleep(LOOK_EVERY_S)
         words = f"Process {process}, which drove the bed, was ended. "

@@ -104,7 +104,7 @@ def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float
     Raises
     ------
     LimitError
-        There is none.
+        The controller has no such step.
     """
     speeds = {
         number: nominal_speed_mm_s(step, step.target_mm, top_speed_mm_s)

@@ -68,13 +68,13 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
         return None
     if about.get("recipe") != recipe.text:
         raise OutputError(
-            f"The run in {path} broke off, but was of another recipe ({about.get('name')}): go on with that one, or "
-            "name another folder with --out."
+            f"The run in {path} was interrupted, and used another recipe ({about.get('name')}): continue "
+            "with that recipe, or name another folder with --out."
         )
     if about.get("bed_digest") != digest:
         raise OutputError(
-            f"The run in {path} broke off, but was on another bed: go on with that one, or name another folder with "
-            "--out."
+            f"The run in {path} was interrupted, and used another test bed: continue with that test bed, or "
+            "name another folder with --out."
         )
     rows = _rows_with_pictures(path)
     return Remains(datetime.fromisoformat(str(about["began_at"])), rows, _numbered_events(path))
@@ -85,7 +85,7 @@ def _about(path: Path) -> dict[str, Any]:
         about: dict[str, Any] = json.loads((path / RUN).read_text(encoding="utf-8"))
         kind = about.get("kind")
     except (OSError, ValueError, AttributeError) as error:
-        raise OutputError(f"{path / RUN} could not be read ({error}): name another --out.") from error
+        raise OutputError(f"{path / RUN} could not be read ({error}): name another folder with --out.") from error
     if kind != KIND:
         refuse_others(path, "another run")
     return about

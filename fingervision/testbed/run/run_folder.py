@@ -87,7 +87,7 @@ class BedRunFolder:
         except OSError as error:
             self._lock.release()
             raise OutputError(
-                f"The folder {path} cannot be written ({error.strerror}): name another with --out."
+                f"The folder {path} cannot be written ({error.strerror}): name another folder with --out."
             ) from error
         except BaseException:
             self._lock.release()
@@ -103,7 +103,7 @@ class BedRunFolder:
         if needed > free:
             raise OutputError(
                 f"The run needs up to {needed / 1e6:.0f} MB, but the disk of {self.path} has {free / 1e6:.0f} MB free: "
-                "make room, or name a folder on another disk. Nothing was moved."
+                "free disk space, or name a folder on another disk. Nothing was moved."
             )
 
     def add_picture(self, frame: Frame, time_s: float) -> None:
@@ -154,7 +154,7 @@ def rows_before(path: Path) -> list[SampleRow]:
     Raises
     ------
     DataError
-        There is no finished run in the folder.
+        The folder holds no finished run.
     """
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
     rows = read_samples(table)

@@ -118,13 +118,13 @@ class Watch:
             if measured.status is Status.OK:
                 return
         raise DeviceError(
-            f"The camera must see both fingers before anything moves, but does not: {words} Mend the view, and run the "
-            "recipe again."
+            f"The camera must show both fingers before anything moves, but does not: {words} "
+            "Bring both into the picture (camera, light, focus), and run the recipe again."
         )
 
     def _end_if_stopped(self) -> None:
         if self.controls.stopped:
-            raise StoppedError("The run was stopped; the motor stands. The same command goes on with it.")
+            raise StoppedError("The run was stopped, and the motor is at rest. The same command continues the run.")
 
     @property
     def _closes(self) -> bool:

@@ -129,15 +129,15 @@ class Sight:
     Raises
     ------
     FingervisionError
-        There is no camera, or no scale for its frames.
+        The test bed has no camera, or no scale for the camera's frames.
     """
 
     def __init__(self, bed: Bed) -> None:
         if bed.camera is None:
-            raise DataError("A run must be filmed, but the bed has no camera: add a [camera].")
+            raise DataError("A run needs a camera, but the test bed has none: add a [camera] section.")
         if bed.scale is None:
             raise DataError(
-                "A run must have a scale, but the bed has none: add a [scale] with px_per_mm or a calibration."
+                "A run must have a scale, but the test bed has none: add a [scale] with px_per_mm or a calibration."
             )
         description = bed.camera.description
         bed.scale.check_frame_size(description.width_px, description.height_px)

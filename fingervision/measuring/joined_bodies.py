@@ -1,0 +1,80 @@
+"""Check that bodies joined by a flexure are still joined: one that is not was taken for something that looks like it.
+
+A flexure bends but is hardly stretched. In pure bending its chord lies along the bisector of the directions in which
+it leaves the two bodies, and is shorter than the flexure by the square of the bending angle over 24; a shear force adds
+a displacement across it (Howell, 2001, Compliant Mechanisms, chapter 5, ISBN 978-0-471-38478-6).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.body_poses import SeenPose
+from fingervision.models.flexure import Flexure
+from fingervision.models.mechanism_bodies import LinkBody
+
+Array = NDArray[np.float64]
+
+LONGEST, SHORTEST = 1.1, 0.6
+"""Chord over the flexure's length. Polymers yield at strains of 2 to 5 %, and a bending body moves the ends of its
+flexures some per cent otherwise than a rigid one; an arc of 3 rad has a chord of 0.66."""
+MOST_ACROSS, MOST_ACROSS_NECK = 0.3, 0.1
+"""Displacement across the chord over the flexure's length: a leaf guided in parallel is used up to a fifth, and the thin
+part of a notch is a third of its length, so that shear moves it by a third of that."""
+SURE = 4.0
+"""Standard uncertainties of the distance: 1 of 16 000 by chance."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """A flexure and the two bodies that it joins, the one before it first."""
+
+    flexure: Flexure
+    bodies: tuple[LinkBody, LinkBody]
+
+    def is_torn(self, poses: Mapping[str, SeenPose]) -> bool:
+        """Whether two measured bodies lie where this flexure cannot join them; False where one was not measured."""
+        half, ends, turned, variance = self.flexure.half_length_mm, [], 0.0, 0.0
+        for body, along in zip(self.bodies, (-half, half), strict=True):
+            pose = poses[body.name]
+            if pose.x_mm is None or pose.y_mm is None or pose.angle_mrad is None or pose.random is None:
+                return False
+            turn = 1e-3 * pose.angle_mrad
+            c, s = np.cos(turn), np.sin(turn)
+            arm = np.array(self.flexure.point_mm(along, 0.0)) - body.centroid_mm
+            ends.append(body.centroid_mm + (pose.x_mm, pose.y_mm) + np.array([c * arm[0] - s * arm[1],
+                                                                              s * arm[0] + c * arm[1]]))  # fmt: skip
+            turned += 0.5 * turn
+            variance += float(pose.random[0, 0] + pose.random[1, 1])
+            variance += float(pose.random[2, 2]) * 1e-6 * float(arm @ arm)
+        direction = np.radians(self.flexure.axis_deg) + turned
+        way = np.array([np.cos(direction), np.sin(direction)])
+        chord = ends[1] - ends[0]
+        along, across = float(way @ chord), abs(float(way[0] * chord[1] - way[1] * chord[0]))
+        length, doubt = 2.0 * half, SURE * variance**0.5
+        most = (MOST_ACROSS_NECK if self.flexure.is_notch else MOST_ACROSS) * length
+        return across > most + doubt or not SHORTEST * length - doubt <= along <= LONGEST * length + doubt
+
+
+def torn_off(joints: Sequence[Joint], poses: Mapping[str, SeenPose]) -> set[str]:
+    """Names of the bodies that lie where their flexures cannot join them to the others.
+
+    A fixed body is where it was drawn. Of the others, the one with the largest share of its flexures torn is left out,
+    and of several the one with the most of them, until the rest is joined; where two are alike in both, it is not known
+    which of them was mistaken, and both are left out.
+    """
+    found: set[str] = set()
+    while True:
+        rest = [joint for joint in joints if not found & {body.name for body in joint.bodies}]
+        states = [(joint, joint.is_torn(poses)) for joint in rest]
+        torn: dict[str, list[bool]] = {}
+        for joint, is_torn in states:
+            for body in joint.bodies:
+                if not body.is_fixed:
+                    torn.setdefault(body.name, []).append(is_torn)
+        count = {name: (sum(own) / len(own), sum(own)) for name, own in torn.items() if any(own)}
+        if not count:
+            return found
+        found |= {name for name, own in count.items() if own == max(count.values())}
