@@ -5,7 +5,7 @@ arrays; pictures are grey levels of shape (height, width).
 
 Examples
 --------
-Two dark bars of known width, drawn at 40 pixels to the millimetre, give the scale:
+Two dark bars of known width, rendered at 40 pixels per millimetre, give the scale:
 
 >>> import numpy as np
 >>> import calib

@@ -9,14 +9,14 @@ COVERAGE_FACTOR = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """A measurement compared with a certified value.
+    """Comparison of a measurement with a certified value.
 
     Parameters
     ----------
     measured_mm, u_measured_mm : float
-        Measured, with its standard uncertainty.
+        Measured value, with its standard uncertainty.
     certified_mm, u_certified_mm : float
-        Certified, with its standard uncertainty.
+        Certified value, with its standard uncertainty.
     """
 
     measured_mm: float
@@ -26,12 +26,12 @@ class Agreement:
 
     @property
     def deviation_mm(self) -> float:
-        """Measured less certified."""
+        """Measured value minus certified value."""
         return self.measured_mm - self.certified_mm
 
     @property
     def e_n(self) -> float:
-        """Deviation over the expanded uncertainty of the deviation (ISO 13528:2022, 9.6): within +-1 they agree."""
+        """Ratio E_n of the deviation to its expanded uncertainty (ISO 13528:2022, 9.6); within +-1 the values agree."""
         expanded = COVERAGE_FACTOR * hypot(self.u_measured_mm, self.u_certified_mm)
         return self.deviation_mm / expanded if expanded > 0.0 else float("inf")
 

@@ -1,4 +1,4 @@
-"""Chessboards and ChArUco boards: sub-pixel corners of their squares."""
+"""Chessboards and ChArUco boards: sub-pixel positions of the corners of their squares."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -38,14 +38,14 @@ DICTIONARIES = (
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A flat board of squares.
+    """A flat calibration board with a pattern of squares.
 
     Parameters
     ----------
     columns, rows : int
-        Inner corners of a chessboard, squares of a ChArUco board: as OpenCV counts them.
+        Number of inner corners of a chessboard, or of squares of a ChArUco board, as in OpenCV.
     square_mm, u_square_mm : float
-        Side of a square, and the standard uncertainty of the board's scale at one square.
+        Side of a square, and the standard uncertainty of the board's scale, expressed for one square.
     marker_mm : float or None
         Side of a marker on a ChArUco board; None for a chessboard.
     """
@@ -81,11 +81,11 @@ class BoardCorners:
     name : str
         The picture's name.
     points_px : ndarray, shape (n, 2)
-        Where they are seen.
+        Positions of the corners in the picture.
     cells : ndarray of int, shape (n, 2)
-        Which they are: column and row on the board.
+        Column and row of each corner on the board.
     board_mm : ndarray, shape (n, 2)
-        Where they are on the board.
+        Positions of the corners on the board.
     """
 
     name: str
@@ -100,7 +100,7 @@ def find_corners(grey: Grey, board: Board, name: str) -> BoardCorners:
     Raises
     ------
     CalibrationError
-        The picture does not show this board.
+        If the picture does not show this board.
     """
     eight_bit = np.asarray(grey if grey.dtype == np.uint8 else grey // 257, dtype=np.uint8)
     found = _chessboard(eight_bit, board) if board.marker_mm is None else _charuco(eight_bit, board)
@@ -133,7 +133,7 @@ def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | 
 
 
 def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | None:
-    """Corners under the dictionary that fits; the dictionary is found from the picture."""
+    """Corners of a ChArUco board; the marker dictionary is found from the picture."""
     assert board.marker_mm is not None  # noqa: S101 - the caller asks only for boards with markers
     best: tuple[Floats, Ints] | None = None
     for name in DICTIONARIES:

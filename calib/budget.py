@@ -1,4 +1,4 @@
-"""Uncertainty budget of a distance: every contribution side by side, and the one place that combines them."""
+"""Uncertainty budget of a distance: all contributions, and their combination."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -25,13 +25,13 @@ class BudgetLine:
     Parameters
     ----------
     source : str
-        What it is.
+        Name of the source.
     u_mm : ndarray, shape (n,)
         Standard uncertainty of each distance from this source alone.
     supplied : str
-        What the user has to supply to make it true, and what was taken.
+        Value or option that the user must supply for this contribution, and the value that was used.
     shared : bool
-        True where all frames have the same error; False where it differs from frame to frame.
+        True if all frames have the same error; False if it differs from frame to frame.
     """
 
     source: str
@@ -48,12 +48,12 @@ class Budget:
 
     @property
     def u_mm(self) -> Floats:
-        """Combined standard uncertainty (mm): squares of independent sources add (JCGM 100:2008, equation 10)."""
+        """Combined standard uncertainty (mm): root of the sum of squares (JCGM 100:2008, equation 10)."""
         return self._combined(self.lines)
 
     @property
     def u_random_mm(self) -> Floats:
-        """The part that differs from frame to frame (mm)."""
+        """Combined standard uncertainty of the sources that differ from frame to frame (mm)."""
         return self._combined(tuple(line for line in self.lines if not line.shared))
 
     @staticmethod
@@ -83,11 +83,11 @@ def distance_budget(
     scale : Calibration
         The calibration and the limits that it states.
     points_px, flat_px : ndarray, shape (n, 2, 2)
-        The measured points, and the same with lens and perspective taken off.
+        The measured points, and the same points corrected for lens distortion and perspective.
     value_mm : ndarray, shape (n,)
         The distances.
     u_random_px : ndarray, shape (n,)
-        Their random part, in pixels of `flat_px`.
+        Random standard uncertainty of each distance, in pixels of `flat_px`.
     polarity : ndarray, shape (n,)
         +1 for a light gap, -1 for a dark one.
     """

@@ -18,12 +18,12 @@ class BareScale:
     Parameters
     ----------
     px_per_mm : float
-        Pixels to the millimetre; positive.
+        Pixels per millimetre; positive.
 
     Raises
     ------
     ValueError
-        The scale is not positive.
+        If the scale is not positive.
     """
 
     px_per_mm: float
@@ -35,25 +35,25 @@ class BareScale:
 
     @property
     def edge_bias_px(self) -> float:
-        """Zero, because nothing is known about the edges."""
+        """Zero, because the edge bias is not known."""
         return 0.0
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
-        """Distances between pairs of points, without the unknown uncertainty of the scale.
+        """Distances between pairs of points, without the (unknown) uncertainty of the scale.
 
         Parameters
         ----------
         points_px : ndarray, shape (n, 2, 2)
-            Frame, first or second point, x or y.
+            Coordinates, with the indices: distance, first or second point, x or y.
         u_random_px : ndarray, shape (n,)
-            Standard uncertainty of each distance from frame to frame.
+            Standard uncertainty of each distance due to effects that vary from frame to frame.
         light_gap : ndarray of bool, shape (n,)
-            True where the gap is light between dark edges; without an edge bias it makes no difference.
+            True for a light gap between dark edges; without an edge bias it makes no difference.
 
         Returns
         -------
         Distances
-            Values and their random part; `u_mm` is None.
+            Values and their random standard uncertainties; `u_mm` is None.
         """
         points = np.asarray(points_px, dtype=np.float64)
         length_px = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
@@ -66,7 +66,7 @@ class BareScale:
     def positions_mm(
         self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
     ) -> Floats:
-        """Coordinates of both points of each distance along an axis of the picture, from the picture's centre, in mm.
+        """Coordinates (mm) of both points of each distance along an axis of the picture, from the picture's centre.
 
         Parameters
         ----------
@@ -80,11 +80,11 @@ class BareScale:
         Returns
         -------
         ndarray, shape (n, 2)
-            Millimetres.
+            Coordinates in millimetres.
         """
         middle_px = (frame_size_px[axis] - 1) / 2
         points = np.asarray(points_px, dtype=np.float64)
         return np.asarray((points[:, :, axis] - middle_px) / self.px_per_mm)
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:
-        """Do nothing: a bare scale belongs to no particular frame size."""
+        """Do nothing: a bare scale is valid for any frame size."""

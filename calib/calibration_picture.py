@@ -1,4 +1,4 @@
-"""The calibration picture: a reference with the edges found on it, residuals magnified."""
+"""The calibration picture: the reference object with the fitted edges, and their residuals magnified."""
 
 import cv2
 import numpy as np
@@ -21,12 +21,12 @@ LEAST_SIDE_PX = 900
 
 
 def picture_of_edges(grey: NDArray[np.uint8] | NDArray[np.uint16], edges: ParallelEdges, words: str) -> Picture:
-    """Draw the two edges, the rows used, the width and the residuals.
+    """Draw the two edges, the rows used, the width and the residuals into a picture.
 
     Returns
     -------
     ndarray of uint8, shape (height, width, 3)
-        Red, green and blue.
+        The picture in red, green and blue.
     """
     canvas, zoom = _canvas(grey)
     largest = max(float(np.percentile(np.abs(residual), 95)) for residual in edges.residuals_px)
@@ -66,25 +66,25 @@ def picture_of_lines(
     residual_um: Floats,
     words: str,
 ) -> Picture:
-    """Draw the centre of every line of a scale, and its magnified deviation from the nominal position.
+    """Draw the centre of every line of a line scale, and its magnified deviation from the nominal position.
 
     Parameters
     ----------
     grey : ndarray, shape (height, width)
         The picture.
     lines : ScaleLines
-        What was found in it.
+        Lines found in the picture.
     used : ndarray of bool, shape (n,)
-        Lines that were used are green, the others orange.
+        Whether each line was used; used lines are drawn in green, the others in orange.
     residual_um : ndarray, shape (n,)
-        What the scale leaves of each.
+        Residual of each line's position after the fit of the scale.
     words : str
-        Written above.
+        Text at the top of the picture.
 
     Returns
     -------
     ndarray of uint8, shape (height, width, 3)
-        Red, green and blue.
+        The picture in red, green and blue.
     """
     canvas, zoom = _canvas(grey)
     along = np.array([-lines.across[1], lines.across[0]])

@@ -1,7 +1,8 @@
-"""The camera's response: the light that a stored grey level represents.
+"""The camera response: relation between a stored grey level and the light that it represents.
 
-An edge lies where the light passes the mean of its two plateaus. In levels after a transfer curve (gamma), the mean
-level lies elsewhere, and the edge appears displaced, the more so the larger the blur.
+An edge is at the position where the light equals the mean of its two plateaus. In levels after a transfer curve
+(gamma), the mean of the levels is reached at another position, and the edge appears displaced, the more so the larger
+the blur.
 """
 
 from collections.abc import Callable
@@ -22,23 +23,23 @@ FEWEST_POINTS = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraResponse:
-    """A transfer curve, from stored levels to light.
+    """A camera response: curve from stored levels to light.
 
     Parameters
     ----------
     name : str
-        How it is called in files and sentences.
+        Name of the response in files and sentences.
     level : ndarray of float, shape (n,)
         Stored level as a share of full scale, from 0 to 1, increasing.
     light : ndarray of float, shape (n,)
-        Light as a share of that which gives full scale, from 0 to 1, increasing.
+        Light as a share of the light that gives full scale, from 0 to 1, increasing.
     top_level : int or None
-        Full scale of the pictures that it was measured on; None where it holds for any depth.
+        Full scale of the pictures on which the response was measured; None if it is valid for any bit depth.
 
     Raises
     ------
     CalibrationError
-        The curve has too few points, does not rise, or does not reach from 0 to 1.
+        If the curve has too few points, does not increase, or does not extend from 0 to 1.
     """
 
     name: str
@@ -70,19 +71,19 @@ class CameraResponse:
             )
 
     def table(self, top_level: int, size: int) -> Floats:
-        """Light of every stored level, on the scale of the levels: 0 gives 0, full scale gives full scale.
+        """Light for every stored level, on the scale of the levels: 0 gives 0, full scale gives full scale.
 
         Parameters
         ----------
         top_level : int
             Full scale of the pictures.
         size : int
-            Length of the table; levels beyond full scale are as light as full scale.
+            Length of the table; levels beyond full scale are assigned the light of full scale.
 
         Raises
         ------
         CalibrationError
-            The response was measured on pictures of another depth.
+            If the response was measured on pictures of another bit depth.
         """
         if self.top_level is not None and self.top_level != top_level:
             raise CalibrationError(
@@ -93,7 +94,7 @@ class CameraResponse:
         return np.asarray(top_level * np.interp(share, self.level, self.light))
 
     def linearised(self, grey: Grey, top_level: int) -> NDArray[np.uint16]:
-        """Convert a picture to light, in 16 bits."""
+        """Convert a picture to values proportional to light, in 16 bits."""
         table = self.table(top_level, int(np.iinfo(grey.dtype).max) + 1) * (65535.0 / top_level)
         return np.rint(table).astype(np.uint16)[grey]
 
@@ -105,15 +106,16 @@ class MeasuredResponse:
     Parameters
     ----------
     response : CameraResponse
-        The curve.
+        The response curve.
     exponent : float
-        Of the power law that is nearest; 1 for a linear camera, about 2.2 for consumer cameras.
+        Exponent of the nearest power law; 1 for a linear camera, about 2.2 for consumer cameras.
     rms_relative : float
-        Root mean square of what is left, as a share of the light.
+        Root mean square of the residuals, as a share of the light.
     covered : (float, float)
-        Least and largest level that the pictures showed, shares of full scale; beyond them the curve is extended.
+        Smallest and largest level in the pictures, as shares of full scale; outside this range the curve is
+        extrapolated.
     u_exponent : float or None
-        Standard uncertainty of the exponent, where the pictures tell it.
+        Standard uncertainty of the exponent, if the pictures determine it.
     """
 
     response: CameraResponse
@@ -124,18 +126,21 @@ class MeasuredResponse:
 
 
 def _srgb(level: Floats) -> Floats:
-    """IEC 61966-2-1."""
+    """Transfer curve of sRGB (IEC 61966-2-1), from signal to light."""
     return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
 
 
 def _bt709(level: Floats) -> Floats:
-    """ITU-R BT.709-6, item 1.2, from the signal to the light; constants with the digits that join its two parts."""
+    """Transfer curve of ITU-R BT.709-6, item 1.2, from signal to light.
+
+    The constants have as many digits as are needed to make the two parts of the curve continuous.
+    """
     alpha, beta = 1.09929682680944, 0.018053968510807
     return np.where(level < 4.5 * beta, level / 4.5, ((level + alpha - 1.0) / alpha) ** (1.0 / 0.45))
 
 
 def _hlg(level: Floats) -> Floats:
-    """ITU-R BT.2100-2, table 5: from the hybrid log-gamma signal to the light of the scene."""
+    """Transfer curve of ITU-R BT.2100-2, table 5: from the hybrid log-gamma signal to the light of the scene."""
     a = 0.17883277
     b, c = 1.0 - 4.0 * a, 0.5 - a * np.log(4.0 * a)
     light = np.where(level <= 0.5, level**2 / 3.0, (np.exp((np.maximum(level, 0.5) - c) / a) + b) / 12.0)
@@ -144,7 +149,7 @@ def _hlg(level: Floats) -> Floats:
 
 
 def _pq(level: Floats) -> Floats:
-    """ITU-R BT.2100-2, table 4: from the perceptual quantiser to the light of the scene by its reference OOTF."""
+    """Transfer curve of ITU-R BT.2100-2, table 4: from the PQ signal to the scene's light, by the reference OOTF."""
     m1, m2, c1, c2, c3 = 2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
     root = level ** (1.0 / m2)
     display_cd_m2 = 10_000.0 * (np.maximum(root - c1, 0.0) / (c2 - c3 * root)) ** (1.0 / m1)
@@ -164,7 +169,7 @@ CURVES: dict[str, Callable[[Floats], Floats]] = {
 
 @cache
 def standard_response(name: str) -> CameraResponse:
-    """One of the curves of the standards: linear, srgb, bt709, or one of high dynamic range, hlg or pq."""
+    """Return a standard response by its name: linear, srgb, bt709, or (high dynamic range) hlg or pq."""
     if name not in CURVES:
         raise CalibrationError(f"A standard camera response must be one of {', '.join(CURVES)}, but is {name}.")
     level = np.linspace(0.0, 1.0, 4097)

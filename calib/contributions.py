@@ -15,19 +15,19 @@ Floats = NDArray[np.float64]
 
 
 def edge_noise_mm(u_random_px: Floats, px_per_mm: float) -> Floats:
-    """Noise of the two edges in one frame; the only part that differs from frame to frame."""
+    """Contribution of the noise of the two edges in one frame, the only one that differs from frame to frame."""
     return np.asarray(u_random_px / px_per_mm)
 
 
 def estimator_mm(limits: Limits, px_per_mm: float, count: int) -> Floats:
-    """Phase error of the edge fit, for two independent edges."""
+    """Contribution of the edge fit's phase error, for two independent edges."""
     return np.full(count, sqrt(2.0) * rectangular(limits.estimator_px) / px_per_mm)
 
 
 def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, covariance: Floats) -> Floats:
-    """Contribution of a cause that moves scale and edge bias, from the covariance of (px_per_mm, edge_bias_px).
+    """Contribution of a cause that changes scale and edge bias, from the covariance of (px_per_mm, edge_bias_px).
 
-    Called once for each cause: the reference's size, the reference's edges, and the edge bias where no reference
+    It is called once for each cause: the reference's size, the reference's edges, and the edge bias if no reference
     determines it.
     """
     variance = (
@@ -37,31 +37,31 @@ def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, cova
 
 
 def plane_mm(value_mm: Floats, limits: Limits) -> Floats:
-    """Gripper nearer to or farther from the camera than the reference: dg / g = dz / Z."""
+    """Contribution of a gripper plane nearer to the camera, or farther, than the reference: dg / g = dz / Z."""
     return np.asarray(np.abs(value_mm) * rectangular(limits.plane_mm) / limits.camera_distance_mm)
 
 
 def foreshortening_mm(value_mm: Floats, limits: Limits) -> Floats:
-    """Gripper seen obliquely: a distance shrinks by 1 - cos(tilt)."""
+    """Contribution of oblique view: a distance is shortened by the factor cos(tilt)."""
     return np.asarray(np.abs(value_mm) * rectangular(1.0 - cos(limits.tilt_rad)))
 
 
 def keystone_mm(change_mm_per_rad: Floats, limits: Limits) -> Floats:
-    """Perspective of a tilted plane, one side of which is nearer; two axes, `change_mm_per_rad` shape (2, n)."""
+    """Contribution of the perspective of a tilted plane; `change_mm_per_rad` has shape (2, n), one row per axis."""
     return np.asarray(np.hypot(change_mm_per_rad[0], change_mm_per_rad[1]) * rectangular(limits.tilt_rad))
 
 
 def lens_mm(change_mm_per_unit: Floats, limits: Limits) -> Floats:
-    """Residual distortion: its change of the distance minus its change of the scale; per unit of distortion."""
+    """Contribution of residual lens distortion, from the change per unit of distortion of distance minus scale."""
     return np.asarray(np.abs(change_mm_per_unit) * rectangular(limits.lens_relative))
 
 
 def lens_fit_mm(change_px: Floats, covariance: Floats, px_per_mm: float) -> Floats:
-    """Uncertainty of a calibrated lens: `change_px`, shape (p, n), per unit of each parameter, and their covariance."""
+    """Contribution of a calibrated lens, from `change_px` per unit of each parameter, shape (p, n), and covariance."""
     variance = np.einsum("in,ij,jn->n", change_px, covariance, change_px)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)) / px_per_mm)
 
 
 def temperature_mm(value_mm: Floats, limits: Limits) -> Floats:
-    """Thermal expansion of the reference against the temperature of its certificate."""
+    """Contribution of thermal expansion of the reference relative to the temperature of its certificate."""
     return np.asarray(np.abs(value_mm) * limits.expansion_per_k * rectangular(limits.temperature_k))

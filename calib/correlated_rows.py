@@ -1,4 +1,4 @@
-"""Correlation of residuals in rows: number of neighbouring rows that count as one independent row."""
+"""Correlation of residuals along rows: the number of neighbouring rows that count as one independent row."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,13 @@ def rows_in_one(residual: NDArray[np.float64]) -> float:
     """Return the integrated correlation time of residuals in rows, at least 1.
 
     The variance of a mean over n rows is the variance of one row times this number, divided by n. The sum over lags
-    ends where the sum of a pair of correlations becomes negative (Geyer, Statistical Science 7(4), 1992, 473-483,
-    initial positive sequence).
+    stops where the sum of two neighbouring correlations becomes negative (Geyer's initial positive sequence,
+    Statistical Science 7(4), 1992, 473-483).
 
     Parameters
     ----------
     residual : ndarray, shape (n,)
-        What a straight line leaves, row by row.
+        Residuals about a straight line, row by row.
     """
     count = residual.size
     power = float(residual @ residual)

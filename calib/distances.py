@@ -15,9 +15,9 @@ class Distances:
     value_mm : ndarray of float, shape (n,)
         The distances.
     u_mm : ndarray of float, shape (n,), or None
-        Standard uncertainties with everything in the scale's budget; None where the scale has no uncertainty stated.
+        Standard uncertainties that include the scale's whole budget; None if the scale has no stated uncertainty.
     u_random_mm : ndarray of float, shape (n,)
-        Their random part alone, from frame to frame.
+        Random standard uncertainties, due to effects that vary from frame to frame.
     """
 
     value_mm: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Pairs of parallel straight edges in a picture: every candidate for the width of a bar or a slot."""
+"""Pairs of parallel straight edges in a picture: all candidates for the width of a bar or a slot."""
 
 from collections.abc import Sequence
 
@@ -36,12 +36,12 @@ def find_edge_pairs(grey: Grey, region: tuple[int, int, int, int] | None = None)
     grey : ndarray, shape (height, width)
         Original grey levels.
     region : tuple of int, optional
-        x, y, width and height of the part to look in.
+        x, y, width and height of the part of the picture to be searched.
 
     Returns
     -------
     list of ParallelEdges
-        In coordinates of the full picture.
+        Pairs of edges, in coordinates of the full picture.
     """
     part, x, y = _part(grey, region)
     levels = part.astype(np.float64)
@@ -53,7 +53,7 @@ def find_edge_pairs(grey: Grey, region: tuple[int, int, int, int] | None = None)
 
 
 def straight_edges_in_view(grey: Grey, region: tuple[int, int, int, int] | None) -> int:
-    """Count straight edges, to report what is missing where there is no pair."""
+    """Count straight edges, to report what is missing if no pair was found."""
     return len(find_straight_edges(_part(grey, region)[0], FINDING_SIDES_PX[0]))
 
 
@@ -65,7 +65,7 @@ def has_square_end(grey: Grey, region: tuple[int, int, int, int] | None, pair: P
     grey, region
         As for `find_edge_pairs`.
     pair : ParallelEdges
-        Two edges found there.
+        A pair of edges found in this picture.
     """
     part, x, y = _part(grey, region)
     across = (pair.points_px[1] - pair.points_px[0]) / pair.width_px
@@ -78,7 +78,7 @@ def has_square_end(grey: Grey, region: tuple[int, int, int, int] | None, pair: P
 
 
 def _part(grey: Grey, region: tuple[int, int, int, int] | None) -> tuple[Grey, int, int]:
-    """Return the region of a picture, and its origin."""
+    """Return the region of a picture, and the region's origin."""
     x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
     if x < 0 or y < 0 or width < 1 or height < 1 or x + width > grey.shape[1] or y + height > grey.shape[0]:
         raise CalibrationError(

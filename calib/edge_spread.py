@@ -1,8 +1,9 @@
-"""The edge spread function: position of a blurred step in every row of pixels across it.
+"""Fit of the edge spread function: position of a blurred step in every row of pixels across an edge.
 
-Each row contains one edge: a step between two levels of its own, blurred by a Gaussian and integrated over the pixel.
-All rows share one blur. The position is the maximum-likelihood estimate under white noise, so that its variance is the
-Cramer-Rao bound (Kakarala & Hero, IEEE PAMI 14(7), 1992, 769-773). Grey levels are never resampled or smoothed.
+Each row contains one edge: a step between two levels specific to the row, blurred by a Gaussian and integrated over the
+pixel. The blur is the same for all rows. The position is the maximum-likelihood estimate under white noise, so that its
+variance is the Cramer-Rao bound (Kakarala & Hero, IEEE PAMI 14(7), 1992, 769-773). Grey levels are never resampled or
+smoothed.
 """
 
 from dataclasses import dataclass
@@ -35,14 +36,14 @@ CLIPPED_ASYMMETRY = 0.08
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseEdge:
-    """A straight edge known to a pixel or two: x = at_px + slope * row.
+    """A straight edge known to one or two pixels: x = at_px + slope * row.
 
     Parameters
     ----------
     at_px : float
-        Column at row 0.
+        Column of the edge at row 0.
     slope : float
-        Columns per row; at most 1.
+        Columns per row; at most 1 in absolute value.
     rising : bool
         Whether the level rises with x.
     """
@@ -58,26 +59,26 @@ class CoarseEdge:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeRows:
-    """One edge, row by row; all arrays have length n.
+    """Positions of one edge, row by row; all arrays have length n.
 
     Parameters
     ----------
     rows : ndarray of int
-        Rows of pixels.
+        Row numbers.
     x_px : ndarray
-        Where the edge passes through the middle of the row.
+        Column at which the edge crosses the middle of the row.
     u_x_px : ndarray
-        Standard uncertainty from the noise that all rows show together.
+        Standard uncertainty from the noise common to all rows.
     contrast : ndarray
-        Step in grey levels; positive where it goes the way it should.
+        Step in grey levels; positive if it has the expected sign.
     unexplained : ndarray
-        Root mean square of what the model leaves (grey levels).
+        Root-mean-square residual of the fit (grey levels).
     sigma_px : float
-        Standard deviation of the spread across the edge, without the pixel's own width along the row.
+        Standard deviation of the blur across the edge, without the pixel's own width along the row.
     blur_px : float
-        Standard deviation of the spread across the edge, the pixel's own width included.
+        Standard deviation of the blur across the edge, the pixel's own width included.
     clipped : bool
-        Whether the sensor's full scale (or zero) cuts the flank off.
+        Whether the sensor's full scale (or zero) clips the flank.
     """
 
     rows: Ints
@@ -98,13 +99,13 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
     grey : ndarray, shape (height, width)
         Original grey levels.
     rows : ndarray of int, shape (n,)
-        Rows to use; those in which the edge is too near the border are left out.
+        Rows to use; rows in which the edge is too near the border are left out.
     coarse : CoarseEdge
-        Where the edge is to within two pixels.
+        Position of the edge, accurate to two pixels.
     room_px : float
-        How far the fit may reach before it meets something else.
+        Largest half width of the window that contains no other structure.
     known : EdgeRows, optional
-        The same edge in other rows: its blur is taken over, so that rows without an edge do no harm.
+        Result for the same edge in other rows: its blur is used, so that rows without an edge do not affect the blur.
 
     Raises
     ------

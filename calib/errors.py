@@ -1,4 +1,4 @@
-"""Error for users: one sentence with the subject, what it must be, what it is, and what to do."""
+"""Error for users: one sentence with the subject, the requirement, the actual value, and what to do."""
 
 
 class CalibrationError(ValueError):

@@ -1,4 +1,4 @@
-"""Gauge repeatability and reproducibility: the share of a tolerance that the measurement itself uses up."""
+"""Gauge repeatability and reproducibility: the share of a tolerance that the measurement's variation takes up."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,28 +18,29 @@ SPREAD = 6.0
 GOOD_PERCENT, DOUBTFUL_PERCENT = 10.0, 30.0
 
 MOVING = 3.0
-"""Spread of the readings of one part over that from reading to reading, from which on they do not repeat one value. It
-is 1 +- 1 / sqrt(n) for independent readings (von Neumann 1941, doi:10.1214/aoms/1177731677) and 0.41 n for n readings
-of a steady motion; a drift that triples the noise says as little about the gauge."""
+"""Ratio of the standard deviation of one part's readings to that estimated from successive differences, above which the
+readings are not repeats of one value. The ratio is 1 +- 1 / sqrt(n) for independent readings (von Neumann 1941,
+doi:10.1214/aoms/1177731677) and 0.41 n for n readings of a steady motion; a drift that triples the noise makes a gauge
+study equally meaningless."""
 FEWEST_TO_TELL = 12
-"""Of fewer readings neither is known well enough."""
+"""Least number of readings for this test; with fewer, neither of the two standard deviations is known well enough."""
 
 
 @dataclass(frozen=True, slots=True)
 class GaugeStudy:
-    """Standard deviations of a gauge, by analysis of variance.
+    """Standard deviations of a gauge, from an analysis of variance.
 
     Parameters
     ----------
     repeatability_mm : float
-        Equipment variation: the same part again, in the same recording.
+        Equipment variation: repeated readings of the same part in the same recording.
     reproducibility_mm : float
-        Appraiser variation: the same part in another recording (set up again, by somebody else, on another day), parts
-        and recordings crossed included.
+        Appraiser variation: the same part in another recording (set up again, by somebody else, on another day),
+        including the interaction of parts and recordings.
     part_mm : float
-        Variation of the parts themselves.
+        Variation between the parts.
     parts, recordings, trials : int
-        How many of each; trials are those of each part in each recording.
+        Number of parts, of recordings, and of trials of each part in each recording.
     """
 
     repeatability_mm: float
@@ -60,7 +61,7 @@ class GaugeStudy:
         Raises
         ------
         CalibrationError
-            The tolerance is not positive.
+            If the tolerance is not positive.
         """
         if not (isfinite(tolerance_mm) and tolerance_mm > 0.0):
             raise CalibrationError(f"The tolerance must be positive, but is {tolerance_mm} mm: give its whole width.")
@@ -68,7 +69,7 @@ class GaugeStudy:
 
     @property
     def percent_of_total(self) -> float | None:
-        """%GRR of the total variation; None where all parts are the same part, without other variation."""
+        """%GRR of the total variation; None if only one part was measured and there is no other variation."""
         total = hypot(self.grr_mm, self.part_mm)
         return 100.0 * self.grr_mm / total if self.parts > 1 and total > 0.0 else None
 
@@ -79,9 +80,9 @@ def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
     Parameters
     ----------
     readings_mm : sequence of float
-        In the order in which they were taken.
+        Readings in the order in which they were taken.
     name : str
-        What they are of, for the sentence.
+        Name of the part, for the error message.
 
     Raises
     ------
@@ -104,13 +105,14 @@ def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
 def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
     """Analyse a crossed study with random parts and recordings.
 
-    AIAG, Measurement Systems Analysis, 4th ed. 2010, appendix A (analysis of variance): components from mean squares, a
-    negative one set to zero; an interaction that is not significant is pooled with repeatability.
+    The method is that of AIAG, Measurement Systems Analysis, 4th ed. 2010, appendix A (analysis of variance): variance
+    components follow from mean squares, a negative component is set to zero, and an interaction that is not significant
+    is pooled with repeatability.
 
     Parameters
     ----------
     readings_mm : nested sequence, shape (recordings, parts, trials)
-        Each cell the same number of trials, at least two in all.
+        Readings with the same number of trials in each cell, and at least two in all.
 
     Raises
     ------
@@ -156,7 +158,7 @@ def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
 
 
 def verdict(percent: float) -> str:
-    """Meaning of %GRR, in the manual's words."""
+    """Meaning of a %GRR, in the words of the AIAG manual."""
     if percent < GOOD_PERCENT:
         return "acceptable"
     return "may be acceptable for some uses" if percent <= DOUBTFUL_PERCENT else "not acceptable"

@@ -1,4 +1,4 @@
-"""Bars and slots of known size: choice of the pair of edges in each picture that was certified."""
+"""Bars and slots of known size: selection, in each picture, of the pair of edges whose distance was certified."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class KnownSize:
     Parameters
     ----------
     name : str
-        The picture's name, for sentences.
+        Name of the picture in error messages.
     kind : str
         "bar" (an object) or "slot" (a gap between objects).
     size_mm, u_size_mm : float
@@ -73,16 +73,16 @@ def find_widths(
     Parameters
     ----------
     pictures : sequence of KnownSize
-        At least one; all of one scene, so of one scale.
+        At least one picture; all have the same scale.
     region : tuple of int, optional
-        x, y, width and height of the part of every picture to look in.
+        x, y, width and height of the part of every picture to be searched.
     px_per_mm : float, optional
-        The scale, where it is known already.
+        The scale, if already known.
 
     Raises
     ------
     CalibrationError
-        No object, several, a clipped flank, or sizes that contradict each other.
+        If there is no object, several objects, a clipped flank, or sizes that contradict each other.
     """
     choices = [_choices(picture, find_edge_pairs(picture.grey, region), region) for picture in pictures]
     widths = _settled(pictures, choices) if px_per_mm is None else _expected(pictures, choices, px_per_mm)
@@ -100,9 +100,9 @@ def find_widths(
 def _choices(
     picture: KnownSize, pairs: Sequence[ParallelEdges], region: tuple[int, int, int, int] | None
 ) -> list[ParallelEdges]:
-    """List the possible widths of the object: one, or two where a rectangle is completely visible.
+    """List the possible widths of the object: one, or two for a rectangle that is completely visible.
 
-    Longer edges first.
+    The pair with the longer edges comes first.
     """
     where = "the region" if region is not None else "the picture"
     if not pairs:
@@ -136,7 +136,7 @@ def _choices(
 
 
 def _of_kind(kind: str, pairs: Sequence[ParallelEdges]) -> list[ParallelEdges]:
-    """Bars and slots among pairs of edges: an outermost pair is a bar, a pair between two bars is a slot."""
+    """Bars or slots among pairs of edges: an outermost pair is a bar, a pair between two bars is a slot."""
     if len({pair.light for pair in pairs}) == 1:
         return list(pairs)
     main = pairs[0]
@@ -155,7 +155,7 @@ def _one_object(pair: ParallelEdges, other: ParallelEdges) -> bool:
 
 
 def _refuse_cut(picture: KnownSize, width: ParallelEdges, region: tuple[int, int, int, int] | None) -> None:
-    """Refuse a rectangle with three visible sides: the fourth, beyond the border, may belong to the certified width."""
+    """Refuse a rectangle with three visible sides, because the certified width may include the fourth."""
     if width.length_px < CLEARLY_LONGER * width.width_px and has_square_end(picture.grey, region, width):
         raise CalibrationError(
             f"{picture.name} shows three sides of a rectangle, and the border may cut off an edge of the "
@@ -180,7 +180,7 @@ def _expected(
 
 
 def _settled(pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelEdges]]) -> list[ParallelEdges]:
-    """Choose the widths that agree on the scale."""
+    """Choose the widths that agree on one scale."""
     sizes = np.array([picture.size_mm for picture in pictures])
     longer_edges = [found[0] for found in choices]
     combinations = [list(each) for each in product(*choices)] if len(choices) <= MOST_COMBINED else [longer_edges]
@@ -212,7 +212,7 @@ def _disagreement(widths: Sequence[ParallelEdges], sizes: NDArray[np.float64]) -
 def _refuse_unit(
     pictures: Sequence[KnownSize], combinations: Sequence[Sequence[ParallelEdges]], sizes: NDArray[np.float64]
 ) -> None:
-    """Refuse sizes where changing the unit of a single one would make all pictures agree."""
+    """Refuse sizes if changing the unit of a single one would make all pictures agree."""
     for index, picture in enumerate(pictures):
         for factor, words in WRONG_UNITS.items():
             other = sizes.copy()

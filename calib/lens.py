@@ -1,4 +1,4 @@
-"""Lens distortion: positions of pixels if straight lines stayed straight."""
+"""Lens distortion: conversion of pixel positions to those of a camera that images straight lines as straight."""
 
 from dataclasses import dataclass, replace
 
@@ -13,14 +13,14 @@ UNDISTORT_STEPS = 25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lens:
-    """Radial and tangential distortion after Brown (Photogrammetric Engineering 37(8), 1971, 855-866).
+    """Radial and tangential distortion by the model of Brown (Photogrammetric Engineering 37(8), 1971, 855-866).
 
     Parameters
     ----------
     parameters : ndarray, shape (9,)
         Focal lengths f_x, f_y and principal point c_x, c_y in pixels, then k1, k2, p1, p2, k3.
     covariance : ndarray, shape (9, 9)
-        Covariance of `parameters`; zero rows for a parameter that was held.
+        Covariance of `parameters`; zero rows for parameters that were held fixed.
     """
 
     parameters: Floats
@@ -28,7 +28,7 @@ class Lens:
 
     @property
     def camera_matrix(self) -> Floats:
-        """The pinhole camera's matrix, shape (3, 3), pixels."""
+        """Camera matrix of the pinhole camera, shape (3, 3), pixels."""
         f_x, f_y, c_x, c_y = self.parameters[:4]
         return np.array([[f_x, 0.0, c_x], [0.0, f_y, c_y], [0.0, 0.0, 1.0]])
 
@@ -43,7 +43,7 @@ class Lens:
         Returns
         -------
         ndarray, shape (..., 2)
-            Pixels.
+            Positions without distortion, in pixels.
         """
         f_x, f_y, c_x, c_y, k1, k2, p1, p2, k3 = self.parameters
         seen_x, seen_y = (points_px[..., 0] - c_x) / f_x, (points_px[..., 1] - c_y) / f_y
@@ -67,7 +67,7 @@ class Lens:
         return np.stack([seen_x * f_x + c_x, seen_y * f_y + c_y], axis=-1)
 
     def moved(self, index: int, step: float) -> "Lens":
-        """Return the same lens with one parameter moved, for propagating `covariance`."""
+        """Return the same lens with one parameter changed, for the propagation of `covariance`."""
         parameters = self.parameters.copy()
         parameters[index] += step
         return replace(self, parameters=parameters)

@@ -21,18 +21,18 @@ WORTH_A_PARAMETER = 10.8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensFit:
-    """A lens, with the residuals of its fit.
+    """A fitted lens, with the residuals of the fit.
 
     Parameters
     ----------
     lens : Lens
         The distortion, with its covariance.
     u_parameters : ndarray, shape (9,)
-        Standard deviations by OpenCV's extended calibration, for comparison with other tools.
+        Standard deviations of the parameters by OpenCV's extended calibration, for comparison with other tools.
     rms_px : float
-        Root mean square of the distances between seen and predicted corners (OpenCV's reprojection error).
+        Root mean square of the distances between measured and predicted corners (OpenCV's reprojection error).
     residual_px : tuple of ndarray, each of shape (n, 2)
-        Seen less predicted corners, picture by picture.
+        Measured minus predicted positions of the corners, picture by picture.
     """
 
     lens: Lens
@@ -47,9 +47,9 @@ def lens_from_boards(pictures: Sequence[BoardCorners], frame_size_px: tuple[int,
     Parameters
     ----------
     pictures : sequence of BoardCorners
-        At least three, of boards held at different tilts.
+        At least three pictures of boards at different tilts.
     frame_size_px : tuple of int
-        Width and height.
+        Width and height of the pictures.
     """
     if len(pictures) < 3:
         raise CalibrationError(
@@ -85,7 +85,7 @@ def _covariance(
     rotations: Floats,
     translations: Floats,
 ) -> tuple[Floats, tuple[Floats, ...]]:
-    """Covariance of the lens with all poses free, because OpenCV gives only standard deviations."""
+    """Covariance of the lens parameters with all poses free, because OpenCV returns only standard deviations."""
     normal, count, squares = np.zeros((LENS, LENS)), 0, 0.0
     residuals = []
     held = coefficients.ravel()[4] == 0.0
@@ -114,7 +114,8 @@ def straightness_px(corners: BoardCorners, lens: Lens | None) -> Floats:
     Returns
     -------
     ndarray, shape (n,)
-        Pixels; each corner once for its row and once for its column, lines of fewer than three corners left out.
+        Distances in pixels; each corner is counted once for its row and once for its column; lines with fewer than
+        three corners are left out.
     """
     points = corners.points_px if lens is None else lens.undistort(corners.points_px)
     away = []

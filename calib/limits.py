@@ -1,4 +1,4 @@
-"""Limits of the bench stated by the user: the range of each imperfection."""
+"""Limits of the set-up's imperfections, as stated by the user."""
 
 from dataclasses import dataclass, fields
 from math import radians, sqrt
@@ -8,29 +8,32 @@ from calib.errors import CalibrationError
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Half-widths of the imperfections that no picture shows; the true value lies within +- the limit.
+    """Half-widths of imperfections that no picture shows: each true value lies within +- the limit.
 
-    A limit a stands for the standard uncertainty a / sqrt(3) of a rectangular distribution (JCGM 100:2008, 4.3.7). The
-    defaults are those of an ordinary bench: a camera at 100 mm distance, perpendicular, set up with care.
+    A limit a corresponds to the standard uncertainty a / sqrt(3) of a rectangular distribution (JCGM 100:2008, 4.3.7).
+    The defaults are those of an ordinary laboratory set-up: a camera at 100 mm distance, perpendicular to the scene,
+    set up with care.
 
     Parameters
     ----------
     estimator_px : float
-        Phase bias of the edge finder, each edge (pixels).
+        Phase error of the edge fit, for each edge (pixels).
     edge_bias_px : float
-        Blooming and threshold of both edges together, where the references cannot tell (pixels): 0.3 px an edge.
+        Edge bias of both edges together (blooming and threshold), if the references do not determine it (pixels): 0.3
+        px per edge.
     plane_mm : float
         Distance of the gripper from the plane of the reference.
     camera_distance_mm : float
-        Distance of the camera's centre of projection (about the lens's front) from that plane; not a limit but a value.
+        Distance of the camera's centre of projection (near the front of the lens) from the plane of the reference; a
+        value, not a limit.
     tilt_deg : float
-        Tilt of the plane of the gripper against the picture's, about either axis.
+        Tilt of the gripper's plane relative to the picture's plane, about either axis.
     lens_relative : float
-        Distortion that no lens calibration takes off, as part of the radius at the picture's corner.
+        Distortion that is not corrected by a lens calibration, as a share of the radius at the picture's corner.
     temperature_k : float
-        Difference of temperature between the reference's certificate and the day.
+        Difference between the temperature of the reference's certificate and that during the calibration.
     expansion_per_k : float
-        Thermal expansion of the reference (steel by default); not a limit but a value.
+        Thermal expansion coefficient of the reference (steel by default); a value, not a limit.
     """
 
     estimator_px: float = 0.02

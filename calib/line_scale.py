@@ -1,8 +1,8 @@
-"""Lines of a line scale (stage micrometer): position, width and uncertainty of each.
+"""Lines of a line scale (stage micrometer): position, width and uncertainty of each line.
 
-A line is a stripe with two edges: c + A (step(t - x1) - step(t - x2)), each step spread by one Gaussian. Blooming and
-the camera's response move its two edges in opposite directions and leave its centre in place, so that a pitch needs no
-edge bias. The width is changed, and shows the edge bias where the line's own width is known.
+A line is a stripe with two edges: c + A (step(t - x1) - step(t - x2)), each step blurred by the same Gaussian. Blooming
+and the camera's response move the two edges in opposite directions and leave the centre of the line in place, so that
+the pitch does not depend on the edge bias. The width of a line does; if its true width is known, the edge bias follows.
 """
 
 from dataclasses import dataclass
@@ -40,30 +40,30 @@ LEAST_U_PX = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaleLines:
-    """Lines in a picture; arrays of shape (n,).
+    """Lines measured in a picture; arrays of shape (n,).
 
     Parameters
     ----------
     middle_px : ndarray of float, shape (n, 2)
-        Middle of each line across it, on one straight line across all of them: x, y.
+        Centre of each line in x and y; all centres are on one straight line perpendicular to the lines.
     across : ndarray of float, shape (2,)
         Unit vector across the lines.
     at_px : ndarray of float
-        Place of each line along `across`, from the first.
+        Position of each line along `across`, from the first line.
     u_at_px : ndarray of float
-        Standard uncertainty, from the scatter of the line's pieces.
+        Standard uncertainty of the position, from the scatter of the pieces of the line.
     rising_px, falling_px : ndarray of float
-        Places of the edges at which the level rises and falls along `across`; like `at_px`.
+        Positions, like `at_px`, of the edges at which the level rises and falls along `across`.
     width_px : ndarray of float or None
-        Width of each line; None where the lines are too narrow against the blur.
+        Width of each line; None if the lines are too narrow compared with the blur.
     is_dark : bool
-        Whether the lines are darker than what lies between them.
+        Whether the lines are darker than the spaces between them.
     blur_px : float
-        Spread of their edges (standard deviation).
+        Blur of the edges (standard deviation).
     rows : (int, int)
-        First and last row (column, where the lines lie along the rows) that was used.
+        First and last row that was used (columns, for lines parallel to the rows).
     is_clipped : bool
-        Whether lines or ground stand at an end of the scale: their widths are then too large or too small.
+        Whether lines or background are at an end of the scale: the widths are then too large or too small.
     """
 
     middle_px: Floats
@@ -85,9 +85,9 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
     Parameters
     ----------
     grey : ndarray, shape (height, width)
-        Light of the picture.
+        Picture with levels proportional to light.
     region : tuple of int, optional
-        x, y, width and height of the part to look in.
+        x, y, width and height of the part of the picture to be searched.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
 def _direction(part: Floats) -> tuple[float, bool]:
     """Slope of the lines in columns per row (structure tensor: Bigun & Granlund, ICCV 1987).
 
-    Whether the lines are horizontal.
+    Also return whether the lines are horizontal; the slope is then that of the transposed picture.
     """
     soft = cv2.GaussianBlur(part, (0, 0), 1.0)
     gx, gy = cv2.Sobel(soft, cv2.CV_64F, 1, 0), cv2.Sobel(soft, cv2.CV_64F, 0, 1)
@@ -164,9 +164,9 @@ def _refined(upright: Floats, slope: float) -> float:
 
 
 def _profile(upright: Floats, slope: float, rows: tuple[int, int]) -> Floats:
-    """Mean level along the lines, at whole columns of the middle row.
+    """Mean level along the lines, as a function of the column in the middle row.
 
-    Only the picture's own columns where it is covered.
+    Columns for which less than half of the rows lie inside the picture are left out.
     """
     used = np.arange(rows[0], rows[1] + 1)
     offset = slope * (used - 0.5 * (rows[0] + rows[1]))
@@ -185,7 +185,7 @@ def _profile(upright: Floats, slope: float, rows: tuple[int, int]) -> Floats:
 
 
 def _rows(upright: Floats, slope: float) -> tuple[int, int]:
-    """Longest run of rows in which the lines have nearly their best contrast."""
+    """Longest run of rows in which the lines have nearly their largest contrast."""
     middle = 0.5 * (upright.shape[0] - 1)
     offset = np.rint(slope * (np.arange(upright.shape[0]) - middle)).astype(int)
     shifted = np.array([np.roll(row, -by) for row, by in zip(upright, offset, strict=True)])
@@ -211,7 +211,7 @@ def _rows(upright: Floats, slope: float) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Coarse:
-    """Lines located to one pixel, along the middle row."""
+    """Lines located to the nearest pixel, along the middle row."""
 
     middle: Floats
     width: float
@@ -263,7 +263,7 @@ def _coarse(upright: Floats, slope: float, rows: tuple[int, int]) -> _Coarse:
 def _measured(
     upright: Floats, slope: float, rows: tuple[int, int], coarse: _Coarse
 ) -> tuple[Floats, Floats, Floats, float, Floats]:
-    """Position along the middle row, residual slope, width, common blur, and uncertainty of the positions."""
+    """Position in the middle row, residual slope, width, common blur, and uncertainty of the positions of the lines."""
     row = 0.5 * (rows[0] + rows[1])
     whole = np.arange(rows[0], rows[1] + 1)
     # The spread of the optics is one for all lines: some of them tell it.
@@ -300,7 +300,7 @@ def _fit(
     coarse: _Coarse,
     blur: float | None,
 ) -> tuple[float, float, float]:
-    """Centre at the middle row, width and blur of one line (or a part of it), by least squares on the levels."""
+    """Fit centre (in the middle row), width and blur of one line, or of a part of it, to the levels."""
     reach = int(np.ceil(0.5 * coarse.pitch))
     line = middle + slope * (rows - row)
     columns = np.rint(line).astype(int)[:, None] + np.arange(-reach, reach + 1)
@@ -327,9 +327,9 @@ def _fit(
 
 
 def _binned(t: Floats, level: Floats) -> tuple[Floats, Floats, Floats]:
-    """Means over bins that are narrow compared with any edge, each at the mean position of its pixels.
+    """Means of positions and levels in narrow bins, and the square root of the number of pixels in each bin.
 
-    Root of their number.
+    The bins are narrow compared with the blur of any edge.
     """
     place = np.floor((t - t.min()) / BIN_PX).astype(int)
     count = np.bincount(place)

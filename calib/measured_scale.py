@@ -1,4 +1,4 @@
-"""A scale measured on a reference: the interface of `calib.calibration.BareScale`, with uncertainty."""
+"""A scale measured on a reference object: the same interface as `calib.calibration.BareScale`, with uncertainty."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,11 +26,11 @@ class Reference:
     Parameters
     ----------
     what : str
-        Bar, slot, chessboard or ChArUco board, and the picture's name.
+        Kind of object (bar, slot, chessboard or ChArUco board), and the picture's name.
     size_mm, u_size_mm : float
         Certified size and its standard uncertainty.
     certificate, date : str
-        Name of the certificate and its date; empty where not stated.
+        Name and date of the certificate; empty if not stated.
     """
 
     what: str
@@ -47,11 +47,11 @@ class ScalePart:
     Parameters
     ----------
     source : str
-        The cause.
+        Name of the cause.
     covariance : ndarray, shape (2, 2)
         Covariance of (px_per_mm, edge_bias_px) from this cause alone.
     supplied : str
-        Where the figure comes from.
+        Origin of the value.
     """
 
     source: str
@@ -61,14 +61,14 @@ class ScalePart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """Derivatives of the fitted (px_per_mm, edge_bias_px) by the imperfections through which the reference was seen.
+    """Derivatives of the fitted (px_per_mm, edge_bias_px) by lens distortion and tilt during the calibration.
 
     Parameters
     ----------
     lens : ndarray, shape (2,)
-        Per unit of `calib.picture_shift.lens_shift_px`.
+        Derivatives per unit of `calib.picture_shift.lens_shift_px`.
     tilt : ndarray, shape (2, 2)
-        Per radian about each axis; first index the axis.
+        Derivatives per radian about each axis; the first index is the axis.
     """
 
     lens: Floats = field(default_factory=lambda: np.zeros(2))
@@ -77,7 +77,9 @@ class Response:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """Conversion of a flat scene's pixels to millimetres, with uncertainty: gap_mm = (gap_px + b) / s for a light gap.
+    """Conversion of a flat scene from pixels to millimetres, with uncertainty.
+
+    For a light gap, gap_mm = (gap_px + b) / s.
 
     Parameters
     ----------
@@ -86,32 +88,32 @@ class Calibration:
     edge_bias_px : float
         Edge bias b of a light gap between dark edges; the sign reverses for a dark gap.
     parts : tuple of ScalePart
-        The covariance of (s, b), cause by cause.
+        Contributions of the causes to the covariance of (s, b).
     frame_size_px : tuple of int
-        Width and height of the pictures that it holds for.
+        Width and height of the pictures for which the calibration is valid.
     limits : Limits
-        What the user states about the bench.
+        Limits of the set-up's imperfections.
     stated : frozenset of str
-        Names of the limits that the user stated; the others are defaults.
+        Names of the limits stated by the user; the others are defaults.
     response : Response
-        How scale and bias moved with lens and tilt.
+        Derivatives of scale and edge bias by lens distortion and tilt.
     lens : Lens or None
-        Distortion to take off.
+        Lens distortion to be corrected.
     plane : Plane or None
-        Perspective to take off.
+        Perspective to be corrected.
     references : tuple of Reference
-        What it was made from.
+        Reference objects of the calibration.
     camera : mapping of str to str
-        The camera's settings, where known.
+        Settings of the camera, if known.
     made_at, software : str
-        When (ISO 8601) and by what.
+        Time (ISO 8601) and software of the calibration.
     camera_response : CameraResponse or None
-        Which light the levels of its pictures were taken for; None where it does not say.
+        Camera response assumed for the calibration's pictures; None if not stated.
     response_known : bool
-        Whether that was stated or measured, and not merely assumed.
+        Whether that response was stated or measured, rather than assumed.
     response_shift_px : float or None
-        How much wider a light gap between its edges is than under the other standard response; None where it does not
-        say.
+        Width of a light gap between the calibration's edges minus its width under the other standard response; None if
+        not stated.
     """
 
     px_per_mm: float
@@ -142,14 +144,14 @@ class Calibration:
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of (px_per_mm, edge_bias_px), shape (2, 2): the sum over the independent causes."""
+        """Covariance of (px_per_mm, edge_bias_px), shape (2, 2): the sum over independent causes."""
         return np.asarray(np.sum([part.covariance for part in self.parts] or [np.zeros((2, 2))], axis=0))
 
     @property
     def u_px_per_mm(self) -> float:
         """Standard uncertainty of the scale.
 
-        Plane, tilt and lens belong to the distance's budget and are not included.
+        The contributions of plane, tilt and lens are part of a distance's budget and are not included here.
         """
         return sqrt(float(self.covariance[0, 0]))
 
@@ -159,7 +161,7 @@ class Calibration:
         return sqrt(float(self.covariance[1, 1]))
 
     def how_stated(self, name: str, unit: str) -> str:
-        """Limit `name` in words, and whether the user stated it."""
+        """Limit `name` in words, with a note whether the user stated it."""
         return f"+-{getattr(self.limits, name):g} {unit} ({'stated' if name in self.stated else 'default'})"
 
     def flatten(self, points_px: Floats) -> Floats:
@@ -167,16 +169,16 @@ class Calibration:
         return self.flatten_by(self.lens, points_px)
 
     def flatten_by(self, lens: Lens | None, points_px: Floats) -> Floats:
-        """As `flatten`, with another lens."""
+        """Remove another lens's distortion, and this calibration's perspective, from points, as `flatten` does."""
         flat = np.asarray(points_px, dtype=np.float64)
         if lens is not None:
             flat = lens.undistort(flat)
         return flat if self.plane is None else self.plane.flatten(flat)
 
     def unflatten(self, points_px: Floats) -> Floats:
-        """Apply lens distortion and perspective to points of the flat plane, shape (..., 2).
+        """Apply lens distortion and perspective to points of the undistorted plane, shape (..., 2).
 
-        The inverse of `flatten`.
+        This is the inverse of `flatten`.
         """
         seen = np.asarray(points_px, dtype=np.float64)
         if self.plane is not None:
@@ -184,7 +186,7 @@ class Calibration:
         return seen if self.lens is None else self.lens.distort(seen)
 
     def budget(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Budget:
-        """Uncertainty budget of each distance; arguments as for `distances`."""
+        """Uncertainty budget of each distance; the arguments are those of `distances`."""
         return self._measured(points_px, u_random_px, light_gap)[1]
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
@@ -193,16 +195,16 @@ class Calibration:
         Parameters
         ----------
         points_px : ndarray, shape (n, 2, 2)
-            Frame, first or second point, x or y; as measured in the picture.
+            Coordinates measured in the picture, with the indices: distance, first or second point, x or y.
         u_random_px : ndarray, shape (n,)
-            Standard uncertainty of each distance from frame to frame.
+            Standard uncertainty of each distance due to effects that vary from frame to frame.
         light_gap : ndarray of bool, shape (n,)
-            True where the gap is light between dark edges.
+            True for a light gap between dark edges.
 
         Returns
         -------
         Distances
-            Values, standard uncertainties with the full budget, and their random part alone; millimetres.
+            Values, standard uncertainties with the full budget, and random standard uncertainties; millimetres.
         """
         value_mm, budget = self._measured(points_px, u_random_px, light_gap)
         return Distances(value_mm=value_mm, u_mm=budget.u_mm, u_random_mm=budget.u_random_mm)
@@ -214,7 +216,7 @@ class Calibration:
         light_gap: NDArray[np.bool_],
         frame_size_px: tuple[int, int],
     ) -> Floats:
-        """Positions of both points along an axis of the picture, from its centre (mm).
+        """Coordinates of both points of each distance along an axis of the picture, from the picture's centre (mm).
 
         Half of the edge bias is applied to each edge, so that the difference is the distance's component along the
         axis.
@@ -231,7 +233,7 @@ class Calibration:
         Returns
         -------
         ndarray, shape (n, 2)
-            Millimetres.
+            Coordinates in millimetres.
         """
         flat = self.flatten(points_px)
         apart = flat[:, 1] - flat[:, 0]
@@ -242,7 +244,7 @@ class Calibration:
         return np.asarray((flat[:, :, axis] - centre_px(frame_size_px)[axis] + outward_px) / self.px_per_mm)
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:
-        """Refuse frames of another size, which means another camera, binning or crop, and so another scale."""
+        """Refuse frames of another size, because another camera, binning or crop has another scale."""
         if (width_px, height_px) != self.frame_size_px:
             width, height = self.frame_size_px
             raise CalibrationError(
@@ -251,7 +253,7 @@ class Calibration:
             )
 
     def check_camera(self, settings: Mapping[str, str]) -> None:
-        """Refuse a camera whose settings, where both are known, differ from the calibration's."""
+        """Refuse a camera with settings that differ from the calibration's (where both are known)."""
         for name, value in settings.items():
             known = self.camera.get(name)
             if known is not None and known != value:

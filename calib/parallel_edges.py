@@ -1,4 +1,4 @@
-"""The width between two parallel straight edges, sub-pixel, with its uncertainty."""
+"""Width between two parallel straight edges, with sub-pixel accuracy and uncertainty."""
 
 from dataclasses import dataclass, replace
 from math import atan, cos, hypot, sin
@@ -32,27 +32,27 @@ class ParallelEdges:
     Parameters
     ----------
     width_px : float
-        Distance of the edges across them, half-way along the rows used.
+        Distance of the edges, perpendicular to them, at the middle of the rows used.
     u_width_px : float
-        Standard uncertainty from the rows' own scatter, correlation between rows included.
+        Standard uncertainty from the scatter of the rows, correlation between rows included.
     points_px : ndarray, shape (2, 2)
-        Where that width begins and ends: point, x or y.
+        End points of that width; indices: point, x or y.
     light : bool
-        True where it is light between the edges.
+        True if it is light between the edges.
     profiles : str
-        "rows" where the edges were measured in rows of pixels, "columns" where in columns.
+        "rows" for edges measured in rows of pixels, "columns" for edges measured in columns.
     first, last, count : int
-        First and last row (column) used, and how many on the edge with the fewer.
+        First and last row (column) used, and their number on the edge with fewer rows.
     taper, u_taper : float
         Change of the width per row (column), and its standard uncertainty.
     blur_px, contrast : float
-        Spread of the edges and their step in grey levels.
+        Blur of the edges, and their step in grey levels.
     clipped : bool
-        Whether the sensor's full scale cuts a flank off.
+        Whether the sensor's full scale clips a flank.
     edges_px : tuple of ndarray, each of shape (n, 2)
         Every measured point of the two edges.
     residuals_px : tuple of ndarray, each of shape (n,)
-        Their distances from the straight line, across it.
+        Distances of the measured points from the fitted line, perpendicular to it.
     """
 
     width_px: float
@@ -78,11 +78,11 @@ class ParallelEdges:
 
     @property
     def length_px(self) -> float:
-        """Length of the shorter edge that was used (pixels)."""
+        """Length of the shorter edge (pixels)."""
         return min(float(np.linalg.norm(edge[-1] - edge[0])) for edge in self.edges_px)
 
     def moved(self, x_px: int, y_px: int) -> "ParallelEdges":
-        """Convert the edges of a region to coordinates of the picture in which it begins at (x, y)."""
+        """Convert the edges from coordinates of a region that starts at (x, y) to those of the picture."""
         offset = np.array([x_px, y_px], dtype=np.float64)
         rows = y_px if self.profiles == "rows" else x_px
         return replace(
@@ -94,7 +94,7 @@ class ParallelEdges:
         )
 
     def words(self) -> str:
-        """Description of the pair and its position, for a user who has to choose."""
+        """Description of the pair and its position, for a user who has to choose between pairs."""
         x, y = self.middle_px
         return f"{self.width_px:.1f} px {'light' if self.light else 'dark'} at ({x:.0f}, {y:.0f})"
 
@@ -109,12 +109,12 @@ def measure_parallel_edges(grey: Floats, lines: tuple[Floats, Floats], light: bo
     lines : tuple of ndarray, each of shape (2, 2)
         Two points (x, y) on each edge.
     light : bool
-        Whether it is light between them.
+        Whether it is light between the edges.
 
     Raises
     ------
     CalibrationError
-        The edges are not straight, too short, or have no room.
+        If the edges are not straight, too short, or too near to other structures.
     """
     along = lines[0][1] - lines[0][0]
     if abs(along[0]) > abs(along[1]):
@@ -138,7 +138,7 @@ def measure_parallel_edges(grey: Floats, lines: tuple[Floats, Floats], light: bo
 
 
 def _gather(grey: Floats, coarse: CoarseEdge, line: Floats, room_px: float) -> EdgeRows:
-    """Rows in which the edge is visible, from the coarse line outwards as far as it stays straight."""
+    """Fit rows in which the edge is visible, outwards from the coarse line as far as the edge stays straight."""
     rows = np.arange(max(0, int(np.ceil(line[:, 1].min()))), min(grey.shape[0] - 1, int(line[:, 1].max())) + 1)
     # The first look leaves the ends out, where corners are; the second knows the line and looks everywhere.
     inner = rows[rows.size // 8 : rows.size - rows.size // 8]

@@ -15,9 +15,9 @@ def centre_px(frame_size_px: tuple[int, int]) -> Floats:
 
 
 def lens_shift_px(points_px: Floats, frame_size_px: tuple[int, int]) -> Floats:
-    """Displacement by third-order radial distortion of 1 (that is, 100 %) of the radius at the picture's corner.
+    """Displacement by third-order radial distortion of 1 (100 %) of the radius at the picture's corner.
 
-    The first term of Brown's series; `points_px` and the result have shape (..., 2).
+    This is the first term of Brown's series; `points_px` and the result have shape (..., 2).
     """
     middle = centre_px(frame_size_px)
     radius = points_px - middle
@@ -25,9 +25,9 @@ def lens_shift_px(points_px: Floats, frame_size_px: tuple[int, int]) -> Floats:
 
 
 def tilt_shift_px(points_px: Floats, frame_size_px: tuple[int, int], distance_px: float, axis: int) -> Floats:
-    """Displacement by perspective where the plane is tilted by one radian, to first order.
+    """Displacement by perspective per radian of tilt of the plane, to first order.
 
-    A point at (x, y) of a plane that recedes along x appears at (x, y) / (1 - x t / Z).
+    For a plane tilted by t that recedes along x, at the distance Z, the point (x, y) appears at (x, y) / (1 - x t / Z).
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def tilt_shift_px(points_px: Floats, frame_size_px: tuple[int, int], distance_px
     distance_px : float
         Distance of the camera's centre of projection from the plane, in pixels of the plane.
     axis : int
-        0 where the plane recedes along x, 1 along y.
+        0 for a plane that recedes along x, 1 along y.
     """
     radius = points_px - centre_px(frame_size_px)
     return np.asarray(radius * radius[..., axis : axis + 1] / distance_px)
@@ -50,7 +50,7 @@ def change_of_distance_px(points_px: Floats, shift_px: Floats) -> Floats:
     Parameters
     ----------
     points_px, shift_px : ndarray, shape (n, 2, 2)
-        Pair, first or second point, x or y.
+        Points and their displacements, with the indices: pair, first or second point, x or y.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The plane of a flat scene: correction of perspective, after which a distance in pixels is the same everywhere."""
+"""Plane of a flat scene: correction of perspective, after which a pixel has the same size everywhere."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ Floats = NDArray[np.float64]
 class Plane:
     """Homography from the picture to the plane, scaled so that the picture's centre stays in place.
 
-    Hartley & Zisserman, Multiple View Geometry, 2nd ed., 2.3.
+    Source: Hartley & Zisserman, Multiple View Geometry, 2nd ed., 2.3.
 
     Parameters
     ----------
     homography : ndarray, shape (3, 3)
-        Maps undistorted pixels to pixels of the squarely seen plane.
+        Maps undistorted pixels to pixels of a picture taken perpendicular to the plane.
     """
 
     homography: Floats

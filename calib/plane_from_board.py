@@ -1,4 +1,4 @@
-"""The plane of a board, and its scale, from one picture."""
+"""Plane of a board and its scale, from one picture."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,15 +30,15 @@ class PlaneFit:
     Parameters
     ----------
     plane : Plane
-        Takes the perspective off.
+        Plane that removes the perspective.
     px_per_mm, u_px_per_mm : float
         Scale of the flattened picture, and its standard uncertainty from the corners' own scatter.
     by_lens : float
-        Change of `px_per_mm` per unit of distortion that was not taken off.
+        Change of `px_per_mm` per unit of uncorrected lens distortion.
     residual_px : ndarray, shape (n, 2)
-        Corners less the plane's.
+        Measured minus fitted positions of the corners.
     tilt_deg : float
-        Tilt that would shorten one direction as the plane is shortened in the middle of the picture.
+        Tilt that would cause the observed shortening of one direction at the centre of the picture.
     """
 
     plane: Plane
@@ -57,7 +57,7 @@ def plane_from_board(corners: BoardCorners, ideal_px: Floats, frame_size_px: tup
     corners : BoardCorners
         Corners of one picture.
     ideal_px : ndarray, shape (n, 2)
-        The same with the lens taken off, where it is known.
+        The corners corrected for the lens, if it is known.
     frame_size_px : tuple of int
         Width and height.
     """
@@ -90,7 +90,7 @@ def _homography(board_mm: Floats, points_px: Floats) -> Floats:
 
 
 def _squared(to_picture: Floats, middle: Floats) -> tuple[Plane, float, float]:
-    """Plane that keeps the centre and its directions, its scale, and the ratio of its least to its greatest stretch."""
+    """Plane that keeps the centre and directions there, its scale, and the ratio of smallest to largest stretch."""
     to_board = np.asarray(np.linalg.inv(to_picture), dtype=np.float64)
     at = apply_homography(to_board, middle)
     steps = MIDDLE_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
@@ -115,7 +115,7 @@ def _log_scales(to_picture: Floats, middle: Floats) -> Floats:
 
 
 def _gradient(quantity: Callable[[Floats], Floats], points: Floats) -> Floats:
-    """Derivative of a quantity of shape (k,) by the position of every corner; shape (n, 2, k)."""
+    """Derivative of a quantity of shape (k,) by the positions of all corners; shape (n, 2, k)."""
     changes = []
     for index in np.ndindex(*points.shape):
         moved = points.copy()

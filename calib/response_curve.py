@@ -1,7 +1,8 @@
-"""A smooth response curve through levels whose light is known, up to a factor for each place of the scene.
+"""Fit of a smooth response curve to levels of known relative light, with an unknown factor for each scene point.
 
-ln f is a power law plus a smooth correction: cameras are nearly power laws (Grossberg & Nayar, 2004,
-doi:10.1109/TPAMI.2004.88), and a correction of the logarithm alone would diverge at level 0.
+The logarithm ln f of the light is that of a power law plus a smooth correction: camera responses are nearly power laws
+(Grossberg & Nayar, 2004, doi:10.1109/TPAMI.2004.88), and a smooth curve for the logarithm alone would diverge at level
+0.
 """
 
 import numpy as np
@@ -24,20 +25,20 @@ ROWS = 257
 def fitted_response(
     level: Floats, usable: NDArray[np.bool_], log_light: Floats, top_level: int, name: str
 ) -> MeasuredResponse:
-    """Fit the curve by least squares.
+    """Fit the response curve by least squares.
 
     Parameters
     ----------
     level : ndarray of float, shape (n, places)
-        Levels, shares of full scale: rows of one known light each, columns of one place each.
+        Levels as shares of full scale: one row per known light, one column per point of the scene.
     usable : ndarray of bool, shape (n, places)
-        Levels that count.
+        Whether each level is used.
     log_light : ndarray of float, shape (n,)
         Natural logarithm of each row's light, up to a constant.
     top_level : int
         Full scale of the pictures.
     name : str
-        What the response is called.
+        Name of the response.
     """
     exponent, correction, residual = _fit(level, usable, log_light)
     seen = level[usable]
@@ -50,7 +51,7 @@ def fitted_response(
 
 
 def curve_of(exponent: float, correction: Floats, top_level: int, name: str) -> CameraResponse:
-    """Tabulate a power law with a correction of its logarithm at the knots, shape (KNOTS,)."""
+    """Tabulate a power law with a correction of the light's logarithm at the knots, shape (KNOTS,)."""
     share = np.linspace(0.0, 1.0, ROWS)
     light = share**exponent * np.exp(np.interp(share, np.linspace(0.0, 1.0, KNOTS), correction))
     light = np.maximum.accumulate(light / light[-1]) + 1e-9 * share

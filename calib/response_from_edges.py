@@ -1,9 +1,10 @@
-"""A camera's response from the shape of straight edges: blur spreads a step of light symmetrically.
+"""Camera response from the shape of straight edges, because blur spreads a step of light symmetrically.
 
-The optics and the pixels blur light, and nearly every blur is symmetric. An edge spread function is then odd about the
-edge in light. In levels after a transfer curve it is not, and the exponent that makes it odd again is the camera's. A
-slanted edge samples its profile at many positions within a pixel (ISO 12233). Sharpening or smoothing after the
-transfer curve, or a bevel along the edge, changes the profile as well: the fit then leaves more than noise.
+The optics and the pixels blur the light, and nearly every blur is symmetric. In light, an edge spread function is then
+antisymmetric about the edge. In levels after a transfer curve it is not; the exponent that makes it antisymmetric again
+is that of the camera. A slanted edge samples its profile at many positions within a pixel (ISO 12233). Sharpening or
+smoothing after the transfer curve, or a bevel along the edge, also changes the profile: the residuals of the fit then
+exceed the noise.
 """
 
 from collections.abc import Sequence
@@ -26,39 +27,42 @@ Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
 LEAST_CONTRAST = 0.15
-"""Step of an edge, share of full scale: less bends the curve too little to be seen beside noise."""
+"""Least step of an edge, as a share of full scale: a smaller step is curved too little by the response to be visible in
+noise."""
 FEWEST_ROWS = 40
-"""Length of an edge in pixels."""
+"""Least length of an edge in pixels."""
 MOST_EDGES, MOST_PIXELS = 12, 3000
-"""Edges, and pixels of each, that are used: enough for 1 % of the exponent, and the fit takes a second."""
+"""Most edges, and pixels of each, that are used: enough for 1 % of the exponent in a second of computing time."""
 BESIDE_PX = 6
-"""How far beside a line its two sides are looked at, to tell the light one."""
+"""Distance from a line, on either side, at which levels are compared to find the lighter side."""
 CORNER_PX, CORNER_SHARE = 6.0, 0.1
-"""Left out at either end of an edge, in pixels and as a share of its length: corners are round."""
+"""Length left out at either end of an edge, in pixels and as a share of its length, because corners are round."""
 PARALLEL = 0.7
-"""Cosine between two edges above which they run beside each other; others only meet at a corner."""
+"""Cosine of the angle between two edges above which they count as parallel neighbours; others only meet at a corner."""
 ROOM_PX = 24.0
-"""How far from an edge another one may begin."""
+"""Distance from an edge within which another edge limits the profile."""
 STRAIGHT_PX = 0.15
-"""Scatter of an edge about its line beyond which it is no straight edge: a fifth of the sharpest blur."""
+"""Scatter of an edge about its line above which it does not count as straight: a fifth of the sharpest blur."""
 REACH_SIGMAS = 3.5
-"""Profiles reach so many standard deviations of the blur, and two pixels, to either side: to flat plateaus."""
+"""Half length of a profile in standard deviations of the blur, plus two pixels, so that it includes flat plateaus."""
 LARGEST_U = 0.3
-"""Standard uncertainty of the exponent that is still an answer: linear (1) is then told from consumer cameras (2.2)."""
+"""Largest standard uncertainty of the exponent that is accepted: a linear camera (1) can then be distinguished from
+consumer cameras (2.2)."""
 LARGEST_MISFIT = 2.0
-"""Root mean square of what is left over the noise of the plateaus: more is no symmetric blur behind a power law."""
+"""Largest ratio of the RMS residual to the noise of the plateaus; above it the profile is not a symmetric blur encoded
+by a power law."""
 MOST_OVERSHOOT, OVERSHOOT_BIN_PX = 0.01, 0.5
-"""Overshoot of a profile that is still a blur, as a share of its step, in bins of half a pixel: a sharpening that adds
-2 % of the step changes the exponent by 0.1 at a blur of 1.2 px (`tests/calib/test_response_from_pictures.py`)."""
+"""Largest overshoot of a profile, as a share of its step, and bin width in pixels: sharpening that adds 2 % of the step
+changes the exponent by 0.1 at a blur of 1.2 px (`tests/calib/test_response_from_pictures.py`)."""
 STARTS = (1.0, 2.2)
-"""Exponents at which the fit starts: those that cameras have."""
+"""Exponents from which the fit starts: those of usual cameras."""
 EXPONENTS = (0.2, 5.0)
 """Bounds of the exponent; film and sensors lie between 0.4 and 3 (Grossberg & Nayar, 2004)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Profile:
-    """Pixels across one edge: distance to its light side (pixels), level (fraction of full scale), starting values."""
+    """Pixels across one edge: distance towards its light side (px), level (share of full scale), starting values."""
 
     away_px: Floats
     level: Floats
@@ -68,7 +72,7 @@ class _Profile:
 
 
 def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> MeasuredResponse:
-    """Fit a camera's response, as a power law.
+    """Fit a camera response as a power law.
 
     Parameters
     ----------
@@ -77,12 +81,13 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
     top_level : int
         Full scale of the pictures.
     name : str
-        What the response is called.
+        Name of the response.
 
     Raises
     ------
     CalibrationError
-        No straight edge of enough contrast, edges that tell too little, or profiles that no power law explains.
+        If there is no straight edge of sufficient contrast, the edges do not determine the exponent, or no power law
+        explains the profiles.
     """
     profiles = [profile for grey in pictures for profile in _profiles(grey, top_level)]
     if not profiles:
@@ -126,7 +131,7 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
 
 
 def _overshoot(profile: _Profile) -> float:
-    """Overshoot of the mean profile beyond its plateaus on either side, as a fraction of the step, beyond its noise."""
+    """Overshoot of the mean profile beyond its plateaus, on either side, minus its noise, as a share of the step."""
     bins = np.floor(profile.away_px / OVERSHOOT_BIN_PX).astype(int)
     bins -= bins.min()
     count = np.bincount(bins)
@@ -152,7 +157,7 @@ def _profiles(grey: Grey, top_level: int) -> list[_Profile]:
 
 
 def _apart_px(edge: StraightEdge, other: StraightEdge) -> float:
-    """Least distance of another edge's ends and centre from the line of an edge, where the two overlap."""
+    """Smallest distance of another edge's ends and centre from the line of an edge, where the two overlap."""
     points = np.vstack([other.ends, other.ends.mean(axis=0)])
     along = (points - edge.ends[0]) @ edge.direction
     beside = np.abs((points - edge.ends[0]) @ edge.to_dark)

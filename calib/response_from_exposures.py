@@ -1,7 +1,7 @@
-"""A camera's response from pictures of one still scene at several known exposures.
+"""Camera response from pictures of one static scene at several known exposures.
 
-The light of a pixel is that of its scene times the exposure, for any scene: ln f(level) = ln scene + ln exposure. Scene
-and f are found together by least squares (Debevec & Malik, SIGGRAPH 1997, doi:10.1145/258734.258884).
+The light at a pixel is the radiance of the scene there times the exposure: ln f(level) = ln radiance + ln exposure. The
+radiances and f are estimated together by least squares (Debevec & Malik, SIGGRAPH 1997, doi:10.1145/258734.258884).
 """
 
 from collections.abc import Sequence
@@ -28,23 +28,23 @@ PLACES = 400
 def response_from_exposures(
     pictures: Sequence[Grey], exposures: Sequence[float], top_level: int, name: str
 ) -> MeasuredResponse:
-    """Fit a camera's response.
+    """Fit a camera response to a series of exposures.
 
     Parameters
     ----------
     pictures : sequence of ndarray, each of shape (height, width)
-        One still scene, with its focus, aperture and light left alone.
+        Pictures of one static scene, with focus, aperture and light unchanged.
     exposures : sequence of float
-        Exposure of each, in any unit.
+        Exposure of each picture, in any unit.
     top_level : int
         Full scale of the pictures.
     name : str
-        What the response is called.
+        Name of the response.
 
     Raises
     ------
     CalibrationError
-        Too few pictures, exposures too alike, or nothing in the scene that is flat.
+        If there are too few pictures, the exposures are too similar, or the scene has no uniform areas.
     """
     times = np.asarray(exposures, dtype=np.float64)
     if len(pictures) < FEWEST_PICTURES or not (times > 0.0).all() or times.max() < LEAST_RATIO * times.min():
@@ -65,7 +65,7 @@ def response_from_exposures(
 
 
 def _flat_levels(pictures: Sequence[Grey], top_level: int) -> Floats:
-    """Mean levels of uniform squares, shape (pictures, places), as fractions of full scale."""
+    """Mean levels of uniform squares, as shares of full scale; shape (pictures, squares)."""
     height, width = (size // SIDE_PX * SIDE_PX for size in pictures[0].shape)
     means, spreads = [], []
     for picture in pictures:

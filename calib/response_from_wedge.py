@@ -1,7 +1,7 @@
-"""A camera's response from one picture of a grey wedge whose fields have certified optical densities.
+"""Camera response from one picture of a grey wedge whose fields have certified optical densities.
 
 A field of density D reflects (or transmits) 10**-D of the light (ISO 5-1), so that ln f(level) = -D ln 10 plus a
-constant over the whole wedge: the same equation as for an exposure series, with one place in the scene.
+constant for the whole wedge: the same equation as for an exposure series of a single point of a scene.
 """
 
 from collections.abc import Sequence
@@ -17,35 +17,36 @@ Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
 FEWEST_FIELDS = 6
-"""Fields between black and white that a curve needs: a power law and a bend, twice over."""
+"""Least number of fields between black and white for a curve: twice the number for a power law with a bend."""
 MIDDLE = 0.25
-"""Share of a field that is left out at either of its borders."""
+"""Share of a field that is left out at each of its borders."""
 LARGEST_SPREAD = 0.5
-"""Difference between the thirds of a field over the step to the next one: more is a border or a reflection."""
+"""Largest difference between the thirds of a field, as a share of the step to the next field; more indicates a border
+or a reflection."""
 
 
 def response_from_wedge(
     grey: Grey, densities: Sequence[float], top_level: int, name: str, region: tuple[int, int, int, int] | None = None
 ) -> MeasuredResponse:
-    """Fit a camera's response.
+    """Fit a camera response to the fields of a grey wedge.
 
     Parameters
     ----------
     grey : ndarray, shape (height, width)
-        Picture of the wedge, evenly lit. Its fields follow each other along the longer side of the region.
+        Picture of the wedge, evenly lit. The fields are arranged along the longer side of the region.
     densities : sequence of float
         Optical density of each field, from the lightest to the darkest.
     top_level : int
         Full scale of the picture.
     name : str
-        What the response is called.
+        Name of the response.
     region : (x, y, width, height), optional
-        Where the wedge's fields lie in the picture, pixels; by default the whole picture.
+        Region of the wedge's fields in the picture, in pixels; the whole picture by default.
 
     Raises
     ------
     CalibrationError
-        Too few fields, densities that do not rise, or a region that does not show them.
+        If there are too few fields, the densities do not increase, or the region does not show the fields.
     """
     stated = np.asarray(densities, dtype=np.float64)
     if stated.size < FEWEST_FIELDS or not np.isfinite(stated).all() or not (np.diff(stated) > 0.0).all():
@@ -72,7 +73,7 @@ def response_from_wedge(
 def _field_levels(
     grey: Grey, fields: int, top_level: int, region: tuple[int, int, int, int] | None
 ) -> tuple[Floats, Floats]:
-    """Mean and scatter in the central part of each field, as fractions of full scale; shape (fields,)."""
+    """Mean and scatter of the levels in the central part of each field, as shares of full scale; shape (fields,)."""
     x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
     part = grey[y : y + height, x : x + width].astype(np.float64) / top_level
     part = part if part.shape[1] >= part.shape[0] else part.T

@@ -1,4 +1,4 @@
-"""Scale, plane and lens from pictures of a board."""
+"""Scale, plane and lens calibration from pictures of a board."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ class BoardFit:
     calibration : Calibration
         The result.
     lens : LensFit or None
-        None where there is one picture, which gives the plane alone.
+        Lens fit; None for one picture, which determines the plane only.
     plane : PlaneFit
-        Of the first picture.
+        Plane of the first picture.
     straightness_px : float
-        Root mean square distance of all corners from straight rows and columns, the lens taken off.
+        Root-mean-square distance of all corners from straight rows and columns, corrected for the lens.
     """
 
     calibration: Calibration
@@ -45,18 +45,18 @@ def scale_from_board(
     limits: Limits,
     stated: frozenset[str] = frozenset(),
 ) -> BoardFit:
-    """Calibrate on a board. The plane of the first picture is the plane in which distances are measured.
+    """Calibrate on a board; distances are measured in the plane of the board in the first picture.
 
     Parameters
     ----------
     pictures : sequence of BoardCorners
-        One for the plane; three or more, at different tilts, for the lens as well.
+        One picture for the plane; three or more, at different tilts, for the lens as well.
     board : Board
-        What was photographed.
+        The board in the pictures.
     frame_size_px : tuple of int
         Width and height.
     limits, stated
-        What the user states about the bench, and which of it is not a default.
+        Limits of the set-up's imperfections, and the names of those that the user stated.
     """
     if not pictures:
         raise CalibrationError("A calibration needs at least one picture of the board, but there is none.")

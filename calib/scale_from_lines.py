@@ -1,4 +1,4 @@
-"""Scale from the lines of a line scale: one straight line fitted to all their positions."""
+"""Scale from the lines of a line scale: a straight line fitted to position over line number."""
 
 from dataclasses import dataclass
 
@@ -21,29 +21,29 @@ OUTLIER_SIGMAS, OUTLIER_SHARE = 6.0, 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineScaleFit:
-    """The calibration, with the residuals of the lines.
+    """The calibration from a line scale, with the residuals of the lines.
 
     Parameters
     ----------
     calibration : Calibration
         The result.
     index : ndarray of int, shape (n,)
-        Number of each line's place on the scale, from the first.
+        Number of each line on the scale, counted from the first.
     used : ndarray of bool, shape (n,)
         Whether the line was used.
     residual_um : ndarray of float, shape (n,)
-        Each line's place as measured, less its place on the scale (micrometres).
+        Measured minus nominal position of each line (micrometres).
     by_edge : (float, float)
-        Scale from the edges at which the level rises alone, and from those at which it falls (px/mm).
+        Scale from the rising edges alone, and from the falling edges alone (px/mm).
     width_mm, u_width_mm : float or None
-        Mean width of the lines as they look, and its standard uncertainty without the edge bias; None where they are
-        too narrow to tell.
+        Mean apparent width of the lines, and its standard uncertainty without that of the edge bias; None if the lines
+        are too narrow.
     chi_square : float
-        Of the residuals.
+        Chi-square of the residuals.
     freedom : int
         Degrees of freedom.
     probability : float
-        Chance of so large a `chi_square`.
+        Probability of a `chi_square` at least as large by chance.
     """
 
     calibration: Calibration
@@ -73,24 +73,24 @@ def scale_from_lines(
     Parameters
     ----------
     lines : ScaleLines
-        As measured.
+        The measured lines.
     pitch_mm : float
         Certified distance of neighbouring lines.
     u_line_mm : float
-        Standard uncertainty of every line's place, each its own.
+        Standard uncertainty of each line's position, independent between lines.
     u_length_mm : float
-        Standard uncertainty of the length from the first line used to the last, shared by all of them.
+        Standard uncertainty of the length between the first and the last line used, common to all lines.
     frame_size_px : tuple of int
         Width and height of the picture.
     limits, stated
-        What the user states about the bench, and which of it is not a default.
+        Limits of the set-up's imperfections, and the names of those that the user stated.
     reference : Reference
         The scale's name and certificate; its size is filled in.
 
     Raises
     ------
     CalibrationError
-        The pitch or an uncertainty cannot be one, or the lines do not stand at equal distances.
+        If the pitch or an uncertainty is not valid, or the lines are not equidistant.
     """
     _check(pitch_mm, u_line_mm, u_length_mm)
     index, used = _numbered(lines.at_px)
@@ -154,9 +154,9 @@ class _Line:
     Parameters
     ----------
     slope, intercept : float
-        Of the line.
+        Parameters of the line.
     gain : ndarray of float, shape (n,)
-        By how much each ordinate moves the slope.
+        Change of the slope per change of each ordinate.
     """
 
     slope: float
@@ -174,7 +174,7 @@ def _straight_line(k: Floats, at: Floats, weight: Floats) -> _Line:
 def _bends(
     lines: ScaleLines, used: NDArray[np.bool_], frame_size_px: tuple[int, int], slope: float, limits: Limits
 ) -> tuple[Floats, ...]:
-    """Shift of each line by the lens, and by a tilt about either axis, each per unit of its limit."""
+    """Shift of each line per unit of lens distortion, and per radian of tilt about each axis."""
     points = lines.middle_px[used]
     distance_px = limits.camera_distance_mm * slope
     lens = lens_shift_px(points, frame_size_px) @ lines.across
@@ -210,7 +210,7 @@ def _part(source: str, u_scale: float, supplied: str) -> ScalePart:
 
 
 def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
-    """Number of each line on the scale, and whether it stands near its nominal position."""
+    """Number of each line on the scale, and whether it is near its nominal position."""
     steps = np.diff(at_px)
     pitch = float(np.median(steps))
     index = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / pitch), 1.0))]).astype(np.int_)
@@ -242,7 +242,7 @@ def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
 
 
 def _chi_square(residual: Floats, k: Floats, u: Floats, bends: tuple[Floats, ...], limits: Limits) -> tuple[float, int]:
-    """Chi-square of the residuals, with lens and tilt free within their limits."""
+    """Chi-square of the residuals, with lens distortion and tilt fitted within their limits."""
     covariance = np.diag(u**2) + np.outer(bends[0], bends[0]) * rectangular(limits.lens_relative) ** 2
     for bend in bends[1:]:
         covariance += np.outer(bend, bend) * rectangular(limits.tilt_rad) ** 2

@@ -28,13 +28,13 @@ class MeasuredSize:
     Parameters
     ----------
     reference : Reference
-        Its certified size.
+        Certified size of the object.
     width_px, u_width_px : float
-        Its width in the picture, lens and plane taken off, and the standard uncertainty from its edges.
+        Width in the picture, corrected for lens and plane, and its standard uncertainty from the fit of the edges.
     points_px : ndarray, shape (2, 2)
-        Where the width begins and ends.
+        End points of the width.
     light : bool
-        Whether it is light between the edges.
+        Whether the area between the edges is light.
     """
 
     reference: Reference
@@ -46,22 +46,22 @@ class MeasuredSize:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaleFit:
-    """The calibration, with the residuals of the straight line.
+    """The calibration from objects of known size, with the residuals of the fitted straight line.
 
     Parameters
     ----------
     calibration : Calibration
         The result.
     bias_known : bool
-        Whether the edge bias was found; otherwise it is zero, with its limit as an uncertainty.
+        Whether the edge bias was determined; otherwise it is set to zero, with its limit as an uncertainty.
     residual_mm : ndarray, shape (n,)
-        Linearity residuals: each size as measured, less its certified size.
+        Linearity residuals: measured minus certified size of each object.
     chi_square : float
-        Of the residuals, against sizes, edges, lens and perspective.
+        Chi-square of the residuals, relative to the uncertainties of sizes, edges, lens and perspective.
     freedom : int
-        Degrees of freedom; 0 where nothing is left to check the line with.
+        Degrees of freedom; 0 if the line cannot be checked.
     probability : float
-        Chance of so large a `chi_square`.
+        Probability of a `chi_square` at least as large by chance.
     """
 
     calibration: Calibration
@@ -81,20 +81,21 @@ def scale_from_sizes(
 ) -> ScaleFit:
     """Fit gap_mm = (gap_px + p b) / s to objects of known size, with p = +1 for a light gap and -1 for a dark object.
 
-    As a straight line this is p gap_px = s (p gap_mm) - b. Three different sizes, or a light and a dark one, give s and
-    b; fewer give only s, and b stays in the budget with its limit.
+    Written as a straight line, the equation is p gap_px = s (p gap_mm) - b. Three different sizes, or a light gap and a
+    dark object, determine s and b; fewer determine only s, and b is included in the uncertainty budget with its limit.
 
     Parameters
     ----------
     sizes : sequence of MeasuredSize
-        At least one.
+        At least one measured object.
     frame_size_px : tuple of int
         Width and height of the pictures.
     limits, stated
-        What the user states about the bench, and which of it is not a default.
+        Limits of the set-up's imperfections, and the names of those that the user stated.
     response_shift_px : float
-        How much wider a light gap may have been read because the camera's response is assumed; 0 where it is known. The
-        true shift lies between 0 and this (rectangular, about its end). An edge bias that is found takes it up.
+        Largest excess of a light gap's measured width because the camera response is assumed; 0 if the response is
+        known. The true excess lies between 0 and this value; the standard uncertainty is that of a rectangular
+        distribution of this half-width. If the edge bias is determined, it includes this effect.
     """
     if not sizes:
         raise CalibrationError("A scale needs at least one object of known size, but there is none.")
@@ -164,7 +165,7 @@ def _spread(response: Floats, u: Floats) -> Floats:
 def _seen_through(
     sizes: Sequence[MeasuredSize], polarity: Floats, frame_size_px: tuple[int, int], distance_px: float
 ) -> tuple[Floats, Floats]:
-    """Change of each signed width per unit of distortion, shape (n,), and per radian of tilt, shape (2, n)."""
+    """Change of each signed width per unit of lens distortion, shape (n,), and per radian of tilt, shape (2, n)."""
     points = np.array([size.points_px for size in sizes])
     lens = change_of_distance_px(points, lens_shift_px(points, frame_size_px))
     tilt = [change_of_distance_px(points, tilt_shift_px(points, frame_size_px, distance_px, axis)) for axis in (0, 1)]
@@ -172,7 +173,7 @@ def _seen_through(
 
 
 def _chi_square(line: StraightLine, x: Floats, covariance: Floats, bias_known: bool) -> float:
-    """Chi-square of the residuals with the lens free within its limit."""
+    """Chi-square of the residuals, with lens distortion fitted within its limit."""
     design = np.stack([x, np.ones_like(x)], axis=1) if bias_known else x[:, None]
     inverse = np.linalg.inv(covariance)
     refit = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ line.residual)

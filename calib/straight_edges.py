@@ -1,4 +1,4 @@
-"""Straight edges of a picture, located to one pixel: where to look for the two edges of a bar or a slot."""
+"""Straight edges of a picture, located to the nearest pixel: candidates for the edges of a bar or a slot."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -21,9 +21,9 @@ SHORTEST_EDGE_PX = 14.0
 
 @dataclass(frozen=True, slots=True)
 class StraightEdge:
-    """A straight edge from (x0, y0) to (x1, y1), pixels; the dark side lies to the right when looking along it.
+    """A straight edge from (x0, y0) to (x1, y1) in pixels, with the dark side to the right of this direction.
 
-    The right is that of the picture with x to the right and y down.
+    "Right" refers to the picture as displayed, with x to the right and y downwards.
     """
 
     x0: float
@@ -33,7 +33,7 @@ class StraightEdge:
 
     @property
     def length_px(self) -> float:
-        """Length."""
+        """Length of the edge."""
         return hypot(self.x1 - self.x0, self.y1 - self.y0)
 
     @property
@@ -43,28 +43,28 @@ class StraightEdge:
 
     @property
     def to_dark(self) -> Floats:
-        """Unit vector across the edge to its dark side, shape (2,)."""
+        """Unit vector perpendicular to the edge, towards its dark side, shape (2,)."""
         along = self.direction
         return np.array([-along[1], along[0]])
 
     @property
     def ends(self) -> Floats:
-        """Both ends, shape (2, 2)."""
+        """End points of the edge, shape (2, 2)."""
         return np.array([[self.x0, self.y0], [self.x1, self.y1]])
 
 
 def find_straight_edges(grey: NDArray[np.uint8] | NDArray[np.uint16], side_px: int) -> list[StraightEdge]:
-    """Straight edges, the longest first.
+    """Find straight edges, the longest first.
 
-    They are line segments after Grompone von Gioi et al. (IEEE PAMI 32(4), 2010, 722-732), joined where they continue
-    each other.
+    The edges are line segments found by the method of Grompone von Gioi et al. (IEEE PAMI 32(4), 2010, 722-732);
+    segments that continue each other are joined.
 
     Parameters
     ----------
     grey : ndarray, shape (height, width)
         Grey levels.
     side_px : int
-        Edges are looked for in a picture whose longer side has at most so many pixels.
+        Largest length of the longer side of the (reduced) picture in which edges are searched.
     """
     factor = min(1.0, side_px / max(grey.shape))
     small = cv2.resize(grey, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA) if factor < 1.0 else grey

@@ -1,4 +1,4 @@
-"""The straight line through points that are uncertain in both directions."""
+"""Straight line fitted to points that are uncertain in both coordinates."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -21,19 +21,20 @@ class StraightLine:
     Parameters
     ----------
     slope, intercept : float
-        The line.
+        Parameters of the line.
     response : ndarray, shape (2, n)
-        Change of (slope, intercept) per change of each y; minus the slope times that, per change of each x.
+        Change of (slope, intercept) per change of each y; the change per change of each x is minus the slope times
+        this.
     covariance : ndarray, shape (2, 2)
         Covariance of (slope, intercept) from the stated uncertainties.
     residual : ndarray, shape (n,)
-        y less the line.
+        y minus the line.
     residual_sd : float
         Standard deviation of the residuals with n - p degrees of freedom, weighted relative to the mean weight.
     chi_square : float
-        Sum of squared residuals over their variances.
+        Sum of the squared residuals divided by their variances.
     freedom : int
-        n - p; p = 2, or 1 through the origin.
+        Degrees of freedom n - p, with p = 2 parameters, or 1 for a line through the origin.
     """
 
     slope: float
@@ -47,10 +48,10 @@ class StraightLine:
 
 
 def line_with_errors(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> StraightLine:
-    """Maximum-likelihood line where x and y are both uncertain, and independent.
+    """Maximum-likelihood line for points whose x and y are both uncertain, with independent errors.
 
-    York, Evensen, Lopez Martinez & De Basabe Delgado, American Journal of Physics 72 (2004), 367-375. With `u_x` of
-    zero it is the weighted least-squares line.
+    Source: York, Evensen, Lopez Martinez & De Basabe Delgado, American Journal of Physics 72 (2004), 367-375. For `u_x`
+    = 0 the result is the weighted least-squares line.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def line_with_errors(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> Straight
     Raises
     ------
     CalibrationError
-        The points do not define a line.
+        If the points do not define a line.
     """
     if len(x) < 2 or np.ptp(x) <= 0.0:
         raise CalibrationError(
@@ -95,9 +96,9 @@ def _york(x: Floats, y: Floats, u_x: Floats, u_y: Floats, slope: float) -> tuple
 
 
 def line_through_origin(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> StraightLine:
-    """Line through the origin, each point weighted by its uncertainty in both directions.
+    """Fit a line through the origin, with each point weighted by its uncertainties in both coordinates.
 
-    Arguments as in `line_with_errors`.
+    The arguments are those of `line_with_errors`.
     """
     if not np.any(x):
         raise CalibrationError("A straight line through the origin needs a size other than zero.")

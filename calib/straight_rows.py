@@ -1,4 +1,4 @@
-"""Straight line through an edge that was found in rows of pixels, with its uncertainty."""
+"""Straight line fitted to an edge that was located in rows of pixels, with its uncertainty."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -31,15 +31,15 @@ class StraightRows:
     Parameters
     ----------
     rows : ndarray of int, shape (n,)
-        Rows that belong to it.
+        Rows that belong to the edge.
     residual_px : ndarray, shape (n,)
-        What the line leaves along the row.
+        Residuals about the line, along the row.
     middle_row : float
         Mean of `rows`.
     at_px, slope : float
-        The line.
+        Parameters of the line.
     u_at_px, u_slope : float
-        Standard uncertainties from the rows' own scatter, their correlation included.
+        Standard uncertainties from the scatter of the rows, correlation between rows included.
     """
 
     rows: Ints
@@ -58,12 +58,12 @@ class StraightRows:
 
     @classmethod
     def through(cls, edge: EdgeRows) -> "StraightRows":
-        """Fit the line, excluding rows that do not belong to it.
+        """Fit the line, excluding rows that do not belong to the edge.
 
         Raises
         ------
         CalibrationError
-            The edge is bent, or too few rows belong to it.
+            If the edge is not straight, or too few rows belong to it.
         """
         kept = _belonging(edge.rows, edge.x_px)
         rows, x_px = edge.rows[kept], edge.x_px[kept]

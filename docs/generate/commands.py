@@ -34,7 +34,9 @@ def _usage(command: click.Command, context: click.Context) -> str:
 
 
 def _options(command: click.Command, context: click.Context) -> Iterator[str]:
-    rows = [record for parameter in command.params if (record := parameter.get_help_record(context))]
+    records = [record for parameter in command.params if (record := parameter.get_help_record(context))]
+    # The usage line names the arguments; a row without words would say nothing more.
+    rows = [(names, words) for names, words in records if words.strip()]
     if rows:
         lines = [f"| `{_cell(names)}` | {_cell(words)} |" for names, words in rows]
         yield "\n".join(["| option | what it does |", "|---|---|", *lines])

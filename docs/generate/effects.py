@@ -9,9 +9,9 @@ from fingervision.domain.effect import Effect, Stage
 from fingervision.effects import catalogue
 
 WORDS = {
-    Stage.DRIVE: "Drive: what the mechanism really received",
-    Stage.MECHANISM: "Mechanism: how the body answers",
-    Stage.CAMERA: "Camera: what the picture shows of it",
+    Stage.DRIVE: "Drive: the input that the mechanism really receives",
+    Stage.MECHANISM: "Mechanism: how the fingers move at this input",
+    Stage.CAMERA: "Camera: what the picture shows of this motion",
 }
 
 
@@ -36,7 +36,7 @@ def _section(effect: Effect, pictures: Path) -> str:
         words
         for needed, words in (
             (effect.needs_times, "times (`time_s`)"),
-            (effect.needs_shared_clock, "one clock for all runs"),
+            (effect.needs_shared_clock, "one clock shared by all runs"),
             (effect.needs_edges, "both edges (`left_mm`, `right_mm`)"),
             (effect.needs_force, "a force (`force_n`)"),
         )
@@ -47,14 +47,16 @@ def _section(effect: Effect, pictures: Path) -> str:
         f"{effect.words[0].upper()}{effect.words[1:]}.",
         f"* **Definition with a simulation table:** {effect.formula}\n"
         f"* **Source:** {effect.source or 'definition of this project'}\n"
-        f"* **In measured minus simulated:** {effect.residual}\n"
-        f"* **Needs:** {', '.join(needs) or 'input and gap'}"
-        + (f"\n* **Remembers the past;** start of a run: {effect.start or 'at rest'}" if effect.memory else ""),
-        "| parameter | unit | bounds | what it is |\n|---|---|---|---|\n"
+        f"* **Residual (measured minus simulated):** {effect.residual}\n"
+        f"* **Data needed beside input and gap:** {', '.join(needs) or 'none'}"
+        + (
+            f"\n* **Has memory;** its state at the start of a run: {effect.start or 'at rest'}" if effect.memory else ""
+        ),
+        "| parameter | unit | bounds | meaning |\n|---|---|---|---|\n"
         + "\n".join(
             f"| `{p.name}` | {p.unit or '1'} | {p.lower:g} to {p.upper:g} | {p.words} |" for p in effect.parameters
         ),
-        f"![Residual that {effect.name} leaves](../_generated/effects/{_drawn(effect.name, pictures)})",
+        f"![Residual caused by {effect.name}](../_generated/effects/{_drawn(effect.name, pictures)})",
     ]
     return "\n\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""The reference of a recipe's steps: the kinds that the bed knows, with the keys that each of them reads."""
+"""The reference of a recipe's steps: the kinds that the test bed knows, each with its keys."""
 
 import importlib
 
@@ -10,6 +10,7 @@ def recipe_kinds_page() -> str:
     rows = []
     for name in recipe_kinds.step_kinds():
         kind = importlib.import_module(f"{recipe_kinds.__name__}.{name}")
-        first = (kind.__doc__ or "").strip().splitlines()[0]
-        rows.append(f"| `{name}` | {', '.join(f'`{key}`' for key in kind.KEYS) or 'none'} | {first} |")
-    return "\n".join(["| `kind` | keys | what the bed does |", "|---|---|---|", *rows]) + "\n"
+        first = (kind.__doc__ or "").strip().splitlines()[0].removeprefix("Recipe step: ")
+        keys = ", ".join(f"`{key}`" for key in kind.KEYS) or "none"
+        rows.append(f"| `{name}` | {keys} | {first[:1].upper()}{first[1:]} |")
+    return "\n".join(["| `kind` | keys | what the test bed does |", "|---|---|---|", *rows]) + "\n"

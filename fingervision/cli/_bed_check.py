@@ -13,7 +13,8 @@ Examples:
   fingervision bed check next_run.toml --bed lab.toml
   fingervision bed check recipe.toml --json
 
-Nothing is opened and nothing moves. Exit code 0: the recipe fits the bed; 1: it does not, a sentence for each step.
+No device is opened and nothing moves. Exit code 0: the recipe fits the test bed; 1: it does not, with a message for
+each step that does not fit.
 """
 
 
@@ -22,7 +23,7 @@ Nothing is opened and nothing moves. Exit code 0: the recipe fits the bed; 1: it
 @bed_option
 @click.option("--json", "as_json", is_flag=True, help="Print the check as JSON.")
 def command(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
-    """Check a recipe without moving: positions, speeds, time, predicted gap and force, and the bed's limits."""
+    """Check a recipe without moving: positions, speeds, time, predicted gap and force, and the test bed's limits."""
     import json
     from dataclasses import asdict
 

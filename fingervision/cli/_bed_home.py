@@ -14,9 +14,9 @@ Examples:
 @click.command(epilog=EXAMPLES)
 @bed_option
 def command(bed_name: str) -> None:
-    """Go to the reference: position 0.
+    """Move the stage to its reference, position 0.
 
-    This also clears the reason of an earlier stop.
+    This also resets an earlier motor stop.
     """
     from fingervision.testbed.bed_factory import open_bed
     from fingervision.testbed.manual import manual_control

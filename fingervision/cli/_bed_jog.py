@@ -14,13 +14,13 @@ Examples:
 
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("speed_mm_s", type=float)
-@click.option("--for-s", type=click.FloatRange(0.0, min_open=True), help="Stop by itself after so long.")
-@click.option("--home-first", is_flag=True, help="Home before: steps behind a board need a known position.")
+@click.option("--for-s", type=click.FloatRange(0.0, min_open=True), help="Stop after this many seconds.")
+@click.option("--home-first", is_flag=True, help="First go to the reference: step data need a known start.")
 @bed_option
 def command(speed_mm_s: float, for_s: float | None, home_first: bool, bed_name: str) -> None:
     """Move the stage at SPEED_MM_S until stopped.
 
-    Positive opens. Ctrl-C stops it, or --for-s, or the bed's limit.
+    A positive speed opens the gripper. The motion ends with Ctrl-C, after --for-s, or at a limit of the test bed.
     """
     from math import inf
 

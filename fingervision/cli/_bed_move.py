@@ -12,20 +12,20 @@ Examples:
   fingervision bed move 1.2 --speed-mm-s 20 --bed lab.toml
 
 \b
-A motor controller behind a board goes by its step data: by a step to that position, or by repeated relative steps, none
-of them faster than asked. Ctrl-C stops the motor first.
+A motor controller behind an Arduino board can only run its stored steps: it runs a step to that position, or repeated
+relative steps, none of them faster than requested. Ctrl-C first stops the motor and then ends the command.
 """
 
 
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("to_mm", type=float)
 @click.option("--speed-mm-s", type=float, default=1.0, show_default=True, help="Speed of the stage.")
-@click.option("--home-first", is_flag=True, help="Home before: steps behind a board need a known position.")
+@click.option("--home-first", is_flag=True, help="First go to the reference: step data need a known start.")
 @bed_option
 def command(to_mm: float, speed_mm_s: float, home_first: bool, bed_name: str) -> None:
-    """Move the stage to TO_MM; positive opens.
+    """Move the stage to the position TO_MM; positive positions open the gripper.
 
-    Nothing moves if the target is beyond the bed's limits.
+    Nothing moves if the target is beyond the limits of the test bed.
     """
     from fingervision.testbed.bed_factory import open_bed
     from fingervision.testbed.manual import manual_control

@@ -18,12 +18,12 @@ Examples:
 
 \b
 Files written to --out:
-  samples.csv   one row a frame: input, gap, both edges, force      video.mp4     every frame, lossless (FFV1)
-  run.json      recipe, bed, clocks, digests                        events.jsonl  what happened, when
-  recipe.toml   the recipe                                          simulation.csv what a simulated gripper should do
+  samples.csv   one row per frame: input, gap, both edges, force    video.mp4     every frame, lossless (FFV1)
+  run.json      recipe, test bed, clocks, digests                   events.jsonl  what happened, when
+  recipe.toml   the recipe                                          simulation.csv the predicted gap
 
-A run that broke off, for whatever reason, goes on with the same command. While it runs on a terminal: p and Enter
-pauses and goes on, q and Enter or Ctrl-C ends it; the motor stops first.
+If a run was interrupted, for whatever reason, the same command continues it. On a terminal, p and Enter pauses and
+resumes a run, q and Enter or Ctrl-C ends it; the motor is stopped first.
 """
 
 
@@ -34,13 +34,17 @@ pauses and goes on, q and Enter or Ctrl-C ends it; the motor stops first.
 @effects_option
 @click.option("--out", type=click.Path(path_type=Path), default=Path("run"), show_default=True, help="Folder to write.")
 @click.option(
-    "--after", type=click.Path(path_type=Path), help="Earlier run on this bed; joined.csv then holds the rows of both."
+    "--after",
+    type=click.Path(path_type=Path),
+    help="Earlier run on this test bed; joined.csv then holds the rows of both runs.",
 )
 @click.option(
-    "--seed", type=click.IntRange(0), help="Of everything random in simulated parts; the same gives the same."
+    "--seed",
+    type=click.IntRange(0),
+    help="Seed of all randomness in simulated parts; the same seed gives the same run.",
 )
-@click.option("--real-time", is_flag=True, help="Let a simulated bed take the time that it would take.")
-@click.option("--json", "as_json", is_flag=True, help="Print the end of the run as JSON.")
+@click.option("--real-time", is_flag=True, help="Run a simulated test bed in real time instead of as fast as possible.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result of the run as JSON.")
 def command(
     recipe_toml: Path,
     bed_name: str,
@@ -51,9 +55,9 @@ def command(
     real_time: bool,
     as_json: bool,
 ) -> None:
-    """Run a recipe on the bed and measure every picture.
+    """Run a recipe on the test bed and measure every video frame.
 
-    The whole recipe is checked against the limits of the bed before anything moves.
+    The whole recipe is checked against the limits of the test bed before anything moves.
     """
     import json
     import sys

@@ -16,7 +16,7 @@ Examples:
 \b
   schema = 1                       A file of 1 to 15 blocks, numbered in order.
   [[step]]
-  target_mm = 5.0                  coordinates = "relative" counts from where it stands
+  target_mm = 5.0                  coordinates = "relative" counts from the present position
   load_kg = 0.2                    operation = "pushing" with pushing_force_n
   positioning_time_s = 0.2         or speed_mm_s, acceleration_mm_s2, deceleration_mm_s2
 """
@@ -24,13 +24,14 @@ Examples:
 
 @click.command(epilog=EXAMPLES)
 @click.argument("steps_toml", metavar="STEPS.toml", type=click.Path(path_type=Path))
-@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw position and speed over time.")
-@click.option("--run", "run_them", is_flag=True, help="Home, then run the sequence on the bed.")
+@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Plot position and speed over time.")
+@click.option("--run", "run_them", is_flag=True, help="Search the reference, then run the sequence on the test bed.")
 @bed_option
 def command(steps_toml: Path, plot: Path | None, run_them: bool, bed_name: str) -> None:
-    """Show or run step data of the controller.
+    """Show or run the step data of a motor controller (motions that it stores by number).
 
-    Checked against the published stage (10 mm, 400 mm/s, 5.5 N) or that of the bed's configuration.
+    The steps are checked against the limits of the published stage (10 mm, 400 mm/s, 5.5 N), or of the stage of the
+    test bed's configuration.
     """
     from fingervision.storage.steps_toml import read_steps
     from fingervision.testbed.manual.step_running import run_sequence, step_limits

@@ -10,15 +10,16 @@ Examples:
   fingervision bed stop --bed lab.toml
 
 \b
-Another fingervision that drives this bed is asked to end; its motor stops first. This is no emergency stop: that is a
-circuit of its own which takes the motor's supply away, see fingervision/testbed/firmware/README.md.
+If another fingervision process drives this test bed, it is asked to stop the motor and to end. This command is no
+emergency stop: that must be a separate circuit which disconnects the motor's supply, see
+fingervision/testbed/firmware/README.md.
 """
 
 
 @click.command(epilog=EXAMPLES)
 @bed_option
 def command(bed_name: str) -> None:
-    """Stop the motor, whoever drives it."""
+    """Stop the motor, whichever program drives it."""
     from fingervision.testbed.manual.stopping import stop_bed
 
     click.echo(stop_bed(bed_name))

@@ -7,13 +7,33 @@ import click
 
 # Option, name in calib.limits.Limits, default there (a test holds the two equal), what it is.
 LIMITS = (
-    ("--plane-mm", "plane_mm", 0.5, "Gripper out of the reference's plane by up to +- this, mm."),
-    ("--camera-distance-mm", "camera_distance_mm", 100.0, "Camera's distance from that plane, mm."),
-    ("--tilt-deg", "tilt_deg", 2.0, "Plane tilted by up to +- this, degrees."),
-    ("--lens-relative", "lens_relative", 0.001, "Distortion left, up to +- this part of the radius at the corner."),
-    ("--edge-bias-px", "edge_bias_px", 0.6, "Blooming of both edges together where no reference tells, up to +-, px."),
-    ("--estimator-px", "estimator_px", 0.02, "Phase bias of each edge, up to +-, px."),
-    ("--temperature-k", "temperature_k", 2.0, "Reference warmer or colder than its certificate by up to +- this, K."),
+    ("--plane-mm", "plane_mm", 0.5, "Largest distance of the gripper from the plane of the reference, +- mm."),
+    (
+        "--camera-distance-mm",
+        "camera_distance_mm",
+        100.0,
+        "Distance of the camera from the plane of the reference, mm.",
+    ),
+    ("--tilt-deg", "tilt_deg", 2.0, "Largest tilt of the plane, +- degrees."),
+    (
+        "--lens-relative",
+        "lens_relative",
+        0.001,
+        "Largest residual lens distortion, +-, as a fraction of the radius at the corner.",
+    ),
+    (
+        "--edge-bias-px",
+        "edge_bias_px",
+        0.6,
+        "Largest edge bias (both edges together) if no reference determines it, +- px.",
+    ),
+    ("--estimator-px", "estimator_px", 0.02, "Largest phase bias of each edge, +- px."),
+    (
+        "--temperature-k",
+        "temperature_k",
+        2.0,
+        "Largest deviation of the reference's temperature from its certificate's, +- K.",
+    ),
     ("--expansion-per-k", "expansion_per_k", 11.5e-6, "Thermal expansion of the reference (steel), 1/K."),
 )
 

@@ -18,6 +18,8 @@ _TITLE_INCHES, _BESIDE_INCHES = 1.2, 1.8
 """What title and axis need above and below, axis and colour bar to the left and right."""
 _LEAST_WIDE_INCHES = 7.5
 """Two lines of a title in words need that."""
+_ON_AXIS = 1e-9
+"""Of the body's size: edges nearer to the symmetry axis lie on it."""
 _COLOURS = "YlOrRd"
 """Pale where there is no stress, so that the body is seen as a body."""
 
@@ -42,7 +44,7 @@ def framed(low: Array, high: Array) -> tuple[Figure, Axes]:
 
 
 def draw_body(
-    axes: Axes, plate: PlaneStressPlate, moved: Array, stress: Array, top_mpa: float, *, side: float = 1.0
+    axes: Axes, plate: PlaneStressPlate, moved: Array, stress: Array, top_mpa: float, *, side: float | None = None
 ) -> Any:
     """Draw a body's outline at rest and its deformed shape coloured by stress; return the data for a colour bar.
 
@@ -58,12 +60,16 @@ def draw_body(
         Von Mises stress at the corners, in MPa.
     top_mpa : float
         At the end of the colours.
-    side : float
-        -1 draws the mirror image in the y axis.
+    side : float or None
+        1 or -1 for the right half of a body that is its own mirror image in the y axis: -1 draws that image, and the
+        axis, where the two halves are one piece, is drawn as no edge. None for a whole body.
     """
     x, y = plate.nodes_mm
     u, v = moved[plate.x_dofs], moved[plate.y_dofs]
     ends = plate.outline_edges[[0, 2, 1]]
+    if side is not None:
+        ends = ends[:, np.abs(x[ends]).max(axis=0) > _ON_AXIS * np.ptp(plate.nodes_mm)]
+    side = side or 1.0
     count = stress.size
     at_rest, there = (np.stack([side * a[ends], b[ends]]).T for a, b in ((x, y), (x + u, y + v)))
     # One collection: a line each would take longer than the finite elements do.

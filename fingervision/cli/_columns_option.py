@@ -8,5 +8,5 @@ columns_option = click.option(
     "--columns",
     type=click.Path(path_type=Path),
     metavar="columns.toml",
-    help="What the columns of foreign tables are (`fingervision table` writes it); else the columns.toml beside each.",
+    help="Meaning of the columns, from `fingervision table`; default: the columns.toml beside each table.",
 )

@@ -24,5 +24,5 @@ def effects_option(command: Command) -> Command:
 
     return click.option(
         "--effects", "effects_files", multiple=True, metavar="FILE.py", type=click.Path(path_type=Path),
-        help="Add the effects that a Python file holds; may be given more than once.",
+        help="Add the effects of this Python file to the catalogue; repeatable.",
     )(with_effects)  # fmt: skip

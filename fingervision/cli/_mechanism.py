@@ -1,6 +1,5 @@
 """`fingervision model mechanism.toml`: any planar mechanism, by finite elements and by lumped flexures."""
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from fingervision.cli._body_picture import draw_body, extent_mm, framed
+from fingervision.cli._mechanism_files import draw_deformed, draw_over_input, write_figures, write_states
+from fingervision.cli._mechanism_report import add_endurance, print_figures, say_endurance, warn
+from fingervision.cli._model_grip import part_of_pair, write_pair_grip
 from fingervision.cli._model_motion import MotionAsked, move_mechanism
 from fingervision.cli._model_sweep import sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
 from fingervision.domain.errors import ArgumentError, FingervisionError, InstallationError, OutputError, UsageError
-from fingervision.models.gripper_figures import unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
@@ -24,11 +24,8 @@ from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.mechanism_state import MechanismState
 from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
-from fingervision.storage.simulation_csv import POSE
 
 _KINDS = ("finite_element", "lumped")
-_APART = 0.1
-"""Relative: kinds that differ by more beyond their stated errors are worth a sentence (the issue's own bar)."""
 _ROWS = 21
 _MOST_ROWS = 41
 _OF_YIELD = 0.5
@@ -44,12 +41,14 @@ def predict(
     asked: MotionAsked,
     vary: tuple[str, ...],
     *,
+    object_mm: float | None,
+    object_n_mm: float | None,
     large_rotation: bool,
     contact: bool,
     mesh: bool,
     as_json: bool,
 ) -> None:
-    """Write mechanism.csv (and simulation.csv where a pair is called gap), deformed.png, and print the figures."""
+    """Write the figures, mechanism.csv (and simulation.csv where a pair is called gap) and pictures, and print them."""
     from fingervision.cli._model_figures import draw_mesh
     from fingervision.tables.read import read_drive
 
@@ -59,6 +58,7 @@ def predict(
         return
     with _naming(path):
         mechanism = drawing.mechanism()
+    gripped = part_of_pair(object_mm, object_n_mm, mechanism)
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     if kind not in (*_KINDS, "stiffness_matrix", "all"):
@@ -102,16 +102,20 @@ def predict(
     for name, rows in states.items():
         folder = out if name == chief else out / name
         folder.mkdir(exist_ok=True)
-        _write(rows, folder)
+        write_states(rows, folder)
     plate = models.get("finite_element")
     if isinstance(plate, MechanismPlate):
         shown = max(states["finite_element"], key=lambda state: abs(state.input_mm))
-        _draw(plate, shown, out / "deformed.png", large=large_rotation)
+        draw_deformed(plate, shown, out / "deformed.png", large=large_rotation)
         if mesh:
             draw_mesh(plate.mesh, mechanism.name, out / "mesh.png")
     elif mesh:
         click.echo("--mesh draws the mesh of the finite elements: add --kind finite_element.", err=True)
-    _print(mechanism.name, table, as_json=as_json)
+    draw_over_input(mechanism, states, out / "models.png")
+    for name, rows in states.items():
+        add_endurance(mechanism, rows, table[name])
+    write_figures(table, out / "models.csv")
+    print_figures(mechanism.name, table, as_json=as_json)
     if drawing.estimates:
         spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
@@ -121,7 +125,11 @@ def predict(
         move_mechanism(plate, asked, curve, out, as_json=as_json)
     elif asked.moves:
         click.echo("Motion is answered by the finite elements: add --kind finite_element.", err=True)
-    _warn(mechanism, models[chief], states[chief], table, contact=contact)
+    if gripped is not None:
+        write_pair_grip(models, gripped, None if drive is None else inputs, out, as_json=as_json)
+    if not as_json:
+        say_endurance(chief, mechanism, states[chief])
+    warn(mechanism, models[chief], states[chief], table, contact=contact)
 
 
 @contextmanager
@@ -157,93 +165,3 @@ def _built(name: str, mechanism: Mechanism) -> MechanismModel:
     if name == "lumped":
         return MechanismFrame(mechanism)
     return MechanismChain(mechanism)
-
-
-def _print(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> None:
-    if as_json:
-        click.echo(json.dumps(table, indent=2))
-        return
-    click.echo(f"{name:<44}" + "".join(f"{kind:>18}" for kind in table))
-    labels = list(dict.fromkeys(label for figures in table.values() for label in figures))
-    for label in labels:
-        cells = (f"{figures[label]:.6g}" if label in figures else "-" for figures in table.values())
-        shown = label if label.endswith("]") else f"{label} [{unit_of(label)}]"
-        click.echo(f"{shown:<44}" + "".join(f"{cell:>18}" for cell in cells))
-
-
-def _warn(
-    mechanism: Mechanism, model: MechanismModel, states: list[MechanismState], table: dict[str, dict[str, float]], *,
-    contact: bool,
-) -> None:  # fmt: skip
-    """Warn of limits of the results: yield, faces that penetrate each other, kinds that differ."""
-    worst = max(states, key=lambda state: state.stress_mpa)
-    if worst.stress_mpa > mechanism.material.yield_mpa:
-        at_yield_mm = next(iter(table.values()))["input_at_yield_mm"]
-        click.echo(
-            f"Warning: at an input of {worst.input_mm:.3g} mm the stress in the flexures must stay below the yield of "
-            f"{mechanism.material.yield_mpa:g} MPa, but is {worst.stress_mpa:.3g} MPa; stay within "
-            f"{at_yield_mm:.3g} mm.",
-            err=True,
-        )
-    ends = [state.input_mm for state in (states[0], states[-1])]
-    for name, at_mm in model.touch_input_mm().items():
-        if not contact and min(ends) < at_mm < max(ends):
-            click.echo(
-                f"Warning: the faces of contact {name} touch at an input of {at_mm:.4g} mm, and beyond it this answer "
-                "lets them pass through each other; add --contact.",
-                err=True,
-            )
-    if len(table) > 1:
-        first, second = list(table)[:2]
-        for label in ("input_stiffness_n_mm", "mode_1_drive_free_hz"):
-            if label not in table[first] or label not in table[second]:
-                continue
-            apart = table[second][label] / table[first][label] - 1.0
-            stated = sum(figures["model_error_force_percent"] for figures in (table[first], table[second])) / 100.0
-            if abs(apart) > _APART + stated:
-                click.echo(
-                    f"Warning: {second} differs from {first} by {100.0 * apart:.3g} % in {label}, more than their "
-                    f"model errors of together {100.0 * stated:.2g} % leave; trust {first}.",
-                    err=True,
-                )
-
-
-def _write(states: list[MechanismState], out: Path) -> None:
-    columns: dict[str, list[float]] = {"input_mm": [s.input_mm for s in states], "force_n": [s.force_n for s in states]}
-    for name in states[0].probes_mm:
-        for place, axis in enumerate("xy"):
-            columns[f"{name}_{axis}_mm"] = [s.probes_mm[name][place] for s in states]
-    for name in states[0].pairs_mm:
-        columns[f"{name}_mm"] = [s.pairs_mm[name] for s in states]
-    for name in states[0].contact_n:
-        columns[f"{name}_contact_n"] = [s.contact_n[name] for s in states]
-    columns["stress_mpa"] = [s.stress_mpa for s in states]
-    poses = {
-        f"{name}.{part}": [getattr(s.bodies[name], part) for s in states] for name in states[0].bodies for part in POSE
-    }
-    columns |= poses
-    _table(columns, out / "mechanism.csv")
-    if "gap" in states[0].pairs_mm:
-        table = {name: columns[name] for name in ("input_mm", "gap_mm", "force_n")} | poses
-        _table(table, out / "simulation.csv")
-
-
-def _table(columns: dict[str, list[float]], path: Path) -> None:
-    rows = zip(*columns.values(), strict=True)
-    lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _draw(model: MechanismPlate, state: MechanismState, path: Path, *, large: bool) -> None:
-    plate = model.plate
-    moved: NDArray[np.float64] = state.displacement_mm
-    stress = plate.at_corners(plate.von_mises_mpa(moved, large=large))
-    figure, axes = framed(*extent_mm(plate, moved))
-    colours = draw_body(axes, plate, moved, stress, max(state.stress_mpa, 1e-9))
-    axes.set_title(
-        f"{model.mechanism.name}: input {state.input_mm:.3g} mm, to scale, force {state.force_n:.3g} N\n"
-        f"largest stress in a flexure {state.stress_mpa:.3g} MPa (yield {model.mechanism.material.yield_mpa:g} MPa)",
-        fontsize="medium",
-    )
-    figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
-    figure.savefig(path, dpi=130)

@@ -2,7 +2,8 @@
 
 import csv
 from collections.abc import Mapping
-from math import isfinite
+from dataclasses import dataclass
+from math import hypot, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,9 @@ from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.driven_body import DrivenBody
 from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_loads import GrippedPair, PairGrip
+from fingervision.models.mechanism_plate import MechanismPlate
 
 _COLUMNS = ("kind", "input_mm", "gap_mm", "held_width_mm", "grip_n", "force_n", "stress_mpa")
 _ROWS = 61
@@ -37,7 +41,7 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
         raise UsageError(f"--object-mm must be the positive width of a part, but is {width_mm:g}.")
     if stiffness_n_mm is not None and not (isfinite(stiffness_n_mm) and stiffness_n_mm > 0.0):
         raise UsageError(f"--object-n-mm must be a positive stiffness in N/mm, but is {stiffness_n_mm:g}.")
-    if width_mm > 10.0 * rest_gap_mm:
+    if width_mm > 10.0 * abs(rest_gap_mm):
         raise UsageError(
             f"--object-mm must be a part that fits between the fingers, but is {width_mm:g} mm at a rest gap of "
             f"{rest_gap_mm:g} mm; is it in micrometres?"
@@ -68,15 +72,96 @@ def write_grip(
         rows[kind] = np.array([_row(model, float(value), part) for value in at])
         if touch is not None:
             said.append(_words(gripper, kind, model, part, touch, errors[kind]))
-    with (out / "grip.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_COLUMNS)
-        for kind, table in rows.items():
-            writer.writerows([kind, *("" if np.isnan(v) else f"{v:.7g}" for v in row)] for row in table.tolist())
+    _write(rows, out / "grip.csv")
     _draw(rows, part, name, out / "grip.png")
     if not as_json:
         for words in said:
             click.echo(words)
+
+
+@dataclass(frozen=True, slots=True)
+class PartOfPair:
+    """A part between the probes of a pair of a mechanism."""
+
+    part: Part
+    pair: str
+
+
+def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism: Mechanism) -> PartOfPair | None:
+    """Read and check the part, and find the pair that grips it: the one called gap, or the only one.
+
+    Raises
+    ------
+    UsageError
+        Where the part is none, or the drawing has no such pair.
+    """
+    if width_mm is None and stiffness_n_mm is None:
+        return None
+    pairs = mechanism.pairs
+    name = "gap" if "gap" in pairs else next(iter(pairs), "")
+    if not pairs or (name != "gap" and len(pairs) > 1):
+        has = f"{', '.join(pairs)} and none of that name" if pairs else "no [[pair]]"
+        raise UsageError(
+            f"--object-mm must have a pair of probes that grips the part, called gap where there are several, but "
+            f"{mechanism.name} has {has}."
+        )
+    apart = [a - b for a, b in zip(*(mechanism.probes[end] for end in pairs[name]), strict=True)]
+    part = part_asked(width_mm, stiffness_n_mm, hypot(*apart))
+    return None if part is None else PartOfPair(part, name)
+
+
+def write_pair_grip(
+    models: Mapping[str, Any], asked: PartOfPair, inputs: NDArray[np.float64] | None, out: Path, *, as_json: bool
+) -> None:
+    """Write grip.csv and grip.png of a mechanism's finite elements, and print how the part is held."""
+    plate = models.get("finite_element")
+    if not isinstance(plate, MechanismPlate):
+        click.echo("A part between probes is answered by the finite elements: add --kind finite_element.", err=True)
+        return
+    gripped, part = GrippedPair(plate, asked.pair), asked.part
+    touch = gripped.touch_input_mm(part)
+    reach = max(abs(touch), 0.1 * gripped.rest_mm / abs(gripped.per_input))
+    closing = -1.0 if gripped.per_input > 0.0 else 1.0
+    at = np.linspace(touch - 0.3 * closing * reach, touch + 0.5 * closing * reach, _ROWS) if inputs is None else inputs
+    if at.min() < touch < at.max():
+        at = np.union1d(at, [touch])
+    states = [gripped.at(float(value), part) for value in np.sort(at)]
+    rows = {plate.kind: np.array([_cells(state, part) for state in states])}
+    _write(rows, out / "grip.csv")
+    _draw(rows, part, f"{plate.mechanism.name}, {asked.pair}", out / "grip.png")
+    beyond = gripped.at(touch + closing, part)
+    words = (
+        f"{plate.kind}: a part of {part.width_mm:g} mm ({_stiff(part)}) between the probes of {asked.pair} is touched "
+        f"at {touch:.4g} mm of input, and gripped by {beyond.grip_n:.4g} N per mm beyond. Model error of the grip: "
+        f"{100.0 * plate.force_error:.2g} %, without the dents at the probes."
+    )
+    limit = plate.mechanism.material.yield_mpa
+    hot = max(states, key=lambda state: state.stress_mpa)
+    if not as_json:
+        click.echo(words)
+    if hot.stress_mpa > limit:
+        click.echo(
+            f"Warning: with the part held, at an input of {hot.input_mm:.3g} mm, the stress in the flexures must stay "
+            f"below the yield of {limit:g} MPa, but is {hot.stress_mpa:.3g} MPa.",
+            err=True,
+        )
+
+
+def _cells(state: PairGrip, part: Part) -> tuple[float, ...]:
+    held = part.squeezed_mm(state.grip_n) if state.grip_n > _BEYOND_MM else np.nan
+    return state.input_mm, state.distance_mm, held, state.grip_n, state.force_n, state.stress_mpa
+
+
+def _write(rows: Mapping[str, NDArray[np.float64]], path: Path) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_COLUMNS)
+        for kind, table in rows.items():
+            writer.writerows([kind, *("" if np.isnan(v) else f"{v:.7g}" for v in row)] for row in table.tolist())
+
+
+def _stiff(part: Part) -> str:
+    return f"{part.stiffness_n_mm:g} N/mm" if isfinite(part.stiffness_n_mm) else "rigid"
 
 
 def _closing_limit_mm(gripper: Gripper, model: Any, touch_mm: float | None) -> float:
@@ -110,12 +195,11 @@ def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float,
     share = (limit - before.stress_mpa) / (most.stress_mpa - before.stress_mpa)
     grip = before.grip_n + share * (most.grip_n - before.grip_n)
     where = before.input_mm + share * (most.input_mm - before.input_mm)
-    stiff = f"{part.stiffness_n_mm:g} N/mm" if isfinite(part.stiffness_n_mm) else "rigid"
+    pulled = abs(before.force_n + share * (most.force_n - before.force_n))
     return (
-        f"{kind}: a part of {part.width_mm:g} mm ({stiff}) is touched at {touch_mm:.4g} mm of input; each finger grips "
-        f"it by {per_input:.4g} N per mm beyond, at most {grip:.3g} N at {where:.4g} mm, where the hinges yield "
-        f"(the drive then pulls {abs(before.force_n + share * (most.force_n - before.force_n)):.3g} N). Model error of "
-        f"the grip: {100.0 * error:.2g} %."
+        f"{kind}: a part of {part.width_mm:g} mm ({_stiff(part)}) is touched at {touch_mm:.4g} mm of input; each "
+        f"finger grips it by {per_input:.4g} N per mm beyond, at most {grip:.3g} N at {where:.4g} mm, where the hinges "
+        f"yield (the drive then pulls {pulled:.3g} N). Model error of the grip: {100.0 * error:.2g} %."
     )
 
 
@@ -126,8 +210,7 @@ def _draw(rows: Mapping[str, NDArray[np.float64]], part: Part, name: str, path: 
         style = {"color": f"C{place}", "linestyle": ("-", "--", "-.")[place % 3]}
         upper.plot(table[:, 0], table[:, 3], label=kind, **style)
         lower.plot(table[:, 0], table[:, 4], **style)
-    stiff = f"{part.stiffness_n_mm:g} N/mm" if isfinite(part.stiffness_n_mm) else "rigid"
-    upper.set_title(f"{name}: grip on a part of {part.width_mm:g} mm ({stiff}), small displacements")
+    upper.set_title(f"{name}: grip on a part of {part.width_mm:g} mm ({_stiff(part)}), small displacements")
     upper.set_ylabel("grip of each finger / N")
     lower.set_ylabel("force at the drive / N")
     lower.set_xlabel("input / mm")

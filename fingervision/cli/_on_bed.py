@@ -12,7 +12,7 @@ def bed_option(command: Command) -> Command:
     """Add `--bed`: the word simulated, or the configuration file of a bed."""
     return click.option(
         "--bed", "bed_name", default="simulated", show_default=True, metavar="simulated|CONFIG.toml",
-        help="The bed: simulated, or a file that says what it is made of (see fingervision/testbed/README.md).",
+        help="The test bed: the word simulated, or its configuration file (see fingervision/testbed/README.md).",
     )(command)  # fmt: skip
 
 
@@ -20,5 +20,5 @@ def hide_option(command: Command) -> Command:
     """Add `--hide`: effects that act in the simulated parts."""
     return click.option(
         "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]|SEALED.toml",
-        help="Hide an effect of the catalogue in the simulated parts; may be given more than once.",
+        help="Hide an effect of the catalogue in the simulated parts; repeatable.",
     )(command)  # fmt: skip

@@ -33,12 +33,16 @@ OPTIONS = (
         is_eager=True,
         expose_value=False,
         callback=_take_settings,
-        help="File with settings, as the page saves them; options that are given come before it.",
+        help="Settings file, as saved by the browser page; options on the command line override it.",
     ),
     click.option(
         "--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale with its uncertainty."
     ),
-    click.option("--px-per-mm", type=float, help="The scale alone; the uncertainty then holds the random part alone."),
+    click.option(
+        "--px-per-mm",
+        type=float,
+        help="The scale without its uncertainty; uncertainties then have only the random part.",
+    ),
     click.option(
         "--below-tip-mm",
         type=float,

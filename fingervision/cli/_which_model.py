@@ -44,5 +44,5 @@ kind_option = click.option(
     type=KindChoice(),
     default="lumped",
     show_default=True,
-    help="Which model answers for a gripper.toml.",
+    help="Kind of model that computes a gripper.toml.",
 )

@@ -22,19 +22,20 @@ Examples:
   fingervision batch diagnose 'runs/*/samples.csv' --model comsol.csv --out diagnoses
 
 \b
-Put patterns in quotes; ** stands for any folders. The same call again does what is not done, has changed, or failed:
-after a crash or Ctrl-C it goes on. Each worker uses one core. All machines of a cluster must see the files on one path.
+Put patterns in quotes; ** stands for any folders. Give the same command again to continue after a crash or Ctrl-C: it
+processes only inputs that are not done, have changed, or failed. Each worker uses one core. All machines of a cluster
+must see the files under the same path.
 
 \b
 Files written to --out:
-  <input's name>/  the command's own files, and record.json: what they were made of
-  batch.csv        one row an input: result, exit code, sentence, figures
-  batch.png        all of them in one figure
-  index.html       a small picture of each, on one page that needs nothing else
+  <input's name>/  the files of the command, and record.json: input, options and version of each result
+  batch.csv        one row per input: result, exit code, message, numbers
+  batch.png        all results in one plot
+  index.html       a small picture of each result, on a single self-contained page
 
 \b
-Exit codes: 0 all done; 1 none could be done, or stopped; 2 wrong usage; 3 done, but some inputs were damaged or could
-not be done: each is listed with its sentence.
+Exit codes: 0 all done; 1 no input could be processed, or the batch was stopped; 2 wrong usage; 3 done, but some inputs
+were damaged or could not be processed: each is listed with its message.
 """
 OWN = ("inputs", "out", "scheduler", "jobs", "as_json")
 BAD_SHOWN = 10
@@ -42,7 +43,7 @@ BAD_SHOWN = 10
 
 @click.group(epilog=EXAMPLES)
 def command() -> None:
-    """Run one command on many inputs, each into its own folder, with an overview of all of them."""
+    """Run one command on many inputs, each into its own folder, with an overview of all results."""
 
 
 def _batch_of(name: str) -> click.Command:
@@ -69,11 +70,15 @@ def _batch_of(name: str) -> click.Command:
             click.Argument(["inputs"], nargs=-1, required=True, metavar="INPUT..."),
             *options,
             click.Option(["--scheduler"], metavar="tcp://HOST:PORT", help="Work on this Dask cluster."),
-            click.Option(["--jobs"], type=click.IntRange(min=1), help="Processes on this machine; one a core."),
-            click.Option(["--out"], type=click.Path(path_type=Path), required=True, help="Folder of all results."),
-            click.Option(["--json", "as_json"], is_flag=True, help="Print the outcomes as JSON."),
+            click.Option(
+                ["--jobs"],
+                type=click.IntRange(min=1),
+                help="Number of processes on this machine; default: one per core.",
+            ),
+            click.Option(["--out"], type=click.Path(path_type=Path), required=True, help="Folder for all results."),
+            click.Option(["--json", "as_json"], is_flag=True, help="Print the result of every input as JSON."),
         ],
-        help=f"Run `fingervision {name}` on every INPUT: paths, and patterns in quotes.",
+        help=f"Run `fingervision {name}` on every INPUT. Inputs are paths, or patterns in quotes.",
         epilog=EXAMPLES,
     )
 

@@ -78,9 +78,14 @@ def _output_options(command: Command) -> Command:
                 default="auto",
                 show_default=True,
                 metavar="auto|linear|srgb|bt709|FILE",
-                help="Which light a grey level stands for; auto: the pictures' own tag, else linear.",
+                help="Camera response, from grey level to light; auto: as the pictures are tagged, else linear.",
             ),
-            click.option("--camera", multiple=True, metavar="NAME=VALUE", help="A setting of the camera; repeatable."),
+            click.option(
+                "--camera",
+                multiple=True,
+                metavar="NAME=VALUE",
+                help="A camera setting to record in the calibration; repeatable.",
+            ),
             click.option("--no-picture", is_flag=True, help="Write no calibration picture."),
             click.option("--json", "as_json", is_flag=True, help="Print the result for programs."),
         )
@@ -96,7 +101,7 @@ def _size_options(command: Command) -> Command:
             click.option(
                 "--u-size-mm", default=0.001, show_default=True, help="Standard uncertainty of every size, mm."
             ),
-            click.option("--roi", metavar="X,Y,W,H", help="Look in this part of every picture."),
+            click.option("--roi", metavar="X,Y,W,H", help="Use only this part of every picture."),
         )
     ):
         command = option(command)
@@ -110,8 +115,9 @@ def _size_options(command: Command) -> Command:
 def bar(**options: Any) -> None:
     """Calibrate on bars: objects with two parallel straight edges a known distance apart.
 
-    One object a picture, in any direction; it may leave the frame. Three sizes give scale and edge bias; fewer give the
-    scale, and the bias stays in the budget. Prefix an item to mix: slot:ref3.png=3.000.
+    Each picture shows one object, in any direction; the object may extend beyond the picture. Three sizes give scale
+    and edge bias. Fewer sizes give only the scale; the edge bias is then not corrected, and its limit enters the
+    budget. To add slots, prefix an item: slot:ref3.png=3.000.
     """
     calibrate_on_sizes("bar", **options)
 
@@ -123,7 +129,7 @@ def bar(**options: Any) -> None:
 def slot(**options: Any) -> None:
     """Calibrate on slots: gaps between two parallel straight edges a known distance apart.
 
-    As `bar`; prefix an item to mix: bar:ref5.png=5.000.
+    Everything else is as for `bar`. To add bars, prefix an item: bar:ref5.png=5.000.
     """
     calibrate_on_sizes("slot", **options)
 
@@ -151,10 +157,10 @@ def _board_options(command: Command) -> Command:
 @limit_options
 @_output_options
 def chessboard(**options: Any) -> None:
-    """Calibrate on a chessboard: lens and tilt from three pictures or more, the plane alone from one.
+    """Calibrate on a chessboard: lens and tilt from three pictures or more, only the plane from one picture.
 
-    The first picture defines the plane in which distances are measured: put the board where the gripper moves. In the
-    others tilt it differently each time.
+    The first picture defines the plane in which distances are measured: put the board where the gripper moves. For the
+    other pictures, tilt the board differently each time.
     """
     calibrate_on_board("chessboard", **options)
 
@@ -166,9 +172,9 @@ def chessboard(**options: Any) -> None:
 @limit_options
 @_output_options
 def charuco(**options: Any) -> None:
-    """Calibrate on a ChArUco board; it may leave the frame. The dictionary of its markers is found by itself.
+    """Calibrate on a ChArUco board, which may extend beyond the picture; its marker dictionary is recognised.
 
-    As `chessboard`, but --squares counts squares.
+    Everything else is as for `chessboard`, but --squares counts squares and not inner corners.
     """
     calibrate_on_board("charuco", **options)
 
@@ -180,37 +186,38 @@ def charuco(**options: Any) -> None:
 @click.option(
     "--u-length-mm", default=0.001, show_default=True, help="Standard uncertainty of the length over all lines, mm."
 )
-@click.option("--roi", metavar="X,Y,W,H", help="Look in this part of the picture.")
+@click.option("--roi", metavar="X,Y,W,H", help="Use only this part of the picture.")
 @limit_options
 @_output_options
 def scale(**options: Any) -> None:
     """Calibrate on a line scale (stage micrometer) over all its lines, in any direction.
 
-    The middles of the lines give the scale: blooming and the camera's response move a line's two edges in opposite
-    senses and leave its middle alone. The edge bias of a gap stays in the budget, with its limit.
+    The scale comes from the middles of the lines: blooming and the camera's response move the two edges of a line in
+    opposite directions and do not move its middle. The edge bias of a gap is therefore not corrected; its limit enters
+    the budget.
     """
     calibrate_on_lines(**options)
 
 
 @command.command("response", epilog=RESPONSE_EXAMPLES)
 @click.argument("items", nargs=-1, required=True, metavar="IMAGE[=EXPOSURE]...")
-@click.option("--edges", is_flag=True, help="Pictures of straight plain edges instead, sharp and unclipped: IMAGE...")
+@click.option("--edges", is_flag=True, help="Use pictures of sharp, unclipped, straight, plain edges instead.")
 @click.option(
     "--densities",
     metavar="A:B:STEP|A,B,...",
-    help="One picture of a grey wedge instead, with the optical densities of its fields, lightest first.",
+    help="Use one picture of a grey wedge instead; optical densities of its fields, lightest first.",
 )
-@click.option("--roi", metavar="X,Y,W,H", help="With --densities: where the wedge's fields lie.")
+@click.option("--roi", metavar="X,Y,W,H", help="With --densities: region of the wedge's fields.")
 @click.option("-o", "--out", default="response.csv", type=click.Path(path_type=Path), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
 def response(**options: Any) -> None:
-    """Measure the camera's response, best from pictures of one still scene at several exposures.
+    """Measure the camera's response (light for each grey level), best from a still scene at several exposures.
 
-    An exposure series needs flat parts of many shades (paper with grey fields); only the exposure time changes, the
-    aperture, the light and the focus do not. Exposures count by their ratios: seconds or any other unit.
+    For an exposure series, the scene needs flat parts of many shades (paper with grey fields). Change only the exposure
+    time; leave aperture, light and focus. Only the ratios of the exposures matter, so their unit is free.
 
-    A grey wedge needs one picture and its certificate. Where there is neither, the shape of straight edges tells a
-    power law to some 5 %, as long as the camera does not sharpen.
+    For a grey wedge, one picture and the wedge's certificate suffice. Without series and wedge, --edges estimates a
+    power law to about 5 % from the shape of straight edges, if the camera does not sharpen.
     """
     from fingervision.cli._measuring_response import measure_response
 
@@ -223,7 +230,7 @@ def response(**options: Any) -> None:
 @_size_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
 def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
-    """Measure a known object with an existing calibration and say whether it agrees (E_n number)."""
+    """Measure an object of known size with an existing calibration and say whether both agree (E_n number)."""
     with sentences():
         from fingervision.interface.calibration import Calibration
         from fingervision.interface.reference_pictures import Reference, known_sizes
@@ -257,13 +264,14 @@ def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | 
 
 @command.command("repeat", epilog=REPEAT_EXAMPLES)
 @click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=click.Path(path_type=Path))
-@click.option("--tolerance-mm", type=float, default=None, help="Whole width of the tolerance, for %GRR.")
-@click.option("--by-input", is_flag=True, help="Every input_mm of the drive is a part of its own.")
+@click.option("--tolerance-mm", type=float, default=None, help="Full width of the tolerance, for %GRR.")
+@click.option("--by-input", is_flag=True, help="Treat every input_mm of the drive as a separate part of the study.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
 def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, as_json: bool) -> None:
     """Gauge repeatability and reproducibility over repeated recordings (AIAG, analysis of variance).
 
-    Frames of one recording repeat; recordings of the same thing, set up again each time, reproduce.
+    The scatter of the frames within a recording gives the repeatability. The differences between recordings of the same
+    object, set up anew each time, give the reproducibility.
     """
     with sentences():
         from calib.gauge_study import gauge_study, refuse_moving, verdict

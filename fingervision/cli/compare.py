@@ -19,8 +19,8 @@ Examples:
 
 \b
 Files written to --out:
-  compare.html   figures to zoom and read   compare.json  the same for programs
-  gap_against_input, gap_over_time, residuals: figures as .svg and .pdf; compare.png
+  compare.html   plots to zoom and read    compare.json  the same as data
+  gap_against_input, gap_over_time, residuals: plots as .svg and .pdf; compare.png
 """
 
 
@@ -28,7 +28,9 @@ Files written to --out:
 @click.argument("measured", type=click.Path(path_type=Path))
 @models_option
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the bootstrapped threshold.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the bootstrap for the threshold."
+)
 @kind_option
 @effects_option
 @columns_option
@@ -42,7 +44,7 @@ def command(
     columns: Path | None,
     as_json: bool,
 ) -> None:
-    """Say where a measured table and one or more models disagree beyond the noise."""
+    """Say where a measured table and each of one or more models disagree beyond the noise."""
     import json
 
     from fingervision.diagnosis.report.comparison_files import PAGE

@@ -20,14 +20,14 @@ Examples:
 @hide_option
 @effects_option
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True,
-              help="Of everything random; without --hide also of what is hidden.")  # fmt: skip
+              help="Seed of all randomness; without --hide, it also chooses the hidden effect.")  # fmt: skip
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("demo"), show_default=True, help="Folder to write."
 )
 def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
-    """Hide an effect in the simulated bed, run a recipe, measure its pictures, and find what was hidden.
+    """Hide an effect in the simulated test bed, run a recipe, measure its video, and find the hidden effect.
 
-    Where the first run leaves the answer open, the proposed next one is run as well.
+    If the first run leaves several explanations, the proposed next run is made as well.
     """
     from fingervision.demonstration.demonstrate import demonstrate, drawn
     from fingervision.testbed.simulation.parse_injected_effects import hidden_from

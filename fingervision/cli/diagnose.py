@@ -19,9 +19,9 @@ Examples:
 
 \b
 Files written to --out:
-  report.html   the answer on one page       report.json   the same for programs
-  model.toml    the corrected model          next_run.toml the run that would settle what is open
-  gap_against_input, gap_over_time, residuals: figures as .svg and .pdf
+  report.html   the result on one page       report.json   the same as data
+  model.toml    the corrected model          next_run.toml recipe of a run that separates what is ambiguous
+  gap_against_input, gap_over_time, residuals: plots as .svg and .pdf
 """
 
 
@@ -29,14 +29,14 @@ Files written to --out:
 @click.argument("measured", type=click.Path(path_type=Path))
 @model_option
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("diagnosis"), show_default=True)
-@click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Insist on this effect.")
-@click.option("--without", multiple=True, metavar="EFFECT", help="Rule this effect out.")
+@click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Include this effect in every explanation.")
+@click.option("--without", multiple=True, metavar="EFFECT", help="Exclude this effect from every explanation.")
 @click.option(
     "--seed",
     type=click.IntRange(0),
     default=1,
     show_default=True,
-    help="Of the bootstrap: the same seed gives the same report.",
+    help="Seed of the bootstrap; the same seed gives the same report.",
 )
 @kind_option
 @effects_option

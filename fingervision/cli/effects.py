@@ -18,10 +18,12 @@ Examples:
 
 @click.command(epilog=EXAMPLES)
 @click.argument("name", required=False)
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Draw how it looks in a residual.")
+@click.option(
+    "--figure", type=click.Path(path_type=Path, dir_okay=False), help="Plot the residual that the effect causes."
+)
 @effects_option
 def command(name: str | None, figure: Path | None) -> None:
-    """List the physical effects, or explain one."""
+    """List the physical effects, or explain the effect NAME."""
     from difflib import get_close_matches
 
     from fingervision.effects import catalogue, origin_of

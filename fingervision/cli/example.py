@@ -12,7 +12,7 @@ Examples:
   fingervision example diagnose --out trial
 
 \b
-The examples in the --help of a command work in the folder of its name.
+The examples of `fingervision NAME --help` work in the folder that `fingervision example NAME` writes.
 """
 
 
@@ -20,7 +20,7 @@ The examples in the --help of a command work in the folder of its name.
 @click.argument("name", required=False)
 @click.option("--out", type=click.Path(path_type=Path), help="The new folder; example-NAME if not given.")
 def command(name: str | None, out: Path | None) -> None:
-    """Copy a runnable case, or list what there is."""
+    """Copy the runnable example NAME into a new folder, or list all examples."""
     from fingervision.domain.errors import UsageError
     from fingervision.interface.examples import CASES, copy_example
 

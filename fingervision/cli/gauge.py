@@ -17,10 +17,10 @@ Examples, in the folder of `fingervision example measure`:
   fingervision gauge opening.mp4 --calibration calibration.json --no-browser
 
 \b
-A gauge is added in the panel: choose its kind, and drag over the picture's first frame (across an edge, along a line,
-over a circle or a patch), or press Add and type its numbers. Arrow keys move the chosen one by 1 px (with Shift 10).
-What is drawn is read at once, by the code of `measure`. Save writes the file, and keeps its comments; then
-`fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml` measures it in every frame.
+To add a gauge in the panel, choose its kind and drag over the first video frame (across an edge, along a line, over a
+circle or a patch), or press Add and type its numbers. Arrow keys move the chosen gauge by 1 px (with Shift by 10 px).
+The value of a gauge is shown at once, computed by the code of `measure`. Save writes the gauges file and keeps the
+comments in it; then `fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml` measures every frame.
 """
 USUAL_GAUGES = Path("gauges.toml")
 
@@ -32,12 +32,20 @@ USUAL_GAUGES = Path("gauges.toml")
     type=click.Path(path_type=Path),
     default=USUAL_GAUGES,
     show_default="gauges.toml in the current folder",
-    help="File that is read, where it exists, and saved to.",
+    help="Gauges file: read if it exists, and saved to.",
 )
-@click.option("--rate-hz", type=float, help="Frames in a second, of images without times.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for what the page measures.  [default: live]")
-@click.option("--port", type=click.IntRange(0, 65535), default=USUAL_PORT, show_default=True, help="0: any free one.")
-@click.option("--no-browser", is_flag=True, help="Print the page's address, and open nothing.")
+@click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for what the browser page measures.  [default: live]"
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=USUAL_PORT,
+    show_default=True,
+    help="Port of the page; 0: any free port.",
+)
+@click.option("--no-browser", is_flag=True, help="Print the page's address, but open no browser.")
 @where_to_measure
 def command(
     recording: str,
@@ -52,11 +60,11 @@ def command(
     tips: str,
     roi: str | None,
 ) -> None:
-    """Draw gauges on RECORDING (a video, images, a run's folder) in the page of `fingervision live`.
+    """Draw gauges on RECORDING (a video, images, a run folder) in the browser page of `fingervision live`.
 
-    Edges, pairs of edges, lines, circles, marks, patches and gaps are drawn, dragged, typed, named and saved to a file
-    that `fingervision measure --gauges` takes. Without a scale they can be drawn, and are read once the page is given
-    one.
+    Gauges are edges, pairs of edges, lines, circles, marks, patches and gaps. You draw, drag, type and name them, and
+    save them to a file for `fingervision measure --gauges`. Gauges can be drawn before a scale is known; their values
+    appear once the scale is entered on the page.
     """
     from fingervision.live.access import Access
     from fingervision.live.beside import Beside

@@ -16,7 +16,7 @@ Examples:
   fingervision inspect simulated
 
 \b
-Exit codes: 0 done, whatever was found; 1 nothing could be measured, and the report says why; 2 wrong usage.
+Exit codes: 0 done, whatever was found; 1 no frame could be measured, and the report says why; 2 wrong usage.
 """
 # Without a scale the edges are looked at so far below the tips (pixels).
 WITHOUT_SCALE_PX = 10.0
@@ -25,16 +25,16 @@ WITHOUT_SCALE_PX = 10.0
 @click.command(epilog=EXAMPLES)
 @click.argument("source")
 @where_to_measure
-@click.option("--seconds", type=float, default=5.0, show_default=True, help="How long to look.")
-@click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
+@click.option("--seconds", type=float, default=5.0, show_default=True, help="Duration of the inspection, in seconds.")
+@click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
 @click.option(
     "--response",
     default="auto",
     show_default=True,
     metavar="auto|linear|srgb|bt709|FILE",
-    help="Which light a grey level stands for; auto: the calibration's, else the recording's own tag, else linear.",
+    help="Camera response; auto: as in the calibration, else as the recording is tagged, else linear.",
 )
-@click.option("--bits", type=click.IntRange(8, 16), help="Depth of levels stored in 16 bits, where it is not 16.")
+@click.option("--bits", type=click.IntRange(8, 16), help="True bit depth of levels stored in 16 bits, if not 16.")
 @click.option("--fingers", type=click.Choice(["auto", "dark", "light"]), default="auto", show_default=True)
 @click.option(
     "--picture",
@@ -61,10 +61,10 @@ def command(
     no_picture: bool,
     as_json: bool,
 ) -> None:
-    """Look at SOURCE for some seconds and say what limits the measurement, the worst first.
+    """Look at SOURCE (camera or recording) for some seconds and list what limits the measurement, worst first.
 
-    Each limit (focus, exposure, gamma, compression, motion, light, tilt, scale, vibration, surroundings, view) comes
-    with figures, its cost in µm and what to change. Without a scale costs are in pixels.
+    Each limit (focus, exposure, gamma, compression, motion, light, tilt, scale, vibration, surroundings, view) is
+    listed with its numbers, its cost in µm of uncertainty, and what to change. Without a scale, costs are in pixels.
     """
     import json
 

@@ -27,13 +27,13 @@ Examples:
   fingervision live 0 --px-per-mm 34 --no-page --out runs   also records, from the first frame
 
 \b
-The page is served to this machine alone, at the address that is printed; the address holds a token.
-A run that is recorded is a folder in --out: video.mp4 (lossless, or the camera's own packets), gaps.csv,
-events.jsonl, run.json. `fingervision measure RUN/video.mp4` gives the same numbers again.
+By default, only this machine can open the page, at the address that is printed (it contains a secret token).
+A recorded run is a folder in --out: video.mp4 (lossless, or the camera's own packets), gaps.csv,
+events.jsonl, run.json. `fingervision measure RUN/video.mp4` gives the same values again.
 
 \b
-What a camera is asked for is read back; where it does otherwise, it is said. Its exposure, focus and white balance are
-asked not to change by themselves.
+Settings requested from a camera are read back; a setting that the camera did not accept is reported. The camera is
+asked to keep exposure, focus and white balance constant.
 """
 USUAL_OUT, USUAL_PORT = Path("live"), 8025
 
@@ -42,49 +42,71 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.argument("source", required=False)
 @click.option("--list", "list_cameras", is_flag=True, help="List the cameras of this machine.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for runs and snapshots.  [default: live]")
-@click.option("--as-camera", is_flag=True, help="Play a recording once at its own pace, as if it came from a camera.")
-@click.option("--no-page", is_flag=True, help="No page: gap, status and rate in the terminal.")
-@click.option("--json", "as_json", is_flag=True, help="Print one line of JSON a frame, with the columns of gaps.csv.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address that the page is served at.")
-@click.option("--port", type=click.IntRange(0, 65535), default=USUAL_PORT, show_default=True, help="0: any free one.")
+@click.option("--as-camera", is_flag=True, help="Play a recording once in real time, as if it came from a camera.")
+@click.option("--no-page", is_flag=True, help="Open no browser page; print gap, status and rate in the terminal.")
+@click.option("--json", "as_json", is_flag=True, help="Print one line of JSON per frame, with the columns of gaps.csv.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Network address at which the page is served.")
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=USUAL_PORT,
+    show_default=True,
+    help="Port of the page; 0: any free port.",
+)
 @click.option(
     "--password-file",
     type=click.Path(path_type=Path),
-    help="Text file with the password that the page asks for; needed beyond this machine.",
+    help="Text file with the password of the page; required if other machines can reach it.",
 )
 @click.option("--tls-cert", type=click.Path(path_type=Path), help="Certificate (PEM): the page is served over TLS.")
-@click.option("--tls-key", type=click.Path(path_type=Path), help="Its key (PEM).")
-@click.option("--size", metavar="WxH", help="Size that the camera is asked for.")
-@click.option("--rate-hz", type=float, help="Frames in a second that the camera is asked for.")
-@click.option("--format", "pixel_format", metavar="FOUR", help="Format, such as YUYV (raw) or MJPG.  [default: raw]")
-@click.option("--exposure-ms", type=float, help="Time that the sensor gathers light.")
+@click.option("--tls-key", type=click.Path(path_type=Path), help="Private key of the certificate (PEM).")
+@click.option("--size", metavar="WxH", help="Picture size to request from the camera.")
+@click.option("--rate-hz", type=float, help="Frames per second to request from the camera.")
+@click.option(
+    "--format",
+    "pixel_format",
+    metavar="FOUR",
+    help="Pixel format to request, such as YUYV (raw) or MJPG.  [default: raw]",
+)
+@click.option("--exposure-ms", type=float, help="Exposure time.")
 @click.option("--gain", type=float, help="Amplification, in the camera's own units.")
 @click.option("--focus", type=float, help="Focus, in the camera's own units.")
-@click.option("--white-balance-k", type=float, help="Colour temperature.")
+@click.option("--white-balance-k", type=float, help="Colour temperature of the white balance.")
 @click.option(
-    "--model", "model_path", type=click.Path(path_type=Path), help="Hold the gap against this model as it is measured."
+    "--model",
+    "model_path",
+    type=click.Path(path_type=Path),
+    help="Compare the gap with this model while it is measured.",
 )
 @click.option(
     "--kind",
     type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
     default="lumped",
     show_default=True,
-    help="Which model answers for a gripper.toml.",
+    help="Kind of model that computes a gripper.toml.",
 )
 @click.option(
-    "--drive", type=click.Path(path_type=Path), help="The stage's log, on this view's or the recording's time."
+    "--drive", type=click.Path(path_type=Path), help="Log of the stage, in the time of this view or recording."
 )
-@click.option("--drive-offset-s", type=float, help="Added to the drive's times; a recording's is found if not given.")
+@click.option(
+    "--drive-offset-s",
+    type=float,
+    help="Clock offset, added to the drive's times; for a recording, it is determined if not given.",
+)
 @click.option(
     "--gauges",
     type=click.Path(path_type=Path),
-    help="Gauges of one's own: drawn, followed and read in the page; read from this file where it exists.",
+    help="File of user-defined gauges, which the page shows, measures and edits; it need not exist.",
 )
-@click.option("--bed", "bed_name", metavar="simulated|CONFIG.toml", help="Show this test bed through its own camera.")
+@click.option("--bed", "bed_name", metavar="simulated|CONFIG.toml", help="Show this test bed through its camera.")
 @click.option(
-    "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]", help="Hide an effect in a simulated bed."
+    "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]", help="Hide an effect in a simulated test bed."
 )
-@click.option("--allow-motion", is_flag=True, help="Let the page move the bed; without it, it only looks and stops.")
+@click.option(
+    "--allow-motion",
+    is_flag=True,
+    help="Let the page move the stage of the test bed; otherwise the page can only show and stop it.",
+)
 @where_to_measure
 def command(
     source: str | None,
@@ -119,11 +141,11 @@ def command(
     tips: str,
     roi: str | None,
 ) -> None:
-    """Show SOURCE: a camera's number, a /dev path, a stream, a recording, the folder of a run, or the word simulated.
+    """Show SOURCE: a camera number, a /dev path, a stream, a recording, a run folder, or the word simulated.
 
-    Every frame is measured. The page shows the picture with the measured points, the gap with its uncertainty, and its
-    history; it records, calibrates and saves. A recording is opened to scrub, step and play in, and measured as
-    `fingervision measure` does.
+    Every frame is measured. The browser page shows the picture with the measured points, the gap with its uncertainty,
+    and the gap over time; it can record, calibrate and save. In a recording you can scrub, step and play; it is
+    measured as by `fingervision measure`.
     """
     if list_cameras:
         _list()

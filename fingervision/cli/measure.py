@@ -28,78 +28,84 @@ Examples:
 
 \b
 Files written to --out:
-  gaps.csv      one row a frame: gap with its uncertainty, points, tips, or why there is no number
-  summary.json  counts, statistics, settings, scale, what the uncertainty covers and what it does not
+  gaps.csv      one row per frame: gap with its uncertainty, points, tips, or why there is no value
+  summary.json  counts, statistics, settings, scale, what the uncertainty includes and what not
   gap.png       the gap over time
   bodies.csv    with --mechanism: pose and status of every body and hinge, frame by frame
-  gauges.csv    with --gauges: one row a number, time_s,gauge,quantity,value,u,unit,status
-  overlay.mp4   with --overlay: edges, tips, points and value drawn in
-  steps/        with --steps: a picture of every step
+  gauges.csv    with --gauges: one row per value, time_s,gauge,quantity,value,u,unit,status
+  overlay.mp4   with --overlay: video with edges, tips, points and value drawn in
+  steps/        with --steps: a picture of every processing step
 
 \b
-Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
-3 done, but the recording was damaged: what could be read is written.
+Exit codes: 0 done; 1 failed, or no frame has a gap; 2 wrong usage;
+3 done, but the recording was damaged: everything that could be read is written.
 """
 
 
 @click.command(epilog=EXAMPLES)
 @click.argument("recording")
 @where_to_measure
-@click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
-@click.option("--frames", metavar="FIRST:LAST", help="Measure these frames alone; counted from 0, both included.")
+@click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
+@click.option("--frames", metavar="FIRST:LAST", help="Measure only these frames; counted from 0, both included.")
 @click.option(
     "--drive",
     type=click.Path(path_type=Path),
-    help="The stage's log: drive.csv (time_s,input_mm[,run][,force_n]) or any.",
+    help="Log of the stage: drive.csv (time_s,input_mm[,run][,force_n]) or a table of any program.",
 )
 @columns_option
 @click.option(
     "--drive-offset-s",
     type=float,
-    help="Added to the drive's times to get the recording's; found from the motion if not given.",
+    help="Clock offset, added to the drive's times; determined from the motion if not given.",
 )
 @click.option(
     "--response",
     default="auto",
     show_default=True,
     metavar="auto|linear|srgb|bt709|FILE",
-    help="Which light a grey level stands for; auto: the calibration's, else the recording's own tag, else linear.",
+    help="Camera response; auto: as in the calibration, else as the recording is tagged, else linear.",
 )
-@click.option("--bits", type=click.IntRange(8, 16), help="Depth of levels stored in 16 bits, where it is not 16.")
+@click.option("--bits", type=click.IntRange(8, 16), help="True bit depth of levels stored in 16 bits, if not 16.")
 @click.option(
     "--fingers",
     type=click.Choice(["auto", "dark", "light"]),
     default="auto",
     show_default=True,
-    help="Whether the fingers are darker or lighter than their ground.",
+    help="Whether the fingers are darker or lighter than the background.",
 )
 @click.option(
     "--face",
     type=click.Choice(["front", "outline"]),
     default="front",
     show_default=True,
-    help="Edge of a thick part: of the face towards the camera, or of its outline, side walls included.",
+    help="Edge to measure on a thick part: that of the face towards the camera, or the outline with side walls.",
 )
 @click.option(
     "--gauges",
     type=click.Path(path_type=Path),
-    help="Gauges of your own (gauges.toml): edges, lines, circles, marks, patches.",
+    help="Also measure user-defined gauges (gauges.toml): edges, lines, circles, marks, patches.",
 )
 @click.option(
     "--mechanism",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="gripper.toml or mechanism.toml: also follow the bodies that it draws, bodies.csv.",
+    help="gripper.toml or mechanism.toml: also measure the poses of its bodies; written to bodies.csv.",
 )
 @click.option(
     "--at",
     "points",
     multiple=True,
     metavar="X,Y=XMM,YMM",
-    help="With --mechanism: where a point of the drawing lies in the first picture, in px and in mm; three tell all.",
+    help="With --mechanism: pixel X,Y of the first frame shows point XMM,YMM of the drawing; give three such points.",
 )
-@click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
-@click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
+@click.option("--overlay", is_flag=True, help="Also write overlay.mp4, the video with the measurement drawn in.")
+@click.option(
+    "--steps",
+    "steps_frame",
+    type=int,
+    metavar="FRAME",
+    help="Also write a picture of every processing step of this frame (counted from 0).",
+)
 @click.option(
     "--out",
     type=click.Path(path_type=Path),

@@ -40,8 +40,8 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
-@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Which model.")
-@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs to answer.")
+@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Kind of model.")
+@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs over time.")
 @columns_option
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder to write."
@@ -58,7 +58,8 @@ Examples:
 @click.option("--damping", default="modal:0.025", show_default=True, metavar="LAW", help="In motion: modal:RATIO, "
               "loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 above the lowest mode).")  # fmt: skip
 @click.option("--rate-hz", type=float, help="Rows a second of response.csv, beside the drive's own samples.")
-@click.option("--object-mm", type=float, help="Width of a part between the fingers: grip.csv and grip.png.")
+@click.option("--object-mm", type=float, help="Width of a part between the fingers, or the probes of a pair: "
+              "grip.csv and grip.png.")  # fmt: skip
 @click.option("--object-n-mm", type=float, help="Stiffness of that part in N/mm; rigid where left out.")
 @click.option("--mesh", is_flag=True, help="Draw the mesh of the finite elements to mesh.png.")
 @click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Table over one number of the drawing, N values from "
@@ -84,18 +85,18 @@ def command(
     vary: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Predict gap, force, stress and vibration from a drawing, by one model or all of them.
+    """Predict gap, force, stress and vibration from a drawing, by one kind of model or all kinds.
 
     Writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the paper's Figure 9, with
     differences) and deformed.png (with finite elements). With --drive also response.csv, the gap and the force over
     the drive's time, which compare and diagnose take as measured, and response.png. A mechanism drawn by bodies
-    (mechanism.toml) is answered by finite elements: mechanism.csv, deformed.png.
+    (mechanism.toml) has its own table over the input, mechanism.csv.
     """
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_inputs import inputs_mm, inputs_until_touch, with_rows_between
     from fingervision.cli._model_motion import motion_asked, move
     from fingervision.cli._model_report import print_table, say_what_limits, write_table
-    from fingervision.domain.errors import FingervisionError, UsageError
+    from fingervision.domain.errors import FingervisionError
     from fingervision.models.agreement import disagreements
     from fingervision.models.gripper_figures import gripper_figures
     from fingervision.models.hinge_correction import HingeTheory
@@ -112,11 +113,10 @@ def command(
     if is_mechanism(gripper_toml):
         from fingervision.cli._mechanism import predict
 
-        if object_mm is not None or object_n_mm is not None:
-            raise UsageError("--object-mm works for a gripper.toml only; leave it out for a mechanism.toml.")
         predict(
             gripper_toml, kind, drive, columns, out, asked, vary,
-            large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json,
+            object_mm=object_mm, object_n_mm=object_n_mm, large_rotation=large_rotation, contact=contact, mesh=mesh,
+            as_json=as_json,
         )  # fmt: skip
         finish_in(out, gripper_toml, _SWEPT if vary else _PREDICTED, began_ns)
         return

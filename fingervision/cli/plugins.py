@@ -15,16 +15,16 @@ Examples:
 A distribution adds a part by an entry point of its group:
   fingervision.effects        fingervision.models    fingervision.frame_sources  fingervision.report_parts
   fingervision.actuators      fingervision.cameras   fingervision.force_sensors
-A file adds one for a command: --effects FILE.py, or kind = "./FILE.py" in a bed's file. The README.md of
-fingervision/plugins says what each must be; fingervision.testing holds the tests that every part passes.
+A Python file adds a part without installation: --effects FILE.py, or kind = "./FILE.py" in a bed.toml. The README.md of
+fingervision/plugins says what each part must define; fingervision.testing has the tests that every part passes.
 """
 
 
 @click.command(epilog=EXAMPLES)
-@click.option("--all", "every", is_flag=True, help="List what is built in as well.")
-@click.option("--json", "as_json", is_flag=True, help="Print the list for programs, with what is built in.")
+@click.option("--all", "every", is_flag=True, help="Also list built-in parts.")
+@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON, with built-in parts.")
 def command(every: bool, as_json: bool) -> None:
-    """List the installed plug-ins, where each comes from, and what is left out and why."""
+    """List the installed plug-ins, where each comes from, and which were left out and why."""
     import json
 
     rows: list[dict[str, Any]] = []

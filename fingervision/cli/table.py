@@ -20,30 +20,33 @@ Examples:
   fingervision table stage.lvm --png stage.png
 
 \b
-Read are text of every habit (CSV, COMSOL, LabVIEW .lvm), .xlsx, .mat, .parquet and .tdms.
+Formats: text of any convention (CSV, COMSOL, LabVIEW .lvm), .xlsx, .mat, .parquet and .tdms.
 
 \b
 Keys of --set and of columns.toml:
   columns.ROLE  name or number of the column: time, input, gap, left, right, force, run, target, position, ...
-  units.ROLE    its unit, or a multiple of one: mm, um, ms, '0.1 um'
+  units.ROLE    unit of the column, or what one count is worth: mm, um, ms, '0.1 um'
   separator , ; tab | blank     decimal . ,       encoding    header_line (0: none)      part (sheet, group, variable)
-  runs restart|one              date_order dmy|mdy|ymd        accept (doubts that were looked at)
+  runs restart|one              date_order dmy|mdy|ymd        accept (doubts that you checked)
 
 \b
-Exit codes: 0 understood, and columns.toml is written; 1 it is open what it means: the sentence names the key.
+Exit codes: 0 interpreted, and columns.toml is written; 1 ambiguous: the message names the key of --set that decides.
 """
 
 
 @click.command(epilog=EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
-    "--as", "kind", type=click.Choice(["measured", "drive", "simulation"]), help="What it is; found if not given."
+    "--as",
+    "kind",
+    type=click.Choice(["measured", "drive", "simulation"]),
+    help="Kind of table; recognised if not given.",
 )
-@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Decide one key of columns.toml.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Set one key of columns.toml; repeatable.")
 @columns_option
-@click.option("--out", type=click.Path(path_type=Path), help="Where to write; columns.toml beside FILE if not given.")
-@click.option("--png", type=click.Path(path_type=Path), help="Also draw the curve to this picture.")
-@click.option("--json", "as_json", is_flag=True, help="Print the account for programs.")
+@click.option("--out", type=click.Path(path_type=Path), help="File to write; columns.toml beside FILE if not given.")
+@click.option("--png", type=click.Path(path_type=Path), help="Also plot the curve to this picture.")
+@click.option("--json", "as_json", is_flag=True, help="Print the interpretation as JSON.")
 def command(
     file: Path,
     kind: str | None,
@@ -53,9 +56,9 @@ def command(
     png: Path | None,
     as_json: bool,
 ) -> None:
-    """Print what FILE, a table of any program, is understood as, and write columns.toml to read it so again.
+    """Show how FILE, a table of any program, is interpreted, and write this interpretation to columns.toml.
 
-    Every command that reads a table uses the columns.toml beside the table, or the one that --columns names.
+    Every command that reads a table uses the columns.toml beside that table, or the file that --columns names.
     """
     import json
 

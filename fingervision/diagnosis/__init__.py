@@ -1,1 +1,1 @@
-"""Compare simulation and measurement: where they disagree, which effect is missing, and what remains."""
+"""Compare simulation and measurement: where they disagree, which effect explains it, and what remains unexplained."""

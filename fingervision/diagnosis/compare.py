@@ -19,15 +19,16 @@ from fingervision.domain.report import Place
 from fingervision.models.corrected import CorrectedModel
 
 MOST_REFITS = 4
-"""Steps of Newton's rule for a drawing's uncertain numbers; small changes of links and hinges need two."""
+"""Most iterations of Newton's method for a drawing's uncertain dimensions; small changes of links and hinges need
+two."""
 
 PIECE_S, LEAST_PIECE = 1.0, 12
-"""Length of a straight piece in seconds, and in samples at least: noise is looked for in what is faster."""
+"""Length of a straight piece in seconds, and least number of samples; only faster changes count as noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Regions where the residual cannot be noise, and that residual.
+    """Regions where the residual is more than noise, and the residual.
 
     Parameters
     ----------
@@ -36,10 +37,10 @@ class Comparison:
     residual_mm : dict of ndarray of float, shape (n,)
         Measured minus predicted, by channel.
     places : tuple of Place
-        Largest first.
+        Regions, largest first.
     rms_mm, noise_mm : float
-        Disagreement of one gap reading, and an upper bound of its noise: what the disagreement does within seconds
-        counts as noise here, so that a model that is farther off states more of it.
+        RMS disagreement of one gap reading, and an upper bound of its noise: fast changes of the disagreement count as
+        noise here, so that the bound is larger for a model that deviates more.
     """
 
     data: Observations
@@ -49,7 +50,7 @@ class Comparison:
     noise_mm: float
 
     def document(self) -> dict[str, object]:
-        """The comparison as a document for programs."""
+        """The comparison as data for other programs."""
         return {
             "schema": 1,
             "rms_mm": self.rms_mm,
@@ -72,9 +73,9 @@ class Comparison:
 
 
 def rough(residual_mm: Array, history: History) -> Array:
-    """Residual minus broken lines, one from reversal to reversal in each run; shape as given.
+    """Residual minus broken lines, which extend from reversal to reversal in each run; same shape.
 
-    A step at a reversal contains all frequencies, so that a spectrum alone would take it for noise.
+    A step at a reversal contains all frequencies, so that it would be counted as noise in a spectrum.
     """
     n = history.input_mm.size
     if history.time_s is None:

@@ -1,4 +1,4 @@
-"""The whole diagnosis: locate the disagreement, name the missing effects, and judge the residual."""
+"""The whole diagnosis: locate the disagreement, name the missing effects, and assess the residual."""
 
 import time
 from dataclasses import dataclass, replace
@@ -24,25 +24,25 @@ from fingervision.effects.trial import EffectAnswerError
 from fingervision.models.corrected import CorrectedModel
 
 MOST_DRIVES = 2
-"""Times that a model which is a function of time is driven again behind the effects that were found."""
+"""Number of times that a dynamic model is recomputed with the effects found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
-    """The report, with the arrays for its figures.
+    """The report of a diagnosis, with the arrays for its plots.
 
     Parameters
     ----------
     report : DiagnosisReport
-        The answer.
+        Result of the diagnosis.
     data : Observations
         Measurement and model.
     before_mm, after_mm : ndarray of float, shape (channels * n,)
-        Measured minus predicted, without and with the answer.
+        Measured minus predicted values, without and with the effects found.
     positioning : PositioningReport or NoRepeatedTargets
-        Figures of ISO 230-2 where the table repeats its targets.
+        Results by ISO 230-2, if the table repeats its target positions.
     bodies : BodyEvidence or None
-        What the poses of bodies say, where there are any.
+        Results from the poses of bodies, if there are any.
     """
 
     report: DiagnosisReport
@@ -67,15 +67,15 @@ def diagnose(
     Parameters
     ----------
     table : MeasuredTable
-        Measurement.
+        The measured table.
     model : CorrectedModel
-        Model, with the effects that it already has.
+        The model, with effects that it already includes.
     seed : int
-        Of the bootstrap; the same seed gives the same report.
+        Seed of the bootstrap; the same seed gives the same report.
     forced, without : frozenset of str
-        Effects that the user insists on, or rules out.
+        Effects that the user requires, or excludes.
     progress : callable
-        Told the share that is done.
+        Called with the share of the work that is done.
     """
     unfit: dict[str, str] = {}
     while True:
@@ -100,7 +100,7 @@ def _diagnosed(
     without: frozenset[str],
     progress: Progress,
 ) -> Diagnosis:
-    """Diagnose once; an effect of a plug-in that fails on the way ends the diagnosis."""
+    """Diagnose once; a failing plug-in effect ends the diagnosis with an error."""
     table, bare = without_places(table, model)
 
     def explain(seen: MeasuredTable, by: CorrectedModel) -> Diagnosis:

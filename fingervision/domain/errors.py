@@ -57,7 +57,7 @@ class ArgumentError(UsageError, ValueError):
     Parameters
     ----------
     argument : str
-        Its name in Python (`below_tip_mm`).
+        Name of the argument in Python (`below_tip_mm`).
     must : str
         What it must be, as it follows the word "must".
     found : str
@@ -85,11 +85,11 @@ class UnknownNameError(ArgumentError):
     name : str
         What was given.
     known : iterable of str
-        The names that there are.
+        All known names.
     what : str
-        What they are names of, with its article.
+        What the names stand for, with an article.
     listing : str
-        What to do where no name is near.
+        Advice if no known name is similar.
     """
 
     def __init__(self, argument: str, name: str, known: Iterable[str], what: str, listing: str = "") -> None:
@@ -136,7 +136,7 @@ class DeviceError(FingervisionError):
 
 
 class LimitError(FingervisionError):
-    """A motion is beyond the limits of the bed, or beyond what the device can do."""
+    """A motion goes beyond the limits of the test bed or of the device."""
 
 
 class StateError(FingervisionError):

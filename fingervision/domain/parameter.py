@@ -13,7 +13,7 @@ class Parameter:
     Parameters
     ----------
     name : str
-        With its unit, as it stands in every file (`play_mm`).
+        Name with its unit, as in every file (`play_mm`).
     unit : str
         As printed; empty for a ratio.
     lower, upper : float
@@ -24,16 +24,16 @@ class Parameter:
         The value at which the effect changes nothing; None for a shape (a period, a time constant) that by itself
         changes nothing while the effect's amplitude is at its neutral value.
     starts : int
-        How many starting values a search tries between the bounds; 1 for a parameter that the answer is nearly
-        linear in.
+        How many starting values a search tries between the bounds; 1 for a parameter on which the prediction depends
+        nearly linearly.
     logarithmic : bool
         Whether the starting values are spaced by a ratio.
     reciprocal : bool
-        Whether their reciprocals are evenly spaced (periods).
+        Whether the reciprocals of the starting values are evenly spaced (for periods).
     rugged : bool
-        Whether the answer jumps as it changes, so that a search has to scan it.
+        Whether the prediction jumps as this parameter changes, so that the search must scan its range.
     typical : float or None
-        Physical prior: the size that a well-run bench would not exceed often. It only decides which of several
+        Physical prior: a size that a well-run set-up rarely exceeds. It only decides which of several
         explanations that the data cannot tell apart is named first.
     run : int or None
         The run whose start state this is: a nuisance that is fitted beside the effect and is no part of an answer.

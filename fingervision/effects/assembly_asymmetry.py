@@ -19,15 +19,21 @@ EFFECT = PointEffect(
     words="one finger opens more than the other",
     formula="right share 1/2 + share, left 1/2 - share; the gap does not change",
     source="definition",
-    residual="the midline moves in proportion to the opening",
-    parameters=(Parameter("share", "", -0.5, 0.5, "share of the motion that moves from left to right", typical=0.05),),
+    residual="a midline that moves in proportion to the opening; the gap is unchanged",
+    parameters=(
+        Parameter(
+            "share", "", -0.5, 0.5, "share of the opening that shifts from the left to the right finger", typical=0.05
+        ),
+    ),
     needs_edges=True,
     checks={FurtherCheck.TURN: True},
     odd=("share",),
     demonstrated=True,
     in_drawing=DrawingForm(
         DrawnPart.LINKS_OPPOSITE,
-        Parameter("share", "", -0.5, 0.5, "of the opening that the right finger has more than half", typical=0.01),
+        Parameter(
+            "share", "", -0.5, 0.5, "share of the opening that the right finger has beyond one half", typical=0.01
+        ),
     ),
     act=act,
 )

@@ -21,10 +21,10 @@ EFFECT = PointEffect(
     name="camera_tilt",
     stage=Stage.CAMERA,
     order=230,
-    words="the plane is tilted: keystone",
+    words="the plane of the fingers is tilted against the image plane (keystone)",
     formula="x / (1 + k_per_mm x)",
     source="central projection of a tilted plane",
-    residual="the square of the coordinate: the midline moves with the opening squared",
+    residual="proportional to the squared distance from the image centre: the midline moves with the opening squared",
     parameters=(
         Parameter("k_per_mm", "1/mm", -0.02, 0.02, "keystone, change of the scale across the picture", typical=0.002),
     ),

@@ -33,13 +33,15 @@ EFFECT = DriveEffect(
     name="encoder_cyclic_error",
     stage=Stage.DRIVE,
     order=40,
-    words="an error that repeats with the scale's period",
+    words="the encoder has an error that repeats with the period of its scale",
     formula="u + amplitude_mm sin(2 pi u / period_mm + phase_rad)",
     source="interpolation error of incremental encoders (Heydemann 1981)",
     residual="a sinusoid over the input, the same in every run",
     parameters=(
         Parameter("amplitude_mm", "mm", 0.0, 0.2, "amplitude of the cyclic error"),
-        Parameter("period_mm", "mm", 0.0001, 10.0, "period of the scale", neutral=None, starts=24, reciprocal=True),
+        Parameter(
+            "period_mm", "mm", 0.0001, 10.0, "period of the encoder scale", neutral=None, starts=24, reciprocal=True
+        ),
         Parameter("phase_rad", "rad", -3.15, 3.15, "phase of the cyclic error", neutral=None, starts=4),
     ),
     narrow=narrow,

@@ -28,10 +28,10 @@ EFFECT = DriveEffect(
     name="end_stop",
     stage=Stage.DRIVE,
     order=50,
-    words="the stage stops short",
+    words="the stage stops at an end stop before it reaches the recorded input",
     formula="min(u, upper_mm), max(., lower_mm)",
     source="definition",
-    residual="zero up to the stop, then the slope times what is missing",
+    residual="zero up to the stop; beyond it, the missing input times the slope of the model",
     parameters=(
         Parameter("upper_mm", "mm", -1e3, 1e3, "input at the upper stop", neutral=1e3, starts=10),
         Parameter("lower_mm", "mm", -1e3, 1e3, "input at the lower stop", neutral=-1e3, starts=10),

@@ -29,10 +29,10 @@ EFFECT = DriveEffect(
     name="friction_hysteresis",
     stage=Stage.DRIVE,
     order=80,
-    words="a smooth loop, independent of speed",
+    words="friction makes the motion follow a smooth hysteresis loop, independent of speed",
     formula="u - fraction * mean of eight elastic sliders, each clipped to reach_mm k / 8",
     source="Iwan 1966; Maxwell slip",
-    residual="a lens-shaped loop that closes at the reversals",
+    residual="a lens-shaped loop over the input that closes at the reversals",
     parameters=(
         Parameter("fraction", "", 0.0, 0.9, "share of the drive that friction holds back"),
         Parameter(
@@ -48,7 +48,7 @@ EFFECT = DriveEffect(
     ),
     needs_times=True,
     memory=True,
-    start="how far the sliders are drawn at the start, in their reaches",
+    start="deflection of the friction sliders, as a fraction of their reach",
     narrow=narrow,
     demonstrated=True,
     act=act,

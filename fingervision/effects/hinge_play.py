@@ -19,10 +19,10 @@ EFFECT = PointEffect(
     name="hinge_play",
     stage=Stage.MECHANISM,
     order=172,
-    words="a pivot has play, taken up where its load changes sign",
+    words="a pivot has play, which is crossed where the load on the pivot changes sign",
     formula="o - clip(o, +-play_mm / 2); with a drawing, the pin moves in its hole to least elastic energy",
     source="frictionless contact of a pin in a hole",
-    residual="a step where the load on the pivot changes sign; poses of the bodies tell which pivot",
+    residual="a step where the load on the pivot changes sign; the poses of the bodies show which pivot",
     parameters=(Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02),),
     needs_bodies=True,
     in_drawing=DrawingForm(

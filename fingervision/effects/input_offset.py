@@ -19,10 +19,10 @@ EFFECT = DriveEffect(
     name="input_offset",
     stage=Stage.DRIVE,
     order=20,
-    words="the input's zero is off",
+    words="the zero of the recorded input is displaced",
     formula="u + offset_mm; u after a re-zeroing",
     source="definition",
-    residual="nearly a constant; follows the slope of a curved model",
+    residual="nearly a constant offset; if the model is curved, proportional to its slope",
     parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05),),
     checks={FurtherCheck.REZERO: True},
     in_drawing=DrawingForm(

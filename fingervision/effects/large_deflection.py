@@ -30,10 +30,10 @@ EFFECT = PointEffect(
     name="large_deflection",
     stage=Stage.MECHANISM,
     order=100,
-    words="the rotation of the links is not small",
+    words="the links rotate so far that the motion is no longer linear",
     formula="L sin(o / L) + c L (1 - cos(o / L)), L = reach_mm, c = cross",
     source="a point on a circular arc",
-    residual="curved: a parabola and a cubic of the opening",
+    residual="a curve: a parabola plus a cubic of the opening",
     parameters=(
         Parameter("reach_mm", "mm", 0.001, 10000.0, "radius of the arc", neutral=None, starts=4, logarithmic=True),
         Parameter("cross", "", -2.0, 2.0, "share of the motion along the radius"),

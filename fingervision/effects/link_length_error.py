@@ -16,10 +16,10 @@ EFFECT = PointEffect(
     name="link_length_error",
     stage=Stage.MECHANISM,
     order=171,
-    words="a link is longer or shorter than drawn",
+    words="a link is longer or shorter than in the drawing",
     formula="o / (1 + ratio); with a drawing, one end of this link moved along it",
     source="kinematics of a lever",
-    residual="in proportion to the opening; poses of the bodies tell which link",
+    residual="proportional to the opening; the poses of the bodies show which link",
     parameters=(Parameter("ratio", "", -0.1, 0.1, "relative error of the link's length", typical=0.01),),
     needs_bodies=True,
     in_drawing=DrawingForm(

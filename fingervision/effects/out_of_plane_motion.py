@@ -21,12 +21,14 @@ EFFECT = PointEffect(
     name="out_of_plane_motion",
     stage=Stage.CAMERA,
     order=200,
-    words="the tips come nearer or go farther as they open",
+    words="the tips move towards or away from the camera as they open",
     formula="x / (1 - relative_per_mm (g - g0))",
     source="central projection",
-    residual="the gap times the opening: curved",
+    residual="a curve: proportional to the gap times the opening",
     parameters=(
-        Parameter("relative_per_mm", "1/mm", -0.02, 0.02, "relative change of the distance per opening", typical=0.002),
+        Parameter(
+            "relative_per_mm", "1/mm", -0.02, 0.02, "relative change of the camera distance per opening", typical=0.002
+        ),
     ),
     checks={FurtherCheck.SHIFT: False},
     act=act,

@@ -80,10 +80,10 @@ EFFECT = DriveEffect(
     name="slew_limit",
     stage=Stage.DRIVE,
     order=56,
-    words="the stage cannot follow faster",
+    words="the stage cannot move as fast as the recorded input",
     formula="follows u at most at speed_mm_s",
     source="rate limiter",
-    residual="a ramp after each fast move, gone once the stage has caught up",
+    residual="a ramp after each fast move, which vanishes once the stage has caught up",
     parameters=(
         Parameter(
             "speed_mm_s", "mm/s", 1e-6, 1e4, "highest speed of the stage", neutral=1e4, starts=12, logarithmic=True

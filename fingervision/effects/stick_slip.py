@@ -37,12 +37,14 @@ EFFECT = DriveEffect(
     name="stick_slip",
     stage=Stage.DRIVE,
     order=70,
-    words="moves in jumps",
+    words="the stage sticks and moves in jumps",
     formula="if abs(u - s) > jump_mm then s = u, else s stays",
     source="definition: stiction released at a fixed extension",
     residual="a saw-tooth over the input whose teeth are jump_mm wide",
     parameters=(
-        Parameter("jump_mm", "mm", 0.0, 0.5, "input before a jump", starts=300, logarithmic=True, rugged=True),
+        Parameter(
+            "jump_mm", "mm", 0.0, 0.5, "change of input before a jump", starts=300, logarithmic=True, rugged=True
+        ),
     ),
     needs_times=True,
     memory=True,

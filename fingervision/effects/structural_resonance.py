@@ -44,7 +44,7 @@ EFFECT = PointEffect(
     name="structural_resonance",
     stage=Stage.MECHANISM,
     order=120,
-    words="rings after fast moves",
+    words="the mechanism rings at a natural frequency after fast moves",
     formula="x'' + 2 d w x' + w^2 x = w^2 o, linear input between samples",
     source="linear oscillator, damping to ground",
     residual="a decaying oscillation after each change of speed",

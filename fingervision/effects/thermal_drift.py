@@ -28,10 +28,10 @@ EFFECT = PointEffect(
     name="thermal_drift",
     stage=Stage.MECHANISM,
     order=160,
-    words="a slow symmetric change, whatever the input",
+    words="warming changes the gap slowly and symmetrically, whatever the input",
     formula="g + amplitude_mm (1 - exp(-t / tau_s))",
     source="first-order warming",
-    residual="an exponential over the time of the whole table, gap only",
+    residual="an exponential over the time of the whole table, in the gap only",
     parameters=(
         Parameter("amplitude_mm", "mm", -2.0, 2.0, "final thermal change"),
         Parameter("tau_s", "s", 2.0, 3000.0, "thermal time constant", neutral=None, starts=5, logarithmic=True),

@@ -1,1 +1,1 @@
-"""Frame sources, one per file; each yields frames in order, with the source's own time stamps."""
+"""Sources of video frames, one kind per module; each yields frames in order, with the source's own time stamps."""

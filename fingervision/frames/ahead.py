@@ -15,26 +15,26 @@ PATIENCE_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """Marks the end of the frames, with the exception that ended reading, if any."""
+    """Marks the end of the frames, with the exception that ended the reading, if there was one."""
 
     error: BaseException | None
 
 
 def decoded_ahead(source: Iterable[Frame | LostFrame]) -> Generator[Frame | LostFrame, None, None]:
-    """Yield the frames of a source, read by a thread of its own.
+    """Yield the frames of a source, which a separate thread reads in advance.
 
     The decoders release Python's global lock while they work, so that decoding and measuring use two cores. At most
-    `FRAMES_AHEAD` frames wait, however long the recording is.
+    `FRAMES_AHEAD` frames are kept in memory, however long the recording is.
 
     Parameters
     ----------
     source : iterable of Frame or LostFrame
-        Read from the other thread alone.
+        Source of frames; it is read from the other thread only.
 
     Yields
     ------
     Frame or LostFrame
-        In order; an error of the source is raised here, after the frames that came before it.
+        Frames in order; an exception of the source is raised here, after the frames that came before it.
     """
     waiting: Queue[Frame | LostFrame | _End] = Queue(FRAMES_AHEAD)
     unwanted = Event()

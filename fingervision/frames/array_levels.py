@@ -1,4 +1,4 @@
-"""Grey levels or colours of a numpy array as a camera would have stored them; what cannot be a picture is refused."""
+"""Convert a numpy array to grey levels or colours as a camera would store them; refuse arrays that are no pictures."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,11 +7,12 @@ from fingervision.domain.errors import ArgumentError, ArgumentTypeError
 from fingervision.domain.frame import Pixels
 
 FULL_SCALE = 65535
-"""Levels from 0 to 1 become 16 bits: rounding then adds 4e-6 of the full scale (1 / (65535 sqrt 12)), a hundredth of
-the noise of the best cameras."""
+"""Full scale of 16 bits, to which values from 0 to 1 are converted: the rounding adds 4e-6 of the full scale (1 /
+(65535 sqrt 12)), a hundredth of the noise of the best cameras."""
 OF_EIGHT_BITS = 1e-3
-"""Levels of 8 bits: closer than that to whole ones in every pixel is no chance, and single precision rounds by 2e-5.
-Their rounding, of 1/sqrt(12) levels of 8 bits, then stays in the uncertainty."""
+"""Largest distance from whole 8-bit levels, in every pixel, at which floats count as converted from 8 bits: so small a
+distance is no chance, and single precision rounds by 2e-5. The 8-bit rounding of 1/sqrt(12) levels is then kept in the
+uncertainty."""
 COLOURS = (3, 4)
 MUST = (
     "be a numpy array of shape (height, width), (height, width, 3), (frames, height, width) or "
@@ -25,14 +26,14 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
     Parameters
     ----------
     pictures : ndarray
-        As `fingervision.frames.arrays.ArrayFrames` takes it.
+        Array in one of the shapes accepted by `fingervision.frames.arrays.ArrayFrames`.
     argument : str
-        Name of the argument, for sentences.
+        Name of the argument, for error messages.
 
     Returns
     -------
     ndarray, shape (frames, height, width) or (frames, height, width, colours)
-        A view.
+        A view of the array.
 
     Raises
     ------
@@ -74,29 +75,29 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
 
 
 def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "source") -> Pixels:
-    """Levels of one picture of 8 or 16 bits.
+    """Return the levels of one picture in 8 or 16 bits.
 
-    An alpha channel is dropped where it is opaque. Floats must lie between 0 (black) and 1 (full scale); they become
-    levels of 16 bits, or of 8 bits where they were made from these.
+    An alpha channel is dropped where it is opaque. Floats must lie between 0 (black) and 1 (full scale); they are
+    converted to 16-bit levels, or to 8-bit levels if they were computed from such.
 
     Parameters
     ----------
     picture : ndarray, shape (height, width) or (height, width, colours)
-        One picture of a stack that `stated_shape` has let pass.
+        One picture of a stack accepted by `stated_shape`.
     words : str
-        Which picture it is, for sentences; with a leading blank.
+        Description of the picture for error messages, with a leading blank.
     argument : str
-        Name of the argument, for sentences.
+        Name of the argument, for error messages.
 
     Returns
     -------
     ndarray of uint8 or uint16, shape (height, width) or (height, width, 3)
-        Contiguous.
+        Contiguous array.
 
     Raises
     ------
     ArgumentError
-        A level is no number, lies outside 0 to 1, or is seen through an alpha that is not opaque.
+        If a level is not a number, lies outside 0 to 1, or has an alpha value that is not opaque.
     """
     subject = f"{argument}{words and ' '}{words.strip()}" if words else argument
     if picture.dtype.kind == "f":
@@ -137,7 +138,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
 
 
 def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Convert floats from 0 to 1 to levels: of 8 bits where all are multiples of 1/255, else of 16 bits."""
+    """Convert floats from 0 to 1 to levels: 8-bit levels if all are multiples of 1/255, else 16-bit levels."""
     light = np.asarray(picture, dtype=np.float64)
     levels = np.rint(255.0 * light)
     if np.abs(255.0 * light - levels).max() < OF_EIGHT_BITS:
@@ -146,7 +147,7 @@ def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def what_it_is(value: object) -> str:
-    """Type of a value in words, with its size where it has one: 'a list of 3'."""
+    """Type of a value in words, with its size if it has one: 'a list of 3'."""
     kind = type(value)
     library = kind.__module__.partition(".")[0]
     name = kind.__name__ if library in ("builtins", "__main__") else f"{library} {kind.__name__}"

@@ -13,7 +13,7 @@ from fingervision.frames.array_levels import levels_of, stated_shape
 from fingervision.frames.source import Description
 
 HASH_DIGITS = 12
-"""Of the pictures' SHA-256 in their name: two different ones share it once in 10^14."""
+"""Number of digits of the pictures' SHA-256 in the recording's name: two different ones are equal once in 10^14."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,15 +23,15 @@ class ArrayFrames:
     Parameters
     ----------
     pictures : ndarray, shape (height, width[, colours]) or (frames, height, width[, colours])
-        Grey levels, or red, green and blue, with an alpha that is opaque or without; uint8, uint16, or float from
-        0 to 1. An array of three dimensions is one picture in colour where its last one has 3 or 4 entries, otherwise a
-        stack of grey ones.
+        Grey levels, or red, green and blue, optionally with an opaque alpha channel; uint8, uint16, or float from 0 to
+        1. An array of three dimensions is one colour picture if its last dimension is 3 or 4, otherwise a stack of grey
+        pictures.
     rate_hz : float or None
-        Pictures in a second.
+        Pictures per second.
     times_s : sequence of float or None
         Time of every picture; strictly increasing.
     coding : Coding
-        What the pictures went through before they were decoded.
+        Compression that the pictures underwent before they were decoded.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class ArrayFrames:
         )
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Yield the pictures one by one; each is checked and converted when its turn comes."""
+        """Yield the pictures one by one; each is checked and converted when it is yielded."""
         is_single = self.pictures.ndim < 4 and len(self._stack) == 1
         for index, picture in enumerate(self._stack):
             words = "" if is_single else f" of picture {index}"
@@ -86,7 +86,7 @@ class ArrayFrames:
 
     @property
     def has_float_levels(self) -> bool:
-        """Whether levels were given as floats, which become levels of 16 bits."""
+        """Whether the levels were given as floats, which are converted to 16-bit levels."""
         return bool(self.pictures.dtype.kind == "f")
 
     def _time_s(self, index: int) -> float | None:
@@ -97,14 +97,14 @@ class ArrayFrames:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptFrames:
-    """Frames of a camera, kept in memory as a recording.
+    """Frames of a camera that are kept in memory as a recording.
 
     Parameters
     ----------
     description : Description
-        Of the camera.
+        Description of the camera.
     frames : tuple of Frame or LostFrame
-        In order.
+        Frames in order.
     """
 
     description: Description

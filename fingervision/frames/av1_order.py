@@ -1,4 +1,4 @@
-"""Numbers that AV1 writes before every picture: the order in which pictures are presented.
+"""Numbers that AV1 stores in front of every picture: the order in which pictures are presented.
 
 Source: Alliance for Open Media, AV1 Bitstream and Decoding Process Specification (2019), 5.3 (OBU), 5.5 (sequence
 header), 5.9.2 (frame header), 7.20 (reference frame update).
@@ -18,14 +18,14 @@ HEADER_BYTES = 160
 
 @dataclass(frozen=True, slots=True)
 class ShownPicture:
-    """What a packet states of the picture that it presents.
+    """Information that a packet contains on the picture that it presents.
 
     Parameters
     ----------
     is_key : bool
-        Whether decoding can begin with it.
+        Whether decoding can start with this picture.
     order : int
-        `order_hint`: one more than that of the picture shown before it, modulo `modulus`.
+        `order_hint`: one more than that of the picture presented before, modulo `modulus`.
     modulus : int
         2 ** OrderHintBits.
     """
@@ -44,7 +44,7 @@ class _Sequence:
 
 
 class Av1Order:
-    """Reads frame headers; stores the sequence header, and which picture is in which of the eight reference slots.
+    """Reads frame headers; stores the sequence header, and which picture is in each of the eight reference slots.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Av1Order:
             self.of(extradata[4:])
 
     def of(self, packet: bytes) -> ShownPicture | None:
-        """Read a packet; None where it presents no picture, or one without a number."""
+        """Read a packet; return None if it presents no picture, or one without a number."""
         shown: ShownPicture | None = None
         try:
             for kind, content in _units(packet):
@@ -126,7 +126,7 @@ def _units(packet: bytes) -> list[tuple[int, bytes]]:
 
 
 def _sequence(bits: BitReader) -> _Sequence | None:
-    """Read a sequence header up to the length of the numbers; None where frame headers contain decoder times."""
+    """Read a sequence header up to the length of the numbers; None if frame headers contain decoder times."""
     bits.take(3 + 1)
     if bits.take(1):
         return None  # a still picture

@@ -1,11 +1,11 @@
-"""Frame number of a packet of an AVI file from its position in the file: AVI stores no times, only an order.
+"""Frame number of an AVI packet from its position in the file, because AVI stores no times, only an order.
 
-A reader that loses a frame in a damaged place goes on counting, and every frame after it gets too low a number. The
-file's own index (idx1) states the position of each frame, so that a packet at a stated position is that frame, whatever
-was lost before it. Where bytes are missing, the following packets lie nearer to the front than the index states. They
-are identified by a sequence of packet lengths that occurs only once in the rest of the index. Where no byte is missing,
-a packet at a position that the index does not state was never written: its header is damaged. Without a valid index,
-frames are counted as long as one chunk follows another without a hole.
+If a reader loses a frame at a damaged place and goes on counting, every later frame gets too low a number. The file's
+own index (idx1) states the position of each frame, so that a packet at a stated position is identified, whatever was
+lost before it. If bytes are missing, the following packets lie nearer to the start of the file than the index states.
+They are identified by a sequence of packet lengths that occurs only once in the rest of the index. If no byte is
+missing, a packet at a position that is not in the index was never written: its header is damaged. Without a valid
+index, frames are counted as long as the chunks follow each other without a gap.
 
 Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
 """
@@ -29,16 +29,16 @@ KNOWN_CHUNK = re.compile(rb"\d\d(dc|db|wb|tx|pc|iv)|ix\d\d|rec ")
 
 
 class AviPlaces:
-    """Numbers the packets of a video stream, which must be given in the order of the file.
+    """Assigns frame numbers to the packets of a video stream, which must be given in the order of the file.
 
     Parameters
     ----------
     path : Path
-        The file.
+        Path of the file.
     stream : int
-        Number of the video stream in it.
+        Number of the video stream in the file.
     streams : int
-        How many streams the file has.
+        Number of streams in the file.
     """
 
     def __init__(self, path: Path, stream: int, streams: int) -> None:
@@ -47,26 +47,27 @@ class AviPlaces:
             begin = file.read(HEAD_BYTES).find(b"movi")
             self._offsets, self._sizes, self._most_missing = _index(file, self._tag, begin, streams)
         self.after_hole = False
-        """Whether bytes are missing between the beginnings of the last two packets: the first may be hurt itself."""
+        """Whether bytes are missing between the starts of the last two packets: the first of the two may be damaged
+        itself."""
         self._by_offset = {int(offset): number for number, offset in enumerate(self._offsets)}
         self._end: int | None = begin + 4 if begin >= 0 else None
         self._missing = 0
         self._possible = np.zeros(0, np.int64)
         self._number = -1
         self.is_lost = False
-        """Whether the packet before could not be numbered."""
+        """Whether the packet before could not be assigned a number."""
         self.missing: tuple[int, ...] = ()
-        """Frames that the index has, with a picture, between the last two packets that could be numbered."""
+        """Numbers of frames that the index lists, with a picture, between the last two packets with a number."""
 
     def number(self, position: int, size: int) -> int | None:
-        """Frame number, from 0, of the packet whose bytes begin here; None where it cannot be determined.
+        """Frame number, from 0, of the packet whose bytes start at a position; None if it cannot be determined.
 
         Parameters
         ----------
         position : int
-            Where the packet's bytes begin, behind its chunk's header.
+            Start of the packet's bytes, after the header of its chunk.
         size : int
-            Their length.
+            Number of bytes.
         """
         begin, missing = position - HEADER_BYTES, self._missing
         found = self._by_offset.get(begin + self._missing)
@@ -85,7 +86,7 @@ class AviPlaces:
         return found
 
     def _by_length(self, begin: int, size: int) -> int | None:
-        """Frame number from the lengths of this packet and of the unnumbered ones before it, if only one fits."""
+        """Frame number from the lengths of this packet and of those without a number before it, if it is unique."""
         if self.is_lost:
             possible = self._possible + 1
             possible = possible[possible < len(self._sizes)]
@@ -102,7 +103,7 @@ class AviPlaces:
         return number
 
     def _counted(self, begin: int) -> int | None:
-        """Go from chunk to chunk and count the pictures; one on the way was dropped by the camera or by the reader."""
+        """Count pictures from chunk to chunk; pictures skipped on the way were dropped by the camera or the reader."""
         if self._end is None:
             return None
         at, number = self._end, self._number + 1
@@ -124,7 +125,7 @@ class AviPlaces:
 
 
 def _index(file: BinaryIO, tag: bytes, begin: int, streams: int) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
-    """Read each frame's position and length from the index, and how many bytes are missing before the index."""
+    """Read each frame's position and length from the index, and the number of bytes missing before the index."""
     end = file.seek(0, 2)
     start = max(0, end - TAIL_BYTES)
     file.seek(start)

@@ -1,4 +1,4 @@
-"""Cameras of this machine through OpenCV: V4L2, Media Foundation, AVFoundation; settings are read back."""
+"""Cameras of this machine through OpenCV (V4L2, Media Foundation, AVFoundation), with settings read back."""
 
 import sys
 from collections.abc import Iterator
@@ -46,7 +46,7 @@ def open_frames(name: str, wish: Wish) -> "CameraFrames":
 
 
 def found_cameras() -> list[tuple[str, str]]:
-    """List the cameras of this machine, each with its name as a source and its own name."""
+    """List the cameras of this machine, each with its name as a source and its product name."""
     if sys.platform == "linux":
         devices = sorted(DEVICES.glob("video*"), key=lambda path: int(path.name.removeprefix("video")))
         return [(f"/dev/{device.name}", _first_line(device / "name")) for device in devices]
@@ -61,16 +61,16 @@ def found_cameras() -> list[tuple[str, str]]:
 
 
 class CameraFrames:
-    """A camera that is open.
+    """An open camera.
 
-    Grey levels are the camera's luma; time stamps are the computer's clock on arrival.
+    Grey levels are the camera's luma; time stamps are taken from the computer's clock on arrival of a frame.
 
     Parameters
     ----------
     name : str
-        Number or device.
+        Number or device of the camera.
     wish : Wish
-        What the camera is asked for.
+        Requested settings of the camera.
     """
 
     has_own_clock = False
@@ -157,7 +157,7 @@ class CameraFrames:
         return {what: self._capture.get(what) for what in READ}
 
     def _described(self, wish: Wish, size_px: tuple[int, int]) -> Description:
-        """Description of the camera as it is set now, with a sentence for each setting that differs from the wish."""
+        """Describe the camera with its actual settings, with a sentence for each that differs from the request."""
         backend = self._capture.getBackendName()
         with _quiet():
             read = self._read()
@@ -195,7 +195,7 @@ def _check_device(name: str) -> None:
 
 
 def _luma(pixels: Any) -> Pixels:
-    """Grey levels of an OpenCV picture (blue, green, red), or of raw YUYV."""
+    """Grey levels of an OpenCV picture (blue, green, red), or of a raw YUYV picture."""
     if pixels.ndim == 2:
         levels: Pixels = pixels
         return levels

@@ -1,6 +1,6 @@
 """Requested and actual settings of a camera, as properties of OpenCV, whose meaning differs between systems.
 
-The properties have another meaning in each of OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
+The meaning of the properties differs between OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
 cap_avfoundation_mac.mm of OpenCV 4 and 5):
 
 * V4L2 returns -1 for a property that a camera lacks. Its exposure counts units of 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE);
@@ -44,13 +44,13 @@ class Control:
     Parameters
     ----------
     name : str
-        In words.
+        Name of the setting in words.
     what : int
-        OpenCV's property.
+        Number of the property in OpenCV.
     unit : str
-        Of the number as it is shown; empty where only the camera's maker knows it.
+        Unit of the displayed number; empty if only the camera's maker knows it.
     wished : callable
-        What the user asked for, None if nothing.
+        Function that returns the value requested by the user, or None.
     """
 
     name: str
@@ -82,14 +82,14 @@ READ = (
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """The settings that a camera finally has.
+    """The actual settings of a camera.
 
     Parameters
     ----------
     settings : dict of str to str
-        Each setting that it has, with its unit.
+        Value of each setting that the camera has, with its unit.
     notes : tuple of str
-        A sentence for each in which it does otherwise than it was asked.
+        One sentence for each setting that differs from the request.
     """
 
     settings: dict[str, str]
@@ -102,11 +102,11 @@ def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[t
     Parameters
     ----------
     backend : str
-        OpenCV's name for it.
+        OpenCV's name of the backend.
     wish : Wish
-        What the user asks for; what nobody asks for stays, except that nothing shall change by itself.
+        Settings requested by the user; others are left unchanged, except that automatic changes are switched off.
     found : mapping of int to float
-        What was read before, by property.
+        Values read before, by property.
     """
     if backend == V4L2:
         yield cv2.CAP_PROP_MODE, 0.0
@@ -137,11 +137,11 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
     Parameters
     ----------
     backend : str
-        OpenCV's name for it.
+        OpenCV's name of the backend.
     wish : Wish
-        What the user asked for.
+        Settings requested by the user.
     read : mapping of int to float
-        What was read after it was asked, by property.
+        Values read after the request, by property.
     """
     settings, notes = {"format": four_letters(read.get(cv2.CAP_PROP_FOURCC, UNSUPPORTED))}, []
     if wish.camera.format is not None and settings["format"] != wish.camera.format:
@@ -179,12 +179,12 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
 
 
 def coding_of(settings: Mapping[str, str]) -> Coding:
-    """Compression of a camera's pictures before they arrived, judged by the pixel format that it reports."""
+    """Compression of a camera's pictures before their arrival, derived from the reported pixel format."""
     return CODINGS.get(settings.get("format", ""), Coding.LOSSLESS)
 
 
 def four_letters(number: float) -> str:
-    """Four-letter name of a pixel format; "unknown" where there is none."""
+    """Four-letter name of a pixel format; "unknown" if there is none."""
     letters = "".join(chr((int(number) >> shift) & 0xFF) for shift in (0, 8, 16, 24)) if number > 0.0 else ""
     return letters.strip() if letters.isascii() and letters.isprintable() and letters.strip() else "unknown"
 

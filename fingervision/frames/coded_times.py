@@ -20,17 +20,17 @@ class CodedTime:
     Parameters
     ----------
     tick : int or None
-        When its picture is shown.
+        Presentation time of the picture.
     is_key : bool
-        Whether decoding can begin with it.
+        Whether decoding can start with this packet.
     is_shown : bool
-        Whether it gives a picture; VP8 has some that only others hang on.
+        Whether the packet gives a picture; VP8 has packets that only serve as references.
     is_needed : bool
-        Whether others may hang on it (it is no B picture of MPEG-4).
+        Whether other pictures may depend on this one (it is no B picture of MPEG-4).
     turn : int or None
-        The bit of MPEG-4 that turns with every P picture.
+        The bit of MPEG-4 that toggles with every P picture.
     order, modulus : int or None
-        The number of AV1, and where numbers begin again.
+        Picture number of AV1, and the modulus of these numbers.
     """
 
     tick: int | None
@@ -43,7 +43,7 @@ class CodedTime:
 
 
 def is_shown(packet: "av.Packet[Any]", codec: str) -> bool:
-    """Whether a packet presents a picture; in VP8 a bit of the first byte tells (RFC 6386, 9.1)."""
+    """Whether a packet presents a picture; in VP8 this is a bit of the first byte (RFC 6386, 9.1)."""
     return codec != "vp8" or bool(bytes(packet)[0] & 0x10)
 
 
@@ -55,7 +55,7 @@ def coded_times(path: Path, stream: av.VideoStream) -> list[CodedTime]:
     path : Path
         The file.
     stream : av.VideoStream
-        The video in it, opened elsewhere.
+        The video stream, opened elsewhere.
     """
     with listening(stream.codec_context.name):
         return list(_coded_times(path, stream.index, stream.codec.canonical_name))

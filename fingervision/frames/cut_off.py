@@ -6,21 +6,21 @@ import av
 def cut_off(
     container: av.container.InputContainer, stream: av.VideoStream, packets: int, last_end_s: float | None
 ) -> str | None:
-    """Return a sentence if the file states more video than it holds.
+    """Return a sentence if the file states more video than it contains.
 
     Parameters
     ----------
     container, stream : PyAV's
-        Read to the end.
+        PyAV objects, after reading to the end.
     packets : int
-        How many there were.
+        Number of packets read.
     last_end_s : float or None
-        End of the last one.
+        End time of the last packet.
 
     Returns
     -------
     str or None
-        A sentence.
+        A sentence; None if the file is complete.
     """
     kind = container.format.name
     if "mp4" in kind and stream.frames > packets:

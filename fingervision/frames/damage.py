@@ -12,13 +12,13 @@ Picture = tuple[int | None, av.VideoFrame | str]
 
 
 class DamageTrail:
-    """Follows packets into a decoder and pictures out of it, and marks the pictures that are damaged.
+    """Follows packets into a decoder and pictures out of it, and marks the damaged pictures.
 
     A picture that is coded as a difference depends on the pictures before it. After a packet that could not be decoded,
-    the decoder continues with a guess, and its pictures look sound but are wrong. Every picture coded after a broken
-    packet is therefore damaged, until a key frame that is not itself broken. Pictures leave the decoder in another
-    order than their packets enter, so that every packet carries its number through the decoder (FFmpeg's `copy_opaque`,
-    see `prepare`).
+    the decoder continues with substituted content, and its pictures look undamaged but are wrong. Every picture coded
+    after a broken packet is therefore damaged, until a key frame that is not itself broken. Pictures leave the decoder
+    in another order than their packets enter, so that every packet carries its number through the decoder (FFmpeg's
+    `copy_opaque`, see `prepare`).
     """
 
     def __init__(self) -> None:
@@ -47,20 +47,20 @@ class DamageTrail:
             heapq.heappush(self._entered, (packet.pts, self._last))
 
     def breaks(self, why: str) -> None:
-        """Record that the last packet could not be decoded, or was not found complete."""
+        """Record that the last packet could not be decoded, or was incomplete."""
         self._broken.setdefault(self._last, why)
 
     def recovers(self, over: int) -> None:
-        """Record that the last packet is right, whatever came before the packet `over` positions earlier.
+        """Record that the last picture is correct, whatever came before the packet `over` positions earlier.
 
-        Streams without key frames are refreshed part by part: once every part has been refreshed, no picture depends on
-        older ones.
+        Streams without key frames are refreshed part by part: once every part has been refreshed, pictures no longer
+        depend on those before the refresh.
         """
         if self._broken:
             self._recoveries[self._last] = self._last - over
 
     def fails(self, why: str) -> Iterator[Picture]:
-        """Record that the last packet, a picture that depends on no other, gives none; a lost frame takes its place."""
+        """Record that the last packet, whose picture depends on no other, gives none; yield a lost frame instead."""
         self.breaks(why)
         own = [entry for entry in self._entered if entry[1] == self._last]
         for entry in own:
@@ -74,17 +74,17 @@ class DamageTrail:
         self.missing(why)
 
     def missing(self, why: str) -> None:
-        """Record that a whole picture is missing after the last packet, which itself is sound."""
+        """Record that a whole picture is missing after the last packet, which itself is undamaged."""
         self._last = next(self._numbers)
         self._broken[self._last] = why
 
     def lost(self, tick: int, why: str) -> None:
-        """Record a frame that should have come now and is missing; it is passed on in its turn."""
+        """Record a missing frame; it is yielded as a lost frame at its place in the order."""
         self.hole(why)
         heapq.heappush(self._entered, (tick, self._last))
 
     def leaves(self, picture: av.VideoFrame) -> Iterator[Picture]:
-        """Yield the picture that came out, after the lost ones that should have come before it."""
+        """Yield a picture that left the decoder, after the lost frames that belong before it."""
         tick = picture.pts
         if tick in self._given_up:
             return  # behind damage pictures may leave too late; its place is taken
@@ -109,7 +109,7 @@ class DamageTrail:
         yield tick, self._words(number) if self._hangs_on_damage(number) else picture
 
     def rest(self) -> Iterator[Picture]:
-        """Yield the damaged frames that were still awaited when the recording ended."""
+        """Yield the damaged frames that were still expected when the recording ended."""
         while self._entered:
             tick, number = heapq.heappop(self._entered)
             if self._broken:

@@ -33,14 +33,14 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     Parameters
     ----------
     container, stream : PyAV's
-        At their beginning; the decoder is told to be strict.
+        PyAV objects at the start of the file; the decoder is set to strict mode.
     path : Path
         The file.
 
     Yields
     ------
     (int or None, VideoFrame or str)
-        Pictures with their ticks in order of presentation, or what happened instead of one.
+        Tick and picture in order of presentation, or the reason why there is no picture.
     """
     trail = DamageTrail()
     packets, last_end_s, at_end = 0, None, ""
@@ -87,24 +87,24 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
-    """A packet, with what the next packet shows about its place.
+    """A packet, with information on its position that only the next packet gives.
 
     Parameters
     ----------
     packet : av.Packet
-        With the time of the frame that it is.
+        The packet, with the time of its own frame.
     missing : tuple of int
-        Ticks of frames that are missing before it.
+        Ticks of frames that are missing before the packet.
     loses_time : str
-        Why from here on nothing tells when a frame was taken; empty where something does, or that was said before.
+        Reason why times of frames are not known from here on; empty if they are, or the reason was given before.
     is_placed : bool
-        Whether places tell what is missing.
+        Whether missing frames can be detected from positions in the file.
     hole : str
-        What is wrong between it and the next one; empty where nothing is.
+        Damage between this packet and the next one; empty if there is none.
     end : str
-        Why there is no next one, where that is damage.
+        Reason why there is no next packet, if that is damage.
     at_end : str
-        What the container said when there was none: that the file is cut off, mostly.
+        Message of the container at the end, mostly that the file is truncated.
     """
 
     packet: "av.Packet[av.VideoStream]"
@@ -117,7 +117,7 @@ class _Read:
 
 
 def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
-    """Read packets one ahead, because a gap in the stream shows only in the packet after it."""
+    """Read packets one ahead, because a gap in the stream is only visible in the packet after it."""
     demuxed = container.demux(stream)
     places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
     clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None
@@ -163,7 +163,7 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
 
 
 def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
-    """Record what is missing before a packet."""
+    """Record the frames that are missing before a packet."""
     if read.loses_time:
         if read.is_placed:
             trail.hole(f"{MISSING} before it.")

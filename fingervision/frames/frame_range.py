@@ -1,4 +1,4 @@
-"""A part of a recording: the frames from one number to another, with their numbers and times in the whole recording."""
+"""Part of a recording: frames from one number to another, with their numbers and times in the whole recording."""
 
 from collections.abc import Iterable, Iterator
 
@@ -11,15 +11,14 @@ def frame_range(frames: Iterable[Frame | LostFrame], first: int, last: int) -> I
     Parameters
     ----------
     frames : iterable of Frame or LostFrame
-        The recording; read from its beginning, because what a frame hangs on comes before it, and no further than
-        the range.
+        The recording; it is read from its start, because frames depend on earlier ones, and not beyond the range.
     first, last : int
         Numbers of the first and the last frame, from 0, both included.
 
     Yields
     ------
     Frame or LostFrame
-        Those frames, as they are in the whole recording.
+        The frames of the range, with their numbers and times in the whole recording.
     """
     for item in frames:
         if item.index > last:

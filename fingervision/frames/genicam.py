@@ -1,4 +1,4 @@
-"""GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) by their maker's GenTL producer; needs the extra `genicam`.
+"""GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) through the maker's GenTL producer (extra `genicam`).
 
 A camera's name is `genicam:PRODUCER.cti`, or `genicam:PRODUCER.cti#SERIAL` if there are several cameras. The producer
 is the driver file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` loads it. Tested
@@ -26,7 +26,8 @@ from fingervision.frames.source import Description, Wish
 
 START = "genicam:"
 MONO = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
-"""Grey levels of which each has one or two bytes of its own, as the PFNC names them (EMVA, Pixel Format Naming)."""
+"""Pixel formats in which each grey level has one or two bytes of its own, by the names of the PFNC (EMVA, Pixel Format
+Naming Convention)."""
 NODES = {"exposure_ms": ("ExposureTime", 1e3), "gain": ("Gain", 1.0)}
 """Feature of the Standard Features Naming Convention for what may be asked, and its units in ours."""
 CONTROLS = {
@@ -36,7 +37,8 @@ CONTROLS = {
 }
 """What may be set while the camera runs: its feature, its units in ours, our unit."""
 SILENT_S, ASKED_EVERY_S = 2.0, 0.2
-"""A camera that sends nothing for so long is gone; so often it is looked whether the source was closed."""
+"""Time without data after which a camera counts as disconnected, and interval of the checks whether the source was
+closed."""
 
 
 def accepts(name: str) -> bool:
@@ -50,9 +52,9 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
     Raises
     ------
     MissingLibraryError
-        harvesters is not installed.
+        If harvesters is not installed.
     InputFileError
-        The producer's file is not there.
+        If the producer's file does not exist.
     DeviceError
         The camera does not exist, is in use by another program, or delivers no grey levels.
     """
@@ -60,16 +62,16 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
 
 
 class GenicamFrames:
-    """A camera that is open.
+    """An open GenICam camera.
 
-    Time stamps are the camera's own where it sends them, else the computer's clock on arrival.
+    Time stamps are the camera's own if it sends them, else those of the computer's clock on arrival.
 
     Parameters
     ----------
     name : str
-        As the module says.
+        Name of the camera, in the form described in the module.
     wish : Wish
-        Size, rate, exposure (ms) and gain that the camera is asked for.
+        Requested size, frame rate, exposure (ms) and gain.
     """
 
     template: av.VideoStream | None = None
@@ -227,7 +229,7 @@ def _limit(nodes: Any, node: str, end: str) -> float | None:
 
 
 def levels(data: NDArray[np.generic], size: tuple[int, int]) -> Pixels:
-    """Copy the grey levels out of a buffer, which the producer will fill again; shape (height, width)."""
+    """Copy the grey levels out of a buffer, which the producer will reuse; shape (height, width)."""
     pixels: Pixels = np.array(data).reshape(size)
     return pixels
 
@@ -267,7 +269,7 @@ def _connected(name: str) -> tuple[Any, Any]:
 
 
 def _ask(nodes: Any, wish: Wish) -> tuple[str, ...]:
-    """Request the wished settings and grey levels; return a sentence for each one that the camera refuses."""
+    """Request settings and a grey format; return a sentence for each one that the camera refuses."""
     asked: dict[str, Any] = {}
     if _value(nodes, "PixelFormat") not in MONO:
         asked["PixelFormat"] = next((each for each in MONO if each in _choices(nodes, "PixelFormat")), None)
@@ -312,7 +314,7 @@ def _choices(nodes: Any, node: str) -> tuple[str, ...]:
 
 
 def _own_time_s(buffer: Any) -> float | None:
-    """Time of the exposure by the camera's own clock (s); None where the camera states none."""
+    """Time of the exposure by the camera's own clock (s); None if the camera states none."""
     try:
         return 1e-9 * float(buffer.timestamp_ns)
     except Exception:

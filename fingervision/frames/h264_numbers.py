@@ -1,4 +1,4 @@
-"""Numbers that H.264 writes before every picture, which reveal a picture that was lost."""
+"""Numbers that H.264 stores in front of every picture, by which a lost picture is detected."""
 
 from dataclasses import dataclass
 
@@ -21,21 +21,23 @@ class CodedPicture:
     Parameters
     ----------
     is_key : bool
-        Whether decoding can begin with it (an instantaneous decoding refresh): numbers start again.
+        Whether decoding can start with this picture (an instantaneous decoding refresh), at which the numbers start
+        again.
     is_reference : bool
-        Whether other pictures may hang on it.
+        Whether other pictures may depend on this one.
     is_field : bool
-        Whether it is every second line of a picture.
+        Whether the picture is a field (every second line).
     is_intra : bool
-        Whether its first slice hangs on no other picture.
+        Whether its first slice depends on no other picture.
     number : int
         `frame_num`: one more than that of the reference picture before it, modulo `modulus`.
     modulus : int
         2 ** log2_max_frame_num.
     may_leap : bool
-        Whether the stream allows numbers to be left out (temporal layers that were taken out).
+        Whether the stream allows gaps in the numbers (removed temporal layers).
     recovers_after : int or None
-        Where it carries a recovery point: after so many reference pictures everything is as it should be, to the bit.
+        For a picture with a recovery point, the number of reference pictures after which all pictures are exact; else
+        None.
     """
 
     is_key: bool
@@ -57,7 +59,7 @@ class _Sequence:
 
 
 class H264Numbers:
-    """Reads slice headers (ITU-T H.264, 7.3.3); keeps the parameter sets that they refer to.
+    """Reads slice headers (ITU-T H.264, 7.3.3); stores the parameter sets to which they refer.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ class H264Numbers:
                 self._learn(unit)
 
     def of(self, packet: bytes) -> CodedPicture | None:
-        """Read the slice header in a packet; None where the packet holds no readable picture."""
+        """Read the slice header in a packet; return None if the packet contains no readable picture."""
         recovers_after = None
         try:
             units = _after_lengths(packet, self._length_bytes) if self._length_bytes else _between_start_codes(packet)
@@ -129,12 +131,12 @@ class H264Numbers:
 
 
 def _bits(unit: bytes) -> BitReader:
-    """Bits of a unit behind its first byte, without the bytes that keep start codes out (7.3.1)."""
+    """Bits of a unit after its first byte, without the emulation prevention bytes (7.3.1)."""
     return BitReader(unit[1 : 1 + HEADER_BYTES].replace(b"\0\0\3", b"\0\0"))
 
 
 def _sequence(bits: BitReader) -> tuple[int, _Sequence]:
-    """Read the sequence parameters (7.3.2.1.1) up to the last one that is needed here."""
+    """Read the sequence parameters (7.3.2.1.1) up to the last one needed."""
     profile = bits.take(8)
     bits.take(16)
     name = bits.golomb()
@@ -176,7 +178,7 @@ def _skip_scaling(bits: BitReader, count: int) -> None:
 
 
 def _recovery(unit: bytes) -> int | None:
-    """Number of frames until the picture is exact after a recovery point; None where there is none (D.1.8)."""
+    """Number of frames until pictures are exact after a recovery point; None if there is no such point (D.1.8)."""
     content = unit.replace(b"\0\0\3", b"\0\0")
     at = 1
     while at + 2 < len(content):

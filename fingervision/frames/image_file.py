@@ -1,4 +1,4 @@
-"""Read one image file: PNG, JPEG, BMP or TIFF, 8 or 16 bits, grey or colour; a truncated one is refused."""
+"""Read one image file (PNG, JPEG, BMP or TIFF; 8 or 16 bits; grey or colour); refuse a truncated file."""
 
 import struct
 import zlib
@@ -44,7 +44,7 @@ def read_image(file: Path) -> Pixels:
     Raises
     ------
     UnreadableImageError
-        The file cannot be read, is damaged, holds several pictures, or levels other than 8 or 16 bits.
+        If the file cannot be read, is damaged, contains several pictures, or has levels of other than 8 or 16 bits.
     """
     try:
         content = file.read_bytes()
@@ -92,7 +92,7 @@ def _stated_size_px(content: bytes) -> tuple[int, int]:
 
 
 def _decoded(content: bytes) -> NDArray[Any] | None:
-    """Levels in OpenCV's order (blue first); None where the content cannot be decoded."""
+    """Levels in OpenCV's channel order (blue first); None if the content cannot be decoded."""
     try:
         return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:

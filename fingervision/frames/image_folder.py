@@ -1,4 +1,4 @@
-"""Folders and glob patterns of images, in natural order, with times where these are stated."""
+"""Folders and glob patterns of images, in natural order, with times if these are given."""
 
 import glob
 import re
@@ -30,7 +30,7 @@ def open_frames(name: str, wish: Wish) -> "ImageFolder":
     DataError, InputFileError
         The folder has no images, none of them can be read, or their times are invalid.
     UsageError
-        The rate is not positive, or the images have times already.
+        If the rate is not positive, or is given for images that have times.
     """
     return ImageFolder(name, wish.rate_hz)
 
@@ -42,9 +42,9 @@ class ImageFolder:
     Parameters
     ----------
     name : str
-        A folder, a glob, or one image.
+        A folder, a glob pattern, or one image.
     rate_hz : float or None
-        Images in a second. Without a rate and without times, frames have no time.
+        Images per second. Without a rate and without times, frames have no time.
     """
 
     name: str

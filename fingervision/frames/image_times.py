@@ -12,7 +12,7 @@ TIMES_FILE = "times.csv"
 def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
     """Read the times of images from times.csv in their folder.
 
-    The table has the columns `file,time_s`, or `time_s` alone with a row for each image in order.
+    The table has the columns `file,time_s`, or only `time_s` with one row per image, in order.
 
     Returns
     -------
@@ -22,7 +22,7 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
     Raises
     ------
     DataError
-        The table cannot be read, has a bad row, or does not fit the images.
+        If the table cannot be read, has an invalid row, or does not fit the images.
     """
     table = files[0].parent / TIMES_FILE
     if not table.is_file():

@@ -15,7 +15,7 @@ PLANAR = ("yuv4", "yuva4", "yuvj4", "gray", "nv1", "nv2", "nv4", "p0", "p2", "p4
 
 
 def luma(picture: av.VideoFrame) -> Pixels:
-    """Grey levels of a picture, or its colours where it has no luma plane.
+    """Grey levels of a picture, or its colours if it has no luma plane.
 
     Nothing is converted: 8-bit luma is returned as the decoder's own memory. Luma of 9 to 15 bits is scaled to 16 bits,
     so that its largest level becomes 65535.
@@ -23,12 +23,12 @@ def luma(picture: av.VideoFrame) -> Pixels:
     Parameters
     ----------
     picture : av.VideoFrame
-        As decoded.
+        The decoded picture.
 
     Returns
     -------
     ndarray of uint8 or uint16, shape (height, width) or (height, width, 3)
-        Luma; red, green and blue where the codec stores these.
+        Luma; red, green and blue if the codec stores these.
     """
     name = picture.format.name
     bits = picture.format.components[0].bits
@@ -51,7 +51,7 @@ def luma(picture: av.VideoFrame) -> Pixels:
 
 
 def _colours(picture: av.VideoFrame, bits: int) -> Pixels:
-    """Red, green and blue of a picture stored in an RGB format; without loss."""
+    """Red, green and blue of a picture stored in an RGB format, without loss."""
     grey = picture.format.name.startswith(("mono", "gray"))
     wanted = ("gray16le" if bits > 8 else "gray") if grey else ("rgb48le" if bits > 8 else "rgb24")
     levels: Any = picture.to_ndarray(format=wanted)

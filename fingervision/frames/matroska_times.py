@@ -1,9 +1,9 @@
-"""Check the time of a Matroska cluster, because one damaged number there moves all of its frames.
+"""Check the times of Matroska clusters, because one damaged number in a cluster shifts all of its frames.
 
-A cluster states one time, from which its blocks count, so that one flipped bit there moves seconds of frames forward or
-back. The file's index (cues) repeats the times of the key frames: a cluster that holds none of the times stated by its
-cues has a wrong time. Where there is no cue, clusters must follow one another: of two that overlap, neither is trusted
-unless a cue confirms it, and the last one must lie within the stated duration.
+A cluster states one time, relative to which the times of its blocks are given, so that one flipped bit shifts seconds
+of frames forward or back. The file's index (cues) repeats the times of the key frames: a cluster that contains none of
+the times stated by its cues has a wrong time. Without cues, clusters must follow one another in time: of two that
+overlap, neither is trusted unless a cue confirms it, and the last cluster must lie within the stated duration.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters), 5.1.5 (cues).
 """
@@ -35,14 +35,14 @@ class _Cluster:
 
 
 class ClusterTimes:
-    """The clusters of a file whose times are not trustworthy.
+    """Finds the clusters of a file whose times are not trustworthy.
 
     Parameters
     ----------
     path : Path
         The file.
     stream : int
-        Which of the file's streams the video is, from 0.
+        Number of the video stream in the file, from 0.
     """
 
     def __init__(self, path: Path, stream: int) -> None:
@@ -65,7 +65,7 @@ class ClusterTimes:
 
 
 def _track(content: mmap.mmap, stream: int) -> int:
-    """Number that the blocks of a stream carry; streams are counted in the order of their tracks."""
+    """Track number in the blocks of a stream; streams are counted in the order of their tracks."""
     at = content.find(TRACKS)
     while at >= 0:
         tracks = element(content, at)
@@ -127,7 +127,7 @@ def _clusters(content: mmap.mmap, track: int) -> list[_Cluster]:
 
 
 def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
-    """Times stated by the index, by the position of their cluster."""
+    """Times stated by the index, by the position of the cluster."""
     stated: dict[int, set[int]] = {}
     segment, at = content.find(SEGMENT), content.rfind(CUES)
     whole = element(content, segment) if segment >= 0 else None
@@ -152,7 +152,7 @@ def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
 
 
 def _duration(content: mmap.mmap) -> float | None:
-    """Duration in ticks; None where it is not stated."""
+    """Duration in ticks; None if it is not stated."""
     at = content.find(INFO)
     while at >= 0:  # the name stands in the file's table of contents too
         info = element(content, at)

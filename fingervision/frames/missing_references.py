@@ -1,8 +1,9 @@
-"""Find pictures of a file that depend on a missing one, for codecs that do not count their pictures.
+"""Find pictures of a file that depend on a missing picture, for codecs that do not number all pictures.
 
-H.264 counts them (see `reference_chain`), HEVC names the references, MPEG-2 has a constant rate (`transport_stream`).
-Other codecs are decoded without an error when a whole packet is missing: the differences of the next picture are added
-to an older one, and a moving finger is shown in an old position. Four signs are used, all read before decoding:
+H.264 numbers its pictures (see `reference_chain`), HEVC names the reference pictures, MPEG-2 has a constant rate
+(`transport_stream`). With other codecs, a missing packet causes no decoding error: the differences of the next picture
+are added to an older one, and a moving finger is shown in an old position. Four criteria are used, all from data that
+are read before decoding:
 
 * AV1 numbers the pictures in the order in which they are shown. An omitted number means a missing picture; consecutive
   numbers prove that none is missing, whatever the times are.
@@ -29,9 +30,9 @@ import av
 from fingervision.frames.coded_times import CodedTime, coded_times
 
 COUNTED_CODECS = frozenset({"h264", "hevc", "vvc", "mpeg1video", "mpeg2video"})
-"""Codecs, by FFmpeg's names, whose pictures tell by themselves, or are followed elsewhere."""
+"""Codecs, by FFmpeg's names, whose missing references are detected elsewhere."""
 ADAPTING_CODECS = frozenset({"ffv1"})
-"""Codecs of whole pictures, of which all but key frames are read with the statistics of those before them."""
+"""Codecs of whole pictures whose non-key frames are decoded with statistics of the frames before."""
 INTRA_PROPERTY = 1  # FFmpeg's AV_CODEC_PROP_INTRA_ONLY
 TIMED_CONTAINERS = ("mov", "matroska", "flv", "asf", "ogg")
 # An even row: so many single steps at least, and nearly all steps a whole number of the usual one. A camera's own times
@@ -50,7 +51,8 @@ FEWEST_LENGTHS, KEYS_SHARE = 3, 0.9
 FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
 OWN_RECORDING = "Recorded by fingervision, with a list of its lost frames beside it."
-"""Comment of a container whose packets were judged when they came, and whose marks are kept with it."""
+"""Comment in a container whose packets were checked during the recording, and whose list of lost frames is stored with
+it."""
 
 NUMBER_LEFT_OUT = "A picture that it hangs on is missing: the numbers of the coded pictures leave one out."
 BIT_NOT_TURNED = (
@@ -65,21 +67,22 @@ TIME_LEFT_OUT = (
 
 
 def missing_references(path: Path, stream: av.VideoStream, container_format: str) -> dict[int, str]:
-    """Read the packets of a file without decoding, and return before which of them a picture is missing.
+    """Read the packets of a file without decoding; return the packets before which a picture is missing.
 
     Parameters
     ----------
     path : Path
         The file.
     stream : av.VideoStream
-        The video in it, opened elsewhere.
+        The video stream, opened elsewhere.
     container_format : str
-        FFmpeg's name.
+        FFmpeg's name of the container format.
 
     Returns
     -------
     dict of int to str
-        By the number of the packet in the order of decoding, from 0: why what follows, until a key frame, is damaged.
+        By packet number in decoding order, from 0: reason why the pictures from this packet to the next key frame are
+        damaged.
     """
     codec = stream.codec
     is_whole = codec.properties & INTRA_PROPERTY and codec.canonical_name not in ADAPTING_CODECS
@@ -94,9 +97,9 @@ def judged(packets: list[CodedTime], *, are_timed: bool) -> dict[int, str]:
     Parameters
     ----------
     packets : list of CodedTime
-        All of a video, in the order of decoding.
+        All packets of a video, in decoding order.
     are_timed : bool
-        Whether the container gives every picture a time of its own.
+        Whether the container states a time for every picture.
     """
     if sum(packet.order is not None for packet in packets) > len(packets) // 2:
         return _by_number(packets)
@@ -108,7 +111,7 @@ def judged(packets: list[CodedTime], *, are_timed: bool) -> dict[int, str]:
 
 
 def _by_number(packets: list[CodedTime]) -> dict[int, str]:
-    """Check AV1's numbers; removed temporal layers leave the same step between all numbers."""
+    """Check AV1's picture numbers; if temporal layers were removed, all numbers have the same increment."""
     numbered = [(number, packet) for number, packet in enumerate(packets) if packet.order is not None]
     steps = [
         (number, (packet.order - before.order) % packet.modulus)
@@ -120,7 +123,7 @@ def _by_number(packets: list[CodedTime]) -> dict[int, str]:
 
 
 def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
-    """Check MPEG-4's bit where it toggles with every P picture, and starts with the same value after I pictures."""
+    """Check MPEG-4's bit, if it toggles with every P picture and starts with the same value after I pictures."""
     needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
     pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]
     inner = [(number, packet.turn != before.turn) for number, before, packet in pairs if before.turn is not None]
@@ -148,7 +151,7 @@ def _shown_too_late(packets: list[CodedTime]) -> list[int]:
 
 
 def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, str]:
-    """Find the holes in equidistant times, and the packets that may depend on what is missing there."""
+    """Find holes in equidistant times, and the packets that may depend on the missing pictures."""
     shown = sorted({packet.tick for packet in packets if packet.is_shown and packet.tick is not None})
     steps = [after - before for before, after in pairwise(shown)]
     usual = _usual(steps)
@@ -177,10 +180,10 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
 
 
 def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
-    """Whether as many packets as usual lie between the key frames before and after a hole: the camera paused.
+    """Whether as many packets as usual lie between the key frames around a hole, so that the camera paused.
 
-    A coder that makes every n-th picture a key frame counts what it coded. If pictures had been lost, fewer would lie
-    there, unless n of them, or a multiple, were lost.
+    A coder that makes every n-th picture a key frame counts the pictures that it coded. If pictures had been lost,
+    there would be fewer between the key frames, unless a multiple of n was lost.
     """
     lengths = [after - before for before, after in pairwise(key_numbers)]
     behind = bisect_right(key_numbers, number)
@@ -192,7 +195,7 @@ def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
 
 
 def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -> bool:
-    """Whether the bit is in use, and the next P picture toggles it as if nothing were missing."""
+    """Whether the bit is in use, and the next P picture toggles it as if no picture were missing."""
     before = next((each for each in reversed(packets[:number]) if each.is_needed), None)
     following = next((k for k in range(number, len(packets)) if packets[k].is_needed), None)
     if before is None or before.turn is None or following is None or packets[following].turn is None:
@@ -208,7 +211,7 @@ def _key_is_due(keys: list[int], at: int, missing_ticks: float) -> bool:
 
 
 def _sticks_out(steps: list[int], k: int) -> bool:
-    """Whether a step is longer than the usual ones before and after it, unlike at a change of rate."""
+    """Whether a step is longer than the usual steps before and after it, unlike at a change of rate."""
     before, behind = steps[max(0, k - BESIDE) : k], steps[k + 1 : k + 1 + BESIDE]
     return all(steps[k] > median(some) + TICKS for some in (before, behind) if some)
 
@@ -218,7 +221,7 @@ def _is_whole(step: int, usual: float) -> bool:
 
 
 def _usual(steps: list[int]) -> float | None:
-    """Step of equidistant times, in ticks; None where they are not equidistant."""
+    """Step of equidistant times, in ticks; None if they are not equidistant."""
     if not steps:
         return None
     middle = sorted(steps)[len(steps) // 2]

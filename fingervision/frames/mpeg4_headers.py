@@ -1,4 +1,4 @@
-"""Data that MPEG-4 part 2 writes before every picture: its type, and a bit that encoders toggle.
+"""Data that MPEG-4 part 2 stores in front of every picture: its type, and a bit that encoders toggle.
 
 Half-pixel values are rounded up in one P picture and down in the next, so that rounding errors do not accumulate
 (`vop_rounding_type`). Encoders toggle the bit with every P picture and reset it at each I picture, so that it counts
@@ -38,9 +38,9 @@ class Mpeg4Picture:
     Parameters
     ----------
     kind : Mpeg4Kind
-        On what it hangs.
+        Type of the picture, by its dependence on others.
     rounding : int or None
-        `vop_rounding_type`, 0 or 1; None where the header has none.
+        `vop_rounding_type`, 0 or 1; None if it is not in the header.
     """
 
     kind: Mpeg4Kind
@@ -48,7 +48,7 @@ class Mpeg4Picture:
 
 
 class Mpeg4Headers:
-    """Reads the headers of pictures; stores what the layer's header states of their form.
+    """Reads the headers of pictures; stores the format of these headers from the layer's header.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Mpeg4Headers:
         self._units(extradata or b"")
 
     def of(self, packet: bytes) -> Mpeg4Picture | None:
-        """Read the first picture of a packet; None where there is no readable one."""
+        """Read the first picture header of a packet; return None if there is no readable one."""
         return self._units(packet)
 
     def _units(self, content: bytes) -> Mpeg4Picture | None:

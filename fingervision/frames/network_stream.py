@@ -46,7 +46,7 @@ def accepts(name: str) -> bool:
 
 
 def without_password(name: str) -> str:
-    """Return the address without the camera's password, for display on the page and storage in the run."""
+    """Return the address without the camera's password, for display on a browser page and storage in a run."""
     # A password may hold `/` and `@`: what stands before the last @ is who asks, not where.
     shown = re.sub(r"^(\w+://[^/@:?#]*):.*@", r"\1:***@", name)
     return SECRET_PARAMETERS.sub(r"\1***", shown)
@@ -58,9 +58,9 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
     Raises
     ------
     DeviceError
-        Nobody answers, or the answer is no video.
+        If there is no response, or the response is no video.
     UsageError
-        A size or rate is wished, which the camera alone decides.
+        If a size or rate is requested, which only the camera can set.
     """
     if wish.rate_hz is not None or wish.size_px is not None:
         raise UsageError(
@@ -71,20 +71,20 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
 
 
 class NetworkStream:
-    """A connected stream; after an interruption it is opened again as a new one.
+    """A connected stream; after an interruption, a new object is opened.
 
-    Time stamps are those of the stream (RTSP, MPEG-TS), or else the computer's clock on arrival: a sequence of JPEG
-    pictures over HTTP carries no times, and times derived from a nominal frame rate would be invented.
+    Time stamps are those of the stream (RTSP, MPEG-TS), or else of the computer's clock on arrival: a sequence of JPEG
+    pictures over HTTP contains no times, and times derived from a nominal frame rate would not be measured ones.
 
     Parameters
     ----------
     name : str
-        Its address.
+        Address of the stream.
 
     Raises
     ------
     FingervisionError
-        Nobody answers, or the answer is no video.
+        If there is no response, or the response is no video.
     """
 
     def __init__(self, name: str) -> None:
@@ -221,7 +221,7 @@ class NetworkStream:
     def _time_s(self, tick: int | None, arrived_s: float, before_s: float | None) -> float:
         """Convert a tick to the source's clock.
 
-        Without a tick, take one tick after the previous frame, which keeps the order.
+        A frame without a tick is placed one tick after the previous frame, which keeps the order.
         """
         if not self.has_own_clock or self._stream.time_base is None:
             return arrived_s

@@ -1,7 +1,7 @@
-"""The quantiser of every block of a decoded picture, as the decoder read it in the stream.
+"""Quantiser step of every block of a decoded picture, as the decoder read it from the stream.
 
-FFmpeg reports it on request (`export_side_data=venc_params`, libavutil/video_enc_params.h) for H.264, VP9 and the MPEG
-family up to MPEG-4 part 2; for other codecs it is unknown.
+FFmpeg reports the quantiser on request (`export_side_data=venc_params`, libavutil/video_enc_params.h) for H.264, VP9
+and the MPEG family up to MPEG-4 part 2; for other codecs it is unknown.
 """
 
 import struct
@@ -41,12 +41,12 @@ VP9_STEPS = _vp9_steps()
 
 
 def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
-    """Quantiser steps of a decoded picture, on the scale of H.264; None where its codec does not report them.
+    """Quantiser steps of a decoded picture, on the scale of H.264; None if its codec does not report them.
 
     Parameters
     ----------
     picture : av.VideoFrame
-        As decoded, with `EXPORTED` among the decoder's options.
+        Picture that was decoded with `EXPORTED` among the decoder's options.
     """
     carried: Any = picture.side_data  # PyAV's stubs call its items strings
     found = next((each for each in carried if each.type.name == SIDE_DATA), None)

@@ -17,11 +17,11 @@ class OwnPacket:
     Parameters
     ----------
     packet : av.Packet
-        The bytes.
+        The packet with its bytes.
     time_s, decode_s : float
-        When it is shown and when it is decoded, on the source's clock.
+        Presentation time and decoding time, on the source's clock.
     is_key : bool
-        Whether its picture hangs on no other.
+        Whether its picture depends on no other picture.
     """
 
     packet: "av.Packet[av.VideoStream]"
@@ -32,16 +32,16 @@ class OwnPacket:
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """State of the stage at a frame's exposure.
+    """State of the stage at the exposure of a frame.
 
     Parameters
     ----------
     input_mm : float
-        Where it stood.
+        Position of the stage.
     force_n : float or None
-        How hard it pushed, where that is measured.
+        Force of the stage, if it is measured.
     run : str
-        Run that the frame belongs to; what has a memory begins anew with each.
+        Name of the run to which the frame belongs; effects with memory start again with each run.
     """
 
     input_mm: float
@@ -56,13 +56,13 @@ class Received:
     Parameters
     ----------
     item : Frame or LostFrame
-        `time_s` is on the source's clock.
+        The frame; its `time_s` is on the source's clock.
     arrived_s : float
-        When the host had all of it, on the host's monotonic clock.
+        Time at which the computer had received the whole frame, on its monotonic clock.
     packets : tuple of OwnPacket
-        What came in since the frame before; empty where the source codes nothing.
+        Packets received since the frame before; empty if the source does not compress.
     driven : Driven or None
-        What moved the gripper when the frame was exposed, where the source knows it.
+        State of the stage at the exposure, if the source knows it.
     """
 
     item: Frame | LostFrame
@@ -72,7 +72,7 @@ class Received:
 
 
 class LiveSource(Protocol):
-    """A source that runs by itself, and may be interrupted and opened again."""
+    """A live source: it runs independently, and may be interrupted and opened again."""
 
     @property
     def description(self) -> Description:
@@ -81,21 +81,21 @@ class LiveSource(Protocol):
 
     @property
     def has_own_clock(self) -> bool:
-        """Whether times are those of the source; otherwise they are the computer's monotonic clock on arrival."""
+        """Whether times are those of the source; otherwise they are from the computer's monotonic clock on arrival."""
         ...
 
     @property
     def template(self) -> av.VideoStream | None:
-        """The coded stream to which the packets belong; None where there is none."""
+        """The coded stream to which the packets belong; None if there is none."""
         ...
 
     def received(self) -> Iterator[Received]:
-        """Yield the frames as they arrive; ends where a recording ends.
+        """Yield the frames as they arrive; a source that is a recording ends at its end.
 
         Raises
         ------
         DeviceError
-            The source is cut off.
+            If the connection to the source is lost.
         """
         ...
 

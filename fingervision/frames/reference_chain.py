@@ -15,7 +15,7 @@ LEAP_SHARE = 1.5
 
 
 class Link(Enum):
-    """What the frame numbers tell of a picture: it follows on, a reference may be missing, or nothing is known."""
+    """Result of checking a picture's frame number: it follows on, a reference may be missing, or nothing is known."""
 
     FOLLOWS = "follows"
     BROKEN = "broken"
@@ -26,17 +26,17 @@ class ReferenceChain:
     """Follows the frame numbers of H.264 pictures in decoding order (ITU-T H.264, 7.4.3, `frame_num`).
 
     A decoder that misses a picture reports nothing: it adds the differences of the next picture to whichever picture
-    came before. Pictures that are no reference for others (most of those between two others in time) may be missing
-    without harm, and are recognised. HEVC needs no such check: its pictures name their references, and FFmpeg reports
-    which of them are missing. Other codecs write no numbers, so that nothing can be checked.
+    came before. Pictures that are no reference for others (mostly B pictures) may be missing without damage to others,
+    and are recognised. HEVC needs no such check: its pictures name their references, and FFmpeg reports which of them
+    are missing. Other codecs write no numbers, so that nothing can be checked.
 
     Resets of the numbers in mid-stream (memory management operation 5) are not detected, since no camera is known to
-    use them; pictures after one would be taken for damaged until the next key frame.
+    use them; pictures after such a reset would be reported as damaged until the next key frame.
 
     Parameters
     ----------
     codec : str
-        FFmpeg's name.
+        FFmpeg's name of the codec.
     extradata : bytes or None
         The container's parameter sets.
     """
@@ -50,7 +50,8 @@ class ReferenceChain:
         self._key_every: int | None = None
         self._recovering: tuple[int, int] | None = None  # number at which all is right again, pictures since it began
         self.recovered_over: int | None = None
-        """How many pictures ago the recovery began that the last picture completes; None where it completes none."""
+        """Number of pictures since the start of the recovery that the last picture completes; None if it completes
+        none."""
 
     def link(self, packet: "av.Packet[av.VideoStream]") -> Link:
         """Check the next packet."""
@@ -88,14 +89,14 @@ class ReferenceChain:
         return Link.UNKNOWN if picture.may_leap and step and not missing else Link.BROKEN
 
     def _may_hide_a_key(self, before: CodedPicture, missing: int, modulus: int) -> bool:
-        """Whether a loss could be hidden because the numbers, after a reset or a full cycle, come out the same."""
+        """Whether a loss may be undetectable, because after a reset or a full cycle the numbers are the same."""
         if missing >= modulus:
             return True
         is_due = self._key_every is None or self._since_key + 1 + missing >= self._key_every
         return missing > before.number and is_due
 
     def _missing(self, tick: int | None) -> int:
-        """Number of pictures missing before this one, as far as the times tell."""
+        """Number of pictures missing before this one, as far as it follows from the times."""
         step = None if self._tick is None or tick is None else tick - self._tick
         self._tick = tick
         if step is None or step <= 0:

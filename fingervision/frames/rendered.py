@@ -21,13 +21,13 @@ class RenderedFrames:
     Parameters
     ----------
     scenes : sequence of Scene
-        One a frame, all of one size.
+        One scene per frame, all of one size.
     camera : Camera
-        How they are seen.
+        Camera through which the scenes are rendered.
     rng : numpy.random.Generator
-        Source of the noise; a second pass over the frames has other noise.
+        Generator of the noise; a second pass over the frames has different noise.
     rate_hz : float or None
-        Frames in a second; None gives frames without times.
+        Frames per second; None gives frames without times.
 
     Raises
     ------
@@ -49,7 +49,7 @@ class RenderedFrames:
 
     @property
     def description(self) -> Description:
-        """What is known before the frames are drawn."""
+        """Description of the recording before its frames are rendered."""
         first = self.scenes[0]
         return Description(
             name="rendered",

@@ -19,7 +19,7 @@ class Seeking(Protocol):
     """A recording whose single frames can be accessed directly."""
 
     def frame(self, index: int, time_s: float) -> Frame | None:
-        """Return the frame of exactly that time; None where there is none, or it cannot be decoded alone."""
+        """Return the frame with exactly that time; None if there is none, or it cannot be decoded alone."""
         ...
 
 
@@ -37,12 +37,12 @@ def seeking(name: str) -> Seeking | None:
 
 
 class VideoSeeking:
-    """Random access to a video file; for the following frame the decoder continues from where it was.
+    """Random access to a video file; to read the following frame, the decoder continues from its present position.
 
     Parameters
     ----------
     name : str
-        Its path.
+        Path of the file.
     """
 
     def __init__(self, name: str) -> None:
@@ -52,7 +52,7 @@ class VideoSeeking:
         self._tick: int | None = None
 
     def frame(self, index: int, time_s: float) -> Frame | None:
-        """Return the frame of exactly that time; None where there is none, or it cannot be decoded alone."""
+        """Return the frame with exactly that time; None if there is none, or it cannot be decoded alone."""
         try:
             return self._found(index, time_s)
         except (av.FFmpegError, OSError, ValueError):

@@ -1,4 +1,4 @@
-"""A drawn gripper that opens and closes for ever with a known gap, for use without a camera."""
+"""A simulated camera: a rendered gripper that opens and closes endlessly with a known gap."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -36,13 +36,13 @@ def open_frames(name: str, wish: Wish) -> "SimulatedGripper":
     Raises
     ------
     UsageError
-        A rate or size that no camera has.
+        If the rate or size is not that of a camera.
     """
     return SimulatedGripper(wish.size_px or USUAL_SIZE_PX, wish.rate_hz or USUAL_RATE_HZ)
 
 
 def true_gap_mm(index: int) -> float:
-    """Gap that is drawn in a frame, before rounding to grey levels (mm)."""
+    """Gap that is rendered in a frame, before rounding to grey levels (mm)."""
     return CLOSED_MM + (OPEN_MM - CLOSED_MM) * 0.5 * (1.0 - cos(2.0 * pi * (index % CYCLE_FRAMES) / CYCLE_FRAMES))
 
 

@@ -1,4 +1,4 @@
-"""Check that a JPEG holds exactly the blocks that it states, with a second decoder that reports what FFmpeg ignores.
+"""Check that a JPEG contains exactly the blocks that it states, by a second decoder that reports what FFmpeg ignores.
 
 Damage in a JPEG changes how the following Huffman codes are read, and often leaves too few or too many bytes at the end
 of the picture, or of the part before a restart marker. (After a single flipped bit the codes often fit again within a
@@ -18,15 +18,14 @@ PICTURES_TO_LEARN = 16
 
 
 class SoundJpeg:
-    """Checks the pictures of one Motion JPEG stream.
+    """Checks the pictures of one Motion JPEG stream for missing or surplus data.
 
-    A fault is reported only as long as most pictures of the stream are sound: otherwise the camera itself writes such
-    pictures.
+    A fault is reported only if most pictures of the stream have none: otherwise the camera itself writes such pictures.
 
     Parameters
     ----------
     codec : str
-        FFmpeg's name of the codec; of another than Motion JPEG nothing is said.
+        FFmpeg's name of the codec; streams of other codecs than Motion JPEG are not checked.
     """
 
     def __init__(self, codec: str) -> None:
@@ -34,18 +33,18 @@ class SoundJpeg:
         self._sound = self._unsound = 0
 
     def learn(self, pictures: Iterable[bytes]) -> None:
-        """Check a few pictures in advance, to learn what is usual for the stream."""
+        """Check some pictures in advance, to learn which properties are usual for the stream."""
         if self._is_one:
             for picture, _ in zip(pictures, range(PICTURES_TO_LEARN), strict=False):
                 self._count(not _fault(picture))
 
     def fault(self, picture: bytes) -> str:
-        """Describe a picture's fault; empty where it has none.
+        """Describe a picture's fault; empty if it has none.
 
         Parameters
         ----------
         picture : bytes
-            One packet of the stream.
+            Bytes of one packet of the stream.
         """
         if not self._is_one:
             return ""

@@ -1,4 +1,4 @@
-"""Protocol of frame sources, with their description, and how a source is found by its name."""
+"""Protocol of frame sources, their description, and the search for a source by its name."""
 
 import importlib
 import logging
@@ -22,32 +22,32 @@ LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What is known of a recording before its frames are read.
+    """Properties of a recording that are known before its frames are read.
 
     Parameters
     ----------
     name : str
-        What the user called it.
+        Name given by the user.
     kind : str
-        Video file, images, camera.
+        Kind of source: video file, images, camera.
     codec : str
-        How the pictures are stored.
+        Compression format of the pictures.
     coding : Coding
-        Whether that loses something: errors of neighbouring pixels are then correlated.
+        Whether the compression is lossy: errors of neighbouring pixels are then correlated.
     width_px, height_px : int
         Size of every frame; a frame of another size counts as damaged.
     rate_hz : float or None
-        Mean frame rate that the source states; None where it states none. Times never come from it.
+        Mean frame rate stated by the source; None if not stated. Times are never derived from it.
     has_times : bool
-        Whether frames carry times.
+        Whether frames have times.
     frame_count : int or None
-        Frames that the source announces: good for a progress bar, not for more.
+        Number of frames that the source announces; only used to show progress.
     files : tuple of Path
-        What the recording is made of, in order; empty for a live source.
+        Files of the recording, in order; empty for a live source.
     notes : tuple of str
-        What the user should know of the recording, one sentence each.
+        Sentences that the user should know about the recording.
     camera : mapping of str to str
-        Settings that a camera states, with their units.
+        Settings stated by a camera, with their units.
     """
 
     name: str
@@ -65,42 +65,42 @@ class Description:
 
     @property
     def lossy(self) -> bool:
-        """Whether the coding loses any of the picture."""
+        """Whether the coding is lossy."""
         return self.coding is not Coding.LOSSLESS
 
 
 class FrameSource(Protocol):
-    """A recording or a camera: its frames in order, each either a picture or marked as lost; each is read once."""
+    """A recording or a camera: it yields frames in order, each a picture or marked as lost; each is read once."""
 
     @property
     def description(self) -> Description:
-        """What is known before the frames are read."""
+        """Description of the source before its frames are read."""
         ...
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Read the frames; `index` counts from 0 without holes."""
+        """Read the frames; `index` counts from 0 without gaps."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class CameraWish:
-    """Settings that the user requests of a camera of this machine; None leaves a setting unchanged.
+    """Settings that the user requests from a camera of this machine; None leaves a setting unchanged.
 
     Parameters
     ----------
     format : str or None
-        Four letters, such as YUYV or MJPG.
+        Four-letter pixel format, such as YUYV or MJPG.
     exposure_ms : float or None
-        Time that the sensor gathers light.
+        Exposure time.
     gain, focus : float or None
-        In the camera's own units.
+        Values in the camera's own units.
     white_balance_k : float or None
         Colour temperature.
 
     Raises
     ------
     UsageError
-        No camera has such a value.
+        If a value is not possible for a camera.
     """
 
     format: str | None = None
@@ -129,9 +129,9 @@ class Wish:
     rate_hz : float or None
         Frame rate of images without times, or of a camera.
     size_px : (int, int) or None
-        Width and height that a camera shall deliver.
+        Width and height requested from a camera.
     camera : CameraWish
-        What else a camera shall be set to.
+        Other settings requested from a camera.
     """
 
     rate_hz: float | None = None
@@ -145,12 +145,12 @@ class SourceKind(Protocol):
     def accepts(self, name: str) -> bool:
         """Whether a name belongs to this kind of source.
 
-        Called for every recording, so it must be fast and open nothing.
+        This is called for every recording, so that it must be fast and must not open anything.
         """
         ...
 
     def open_frames(self, name: str, wish: Wish) -> FrameSource:
-        """Open the source; raise FingervisionError with a sentence where that is impossible."""
+        """Open the source; raise FingervisionError with a sentence if that is impossible."""
         ...
 
 
@@ -159,14 +159,14 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
 
     Every module of this package that has `accepts(name) -> bool` and `open_frames(name, wish) -> FrameSource` is a kind
     of source, as is every such module or object of another distribution (entry points of the group
-    `fingervision.frame_sources`). A kind with `TAKES_THE_REST = True` is asked only if no other accepts the name.
+    `fingervision.frame_sources`). A kind with `TAKES_THE_REST = True` is tried only if no other kind accepts the name.
 
     Raises
     ------
     DataError, DeviceError, InputFileError
-        No kind of source knows the name, or the one that does cannot read it.
+        If no kind of source accepts the name, or the kind that does cannot read it.
     UsageError
-        Several kinds accept it.
+        If several kinds accept the name.
     """
     if not name:
         raise UsageError("The recording must have a name, but it is empty: give a file, a folder, or a glob in quotes.")

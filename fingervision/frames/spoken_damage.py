@@ -1,4 +1,4 @@
-"""Damage that FFmpeg reports only in its log: collected for each decoder, and kept off the screen."""
+"""Damage that FFmpeg reports only in its log: messages are collected per decoder, and not shown on the screen."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,15 +18,15 @@ HELPERS = ("swscaler", "swresampler", "")
 class Heard:
     """Errors logged since the last request.
 
-    Decoders fill in a damaged part from the previous picture, and containers skip to the next place that looks sound.
-    Both only log it; most of it is never returned to the caller as an error.
+    Decoders replace a damaged part by the previous picture, and container readers skip to the next place that looks
+    undamaged. Such damage is only logged; most of it is never returned to the caller as an error.
 
     Parameters
     ----------
     decoder : str
-        Name of the decoder; who else speaks is the container.
+        Name of the decoder; messages under other names are from the container reader.
     warnings : tuple of str
-        Beginnings of the container's warnings that speak of damage too.
+        Beginnings of warnings by the container reader that also indicate damage.
     """
 
     decoder: str
@@ -34,7 +34,7 @@ class Heard:
     log: list[tuple[int, str, str]] = field(default_factory=list)
 
     def of_picture(self) -> str:
-        """Return and clear the decoder's first logged sentence; empty where there is none."""
+        """Return the decoder's first message and delete its messages; empty if there is none."""
         said = [
             words.strip() for level, speaker, words in self.log if speaker == self.decoder and level <= av.logging.ERROR
         ]
@@ -43,7 +43,7 @@ class Heard:
         return said[0].rstrip(".") if said else ""
 
     def of_file(self) -> str:
-        """Return and clear the container's sentences, keeping those of the decoder."""
+        """Return the container reader's messages and delete them, keeping those of the decoder."""
         said = [
             words.strip()
             for level, speaker, words in self.log
@@ -56,7 +56,7 @@ class Heard:
 
 @contextmanager
 def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
-    """Collect FFmpeg's error log, and keep it off the user's screen."""
+    """Collect FFmpeg's error log, and keep it off the screen."""
     before = av.logging.get_level()
     av.logging.set_level(av.logging.WARNING if warnings else av.logging.ERROR)
     try:

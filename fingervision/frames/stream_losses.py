@@ -1,4 +1,4 @@
-"""Lost packets of a stream, from the packets that did arrive, beside what the container reports itself."""
+"""Detect lost packets of a stream from those that arrived, in addition to reports of the container reader."""
 
 import av
 
@@ -15,9 +15,9 @@ class StreamLosses:
     Parameters
     ----------
     container_format : str
-        FFmpeg's name.
+        FFmpeg's name of the container format.
     stream : av.VideoStream
-        With its decoder.
+        Video stream with its decoder.
     """
 
     def __init__(self, container_format: str, stream: av.VideoStream) -> None:
@@ -28,7 +28,7 @@ class StreamLosses:
     def before(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> str:
         """Report missing packets before this one to the damage trail.
 
-        Return a sentence if whole frames of an even row are missing.
+        Return a sentence if whole frames are missing from a series with equidistant times.
         """
         link = self._chain.link(packet)
         leaps = self._transport.leaps(packet)

@@ -1,4 +1,4 @@
-"""Damage visible in time stamps: times that run backwards, isolated jumps, missing frames."""
+"""Detect damage from time stamps: times that decrease, isolated jumps, missing frames."""
 
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
@@ -19,20 +19,20 @@ OUT_OF_ROW = "Its time does not fit between those of the frames around it, which
 def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
     """Yield pictures in order of presentation, with lost frames in place of those whose time is impossible.
 
-    Pictures leave a decoder in the order of presentation. If a time is earlier than the one before it, one of the two
-    is wrong, but not known which. Both pictures are lost, and so are all that follow until times are later than both. A
-    single time that departs from an otherwise regular series is wrong by itself. A repeated time is left unchanged: it
-    means a duplicate frame.
+    Pictures leave a decoder in the order of presentation. If a time is earlier than the one before, one of the two is
+    wrong, but it is not known which. Both pictures count as lost, and so do all that follow until times are later than
+    both. A single time that deviates from an otherwise regular series is itself wrong. A repeated time is left
+    unchanged, because it means a duplicate frame.
 
     Parameters
     ----------
     pictures : iterable of (int or None, VideoFrame or str)
-        Ticks with pictures, or with what happened instead of one. One is held back.
+        Ticks with pictures, or with the reason why there is no picture. One item is held back.
 
     Yields
     ------
     (int or None, VideoFrame or str)
-        The same, in the same order.
+        Items of the same kind, in the same order.
     """
     steps: deque[int] = deque(maxlen=EVEN_STEPS)
     before: int | None = None  # time of the last picture that was passed on
@@ -68,13 +68,13 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
 class EvenRow:
     """Detects missing frames in a regular series of times, in decoding order.
 
-    Used for broadcast formats (MPEG-TS): their encoders keep a constant rate, so that a missing frame was lost in
+    It is used for broadcast formats (MPEG-TS): their encoders keep a constant rate, so that a missing frame was lost in
     transmission.
 
     Parameters
     ----------
     stated_step : float or None
-        Ticks between two frames, where the stream states a rate: believed from the first step that keeps it.
+        Ticks between two frames, if the stream states a rate; used from the first step that agrees with it.
     """
 
     def __init__(self, stated_step: float | None = None) -> None:
@@ -96,7 +96,7 @@ class EvenRow:
 
 
 def _usual(steps: "deque[int]") -> float | None:
-    """Step of a regular series; None if it is irregular."""
+    """Step of a regular series of times; None if it is irregular."""
     if len(steps) < EVEN_STEPS:
         return None
     usual = sum(steps) / len(steps)

@@ -18,12 +18,12 @@ HEAD_BYTES = 1 << 16
 
 
 def transfer_tag(files: tuple[Path, ...]) -> str | None:
-    """Name of the standard response stated in the first file; None where it states none.
+    """Name of the standard camera response stated in the first file; None if none is stated.
 
     Parameters
     ----------
     files : tuple of Path
-        A recording's files.
+        Files of the recording.
     """
     if not files:
         return None
@@ -68,7 +68,7 @@ def _chunks(head: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _of_jpeg(head: bytes) -> str | None:
-    """Read the colour space of the camera's Exif record: 1 is sRGB; None where a JPEG has no such record."""
+    """Colour space in a JPEG's Exif record, where 1 means sRGB; None without such a record."""
     start = head.find(EXIF_START)
     if start < 0:
         return None

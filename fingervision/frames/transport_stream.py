@@ -1,4 +1,4 @@
-"""Losses in an MPEG transport stream that it does not mark: incomplete pictures, and holes in a regular series."""
+"""Detect losses in an MPEG transport stream that it does not mark: incomplete pictures, gaps in a regular series."""
 
 import av
 
@@ -18,9 +18,10 @@ class TransportLosses:
     Parameters
     ----------
     container_format : str
-        FFmpeg's name.
+        FFmpeg's name of the container format.
     stream : av.VideoStream
-        The rate that it states is believed from the first two frames that keep it: a loss may come right at the start.
+        Video stream; its stated rate is used from the first two frames that agree with it, because a loss may come at
+        the very start.
     """
 
     def __init__(self, container_format: str, stream: av.VideoStream) -> None:
@@ -35,7 +36,7 @@ class TransportLosses:
         return self._is_even and packet.dts is not None and self._row.leaps(packet.dts)
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:
-        """Report to the damage trail, after a packet entered, if it is incomplete without being marked so."""
+        """Report the packet that last entered the decoder as damaged, if it is incomplete without being marked so."""
         # Pictures are cut out of the stream after its damage was marked: the mark may be one too early.
         if self._is_one and (packet.pts is None or self._was_corrupt):
             trail.breaks("It is incomplete.")

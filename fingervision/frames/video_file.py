@@ -35,7 +35,7 @@ RAW_CAMERA_FILES = {
     ".cine": "must be a Phantom camera's recording, but cannot be read as one (FFmpeg reads uncompressed 8- and 16-bit "
     "ones): export it from PCC as 16-bit TIFF images or uncompressed AVI, and measure those.",
 }
-"""What to do with high-speed cameras' own files that cannot be read."""
+"""Advice for files of high-speed cameras that cannot be read."""
 
 NO_CHECKSUM = (
     "Pictures of {codec} carry no checksum, and neither does this file: where its bytes were damaged on the way, a "
@@ -51,7 +51,7 @@ def _coding(properties: int) -> Coding:
 
 
 TAKES_THE_REST = True
-"""A file that no other kind of source knows is read as a video: FFmpeg tells what it is."""
+"""A file that no other kind of source accepts is read as a video: FFmpeg determines its format."""
 
 
 def accepts(name: str) -> bool:
@@ -68,7 +68,7 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
     DataError, InputFileError
         The file cannot be read, is not a video, or contains no picture.
     UsageError
-        A rate is given for what has its own times.
+        If a rate is given for a file with its own times.
     """
     if wish.rate_hz is not None:
         raise UsageError(f"--rate-hz is for images without times, but {name} is a video with its own: leave it out.")
@@ -77,12 +77,12 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
 
 @dataclass(frozen=True, slots=True)
 class VideoFile:
-    """A video file; every pass over it opens it anew.
+    """A video file; it is opened again for every pass over its frames.
 
     Parameters
     ----------
     name : str
-        Its path.
+        Path of the file.
     """
 
     name: str
@@ -190,12 +190,12 @@ def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream
 
 
 def _tracks(container: av.container.InputContainer) -> list[av.VideoStream]:
-    """Tracks that are videos; a cover picture, which is listed among them, is excluded."""
+    """Tracks that are videos; a cover picture, which is listed as a track too, is excluded."""
     return [one for one in container.streams.video if not one.disposition & Disposition.attached_pic]
 
 
 def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream) -> int:
-    """Angle by which the file asks to turn its pictures, anticlockwise; 0 where the first picture cannot be decoded."""
+    """Rotation that the file requests for its pictures, anticlockwise; 0 if the first picture cannot be decoded."""
     try:
         first = next(iter(container.decode(stream)), None)
     except (av.FFmpegError, OSError):
@@ -204,7 +204,7 @@ def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream
 
 
 def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
-    """Turn a picture by quarter turns as its file asks; other angles are ignored."""
+    """Rotate a picture by quarter turns as its file requests; other angles are ignored."""
     if rotation_deg % QUARTER_DEG or not rotation_deg:
         return pixels
     turned: Pixels = np.ascontiguousarray(np.rot90(pixels, rotation_deg // QUARTER_DEG))  # type: ignore[assignment]
@@ -212,7 +212,7 @@ def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
 
 
 def upright_steps(picture: av.VideoFrame) -> Quantiser | None:
-    """Quantiser steps of a picture, turned as the file asks."""
+    """Quantiser steps of a picture, rotated as the file requests."""
     steps = quantiser_steps(picture)
     if steps is None or picture.rotation % QUARTER_DEG:
         return steps

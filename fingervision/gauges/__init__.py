@@ -1,1 +1,1 @@
-"""User-defined gauges: named quantities that are measured in every frame; each kind is a file in `kinds`."""
+"""User-defined gauges: named quantities that are measured in every frame; each kind is a module in `kinds`."""

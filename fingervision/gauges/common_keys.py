@@ -1,4 +1,4 @@
-"""Keys that several kinds of gauges share, each with its limits and the reason for them."""
+"""Settings (TOML keys) that several kinds of gauges have in common, with their limits and the reasons for these."""
 
 from dataclasses import dataclass
 from math import radians
@@ -21,12 +21,12 @@ def middle(section: Section) -> tuple[float, float]:
 
 
 def reach(section: Section) -> float:
-    """Read `reach_px`: how far the object may move from one frame to the next; nothing similar may be within it."""
+    """Read `reach_px`: largest motion of the object between frames; nothing similar may be within this distance."""
     return section.number("reach_px", REACH_PX, low=1.0, high=LARGEST_REACH_PX)
 
 
 def length(section: Section, key: str = "length_px") -> float:
-    """Read `length_px`: the length of edge that is used, half of it to either side of the centre."""
+    """Read `length_px`: the length of edge that is fitted, half of it on either side of the centre."""
     return section.number(key, low=SHORTEST_EDGE_PX, high=LONGEST_PX)
 
 
@@ -43,18 +43,19 @@ def polarity(section: Section) -> int:
 
 @dataclass(frozen=True, slots=True)
 class EdgeKeys:
-    """Settings of a gauge that follows one straight edge.
+    """Settings of a gauge that tracks one straight edge.
 
     Parameters
     ----------
     middle_px : (float, float)
-        Its centre in the first frame.
+        Centre of the gauge in the first frame.
     direction_rad : float
-        Its direction, from the x axis clockwise on the screen: across the edge, or along it, as the kind says.
+        Direction of the gauge, from the x axis clockwise on the screen: across the edge, or along it, depending on the
+        kind.
     length_px, reach_px : float
-        How much of the edge is used, and how far it may move from frame to frame.
+        Length of edge that is fitted, and largest motion between frames.
     polarity : int
-        +1 rising, -1 falling, 0 any.
+        +1 for a rising edge (lighter along the direction), -1 for a falling one, 0 for any.
     """
 
     middle_px: tuple[float, float]
@@ -65,5 +66,5 @@ class EdgeKeys:
 
 
 def edge_keys(section: Section, direction: str) -> tuple[tuple[float, float], float, float, float, int]:
-    """Read the values of `EdgeKeys`, in its order; `direction` is the key of the direction."""
+    """Read the values of `EdgeKeys`, in the order of its attributes; `direction` is the key of the direction."""
     return middle(section), angle(section, direction), length(section), reach(section), polarity(section)

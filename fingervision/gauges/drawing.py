@@ -1,4 +1,4 @@
-"""Gauges drawn into a picture: the searched zone, the result, and the name of each."""
+"""Draw gauges into a picture: searched zone, result, and name of each."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ def draw_gauges(canvas: Canvas, gauges: Sequence[Gauge], readings: Sequence[Read
     canvas : ndarray of uint8, shape (height, width, 3)
         Red, green and blue.
     gauges, readings : sequences of Gauge and Reading
-        One reading a gauge.
+        Gauges and their readings, one reading per gauge.
     """
     size = max(0.6, min(canvas.shape[:2]) / USUAL_HEIGHT_PX)
     for gauge, reading in zip(gauges, readings, strict=True):
@@ -54,7 +54,7 @@ def _cross(canvas: Canvas, point: tuple[float, float], colour: tuple[int, int, i
 
 
 def _name(canvas: Canvas, gauge: Gauge, reading: Reading, colour: tuple[int, int, int], size: float) -> None:
-    """Draw the name, and the status where there is no number, beside the gauge; legible on any background."""
+    """Draw the name of a gauge beside it, and the status if there is no value; legible on any background."""
     places = reading.zone.points_px if reading.zone is not None else (gauge.spec.middle_px,)
     words = gauge.name if reading.status is GaugeStatus.OK else f"{gauge.name}: {reading.status.value}"
     words = words.encode("ascii", "replace").decode()

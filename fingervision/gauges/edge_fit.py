@@ -1,4 +1,4 @@
-"""Fit of the edges near where a gauge looks for its own, and the reasons to refuse what was fitted."""
+"""Fit the edges near the expected position of a gauge's edge, with reasons to refuse the result."""
 
 from dataclasses import replace
 from math import cos, hypot, sin
@@ -54,18 +54,18 @@ def fit_near(
     Parameters
     ----------
     follower : EdgeFollower
-        Its axes, length, and what it knows of the edge.
+        Tracker of the edge, with its axes, its length and the results of earlier frames.
     picture : Picture
         The frame.
     chosen : list of StepCandidate
-        One step, or the two of a pair; positions from the follower's `at_px`.
+        One candidate, or the two of a pair; positions are relative to the tracker's `at_px`.
     steps : list of StepCandidate
-        All that were seen, the chosen ones among them.
+        All candidates seen, including the chosen ones.
 
     Returns
     -------
     (list of EdgeFound, float), or NotFound
-        In the order of `chosen`; and the covariance of the first two positions (0 of one).
+        The fitted edges in the order of `chosen`, and the covariance of the first two positions (0 for one edge).
     """
     blur = follower.known.blur_px if follower.known is not None else 1.2
     reach = reach_px(blur)
@@ -180,7 +180,7 @@ def _edge(follower: "EdgeFollower", picture: Picture, fitted: StraightEdges, k: 
 
 
 def _cut_plateau(picture: Picture, levels: Floats) -> int:
-    """Whether one side may be lighter (+1) or darker (-1) than the scale reaches, because much of it is clipped."""
+    """Whether much of one side is clipped, so that it may be lighter (+1) or darker (-1) than the scale; 0 if not."""
     middle = 0.5 * (float(levels.min()) + float(levels.max()))
     light = levels > middle
     if np.count_nonzero(levels >= picture.top) > MOST_CLIPPED * np.count_nonzero(light):

@@ -1,4 +1,4 @@
-"""Follow one straight edge from frame to frame, together with other edges beside it."""
+"""Track one straight edge from frame to frame, taking account of other edges beside it."""
 
 from dataclasses import replace
 from math import ceil, cos, sin
@@ -33,11 +33,11 @@ class EdgeFollower:
     Parameters
     ----------
     axes : Axes
-        The gauge's.
+        Axes of the gauge.
     at_px : float
-        Where the edge is thought to lie on t in the first frame.
+        Expected position of the edge on the axis t in the first frame.
     length_px, reach_px : float
-        As the gauge's keys say.
+        Settings of the gauge.
     polarity : int
         +1, -1 or 0 for any.
     """
@@ -55,7 +55,7 @@ class EdgeFollower:
         return self.axes.box(self.at_px, self.reach_px * self.times, 0.5 * self.length_px)
 
     def turned_to(self, axes: Axes, at_px: float, slope: float) -> None:
-        """Continue with other axes."""
+        """Continue the tracking with other axes, in which the edge has the given position and slope."""
         self.axes, self.at_px, self.slope = axes, at_px, slope
 
     def lost(self) -> None:
@@ -63,7 +63,7 @@ class EdgeFollower:
         self.times = min(self.times + 1.0, float(MOST_TIMES)) if self.known is not None else 1.0
 
     def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
-        """The only step that may be the edge, with the other steps beside it."""
+        """The only candidate that may be the edge, together with the other candidates beside it."""
         reach = self.first_reach_px if self.known is None else self.reach_px * self.times
         guard = reach if self.known is None else GUARD * reach
         half = ceil(guard) + BEYOND_PX
@@ -112,7 +112,7 @@ class EdgeFollower:
         return [s for s in steps if abs(s.position_px) <= reach and (sign == 0 or s.contrast * sign > 0.0)]
 
     def _steepest(self, seen: Profile, reach: float) -> float:
-        """Largest step from strip to strip within reach, with the gauge's polarity."""
+        """Largest step between neighbouring strips within reach, with the gauge's polarity."""
         rise = np.where((seen.weight[1:] > 0.5) & (seen.weight[:-1] > 0.5), np.diff(seen.level), 0.0)
         rise = self.polarity * rise if self.polarity else np.abs(rise)
         near = np.abs(np.arange(rise.size) + 0.5 - seen.half) <= reach + 1.0

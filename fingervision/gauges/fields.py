@@ -1,4 +1,4 @@
-"""The keys that a kind of gauge reads, found by letting it read a table that records every request."""
+"""Settings that a kind of gauge reads, found by letting it read a table that records every request."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -14,18 +14,18 @@ USUAL_PX = 40.0
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One key of a kind of gauge.
+    """One setting of a kind of gauge.
 
     Parameters
     ----------
     key : str
-        Its name in the file.
+        Name of the setting in the file.
     default : float, str or None
-        What holds where it is left out; None where it must be stated.
+        Value if the setting is left out; None if it must be stated.
     low, high : float or None
-        Limits of a number; None where there is none.
+        Limits of a number; None for no limit.
     choices : tuple of str
-        Words that it may be; empty for a number.
+        Permitted words; empty for a number.
     """
 
     key: str
@@ -36,7 +36,7 @@ class Field:
 
     @property
     def usual(self) -> float | str:
-        """Value with which a new gauge begins."""
+        """Initial value for a new gauge."""
         if self.default is not None:
             return self.default
         if self.choices:
@@ -68,7 +68,7 @@ class _Noting(Section):
 
 @cache
 def fields_of(kind_name: str) -> tuple[Field, ...]:
-    """The keys of a kind of gauge, in its order, with defaults, limits and descriptions."""
+    """Settings of a kind of gauge, in their order, with defaults, limits and descriptions."""
     kind = kind_named(kind_name)
     noting = _Noting(Path(), "", "", {})
     kind.read(noting)

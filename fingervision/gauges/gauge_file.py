@@ -1,4 +1,4 @@
-"""The file gauges.toml: the gauges of one picture.
+"""Read the file gauges.toml: the gauges of one picture.
 
 schema = 1
 [[gauge]]
@@ -34,11 +34,11 @@ class Gauge:
     Parameters
     ----------
     name : str
-        As the user called it.
+        Name given by the user.
     kind_name : str
         Name of its kind.
     spec : Spec
-        What its keys say.
+        Settings of the gauge.
     """
 
     name: str
@@ -47,12 +47,12 @@ class Gauge:
 
     @property
     def kind(self) -> Kind:
-        """Its kind's module."""
+        """Module of the gauge's kind."""
         return kind_named(self.kind_name)
 
     @property
     def quantities(self) -> tuple[tuple[str, str], ...]:
-        """Names of the gauge's quantities, and whether each is a length or an angle."""
+        """Name of each of the gauge's quantities, and whether it is a length or an angle."""
         return self.kind.QUANTITIES
 
 
@@ -62,7 +62,7 @@ def read_gauges(path: Path) -> tuple[Gauge, ...]:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or a value in it cannot be meant; the sentence names the line.
+        If the file cannot be read, or a value in it is not allowed; the sentence names the line.
     """
     return gauges_in(path, *read_document(path, "gauge file"))
 
@@ -73,16 +73,16 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
     Parameters
     ----------
     path : Path
-        The file, for the sentences.
+        Path of the file, for error messages.
     values : mapping
-        Its tables.
+        Parsed tables of the file.
     text : str
-        Its text.
+        Text of the file.
 
     Raises
     ------
     DataError
-        A value in it cannot be meant; the sentence names the line.
+        If a value is not allowed; the sentence names the line.
     """
     top = Section(path, text, "", values)
     top.only(("schema", "gauge"))
@@ -105,14 +105,14 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
     Parameters
     ----------
     section : Section
-        Its table.
+        Table of the gauge.
     others : collection of str
-        Names that are taken.
+        Names that are already in use.
 
     Raises
     ------
     DataError
-        A value in it cannot be meant.
+        If a value is not allowed.
     """
     name = section.word("name")
     if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():

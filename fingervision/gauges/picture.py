@@ -1,4 +1,4 @@
-"""A frame as gauges use it: levels converted to light where they are needed."""
+"""A frame in the form that gauges use: levels are converted to light where needed."""
 
 from dataclasses import dataclass
 
@@ -21,20 +21,20 @@ EDGE_SHARED_PIXELS = SHARED_PIXELS | {Coding.INTERFRAME: 36.0}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """One frame as gauges use it.
+    """One frame in the form that gauges use.
 
     Parameters
     ----------
     frame : Frame
         The frame itself.
     grey : ndarray, shape (height, width)
-        Its grey levels.
+        Grey levels of the frame.
     light : ndarray of float, shape (levels,), or None
-        Light of every level; None where it is the level itself.
+        Light for every level (look-up table); None if the levels are proportional to light.
     top : float
-        End of the scale.
+        Highest level of the scale.
     settings : Settings
-        How the recording is measured.
+        Settings of the measurement.
     """
 
     frame: Frame
@@ -55,12 +55,12 @@ class Picture:
 
     @property
     def shared_pixels(self) -> float:
-        """Number of pixels that count as one, from what is known of the codec's shared errors."""
+        """Number of neighbouring pixels with a common codec error, which count as one pixel."""
         return SHARED_PIXELS[self.frame.coding]
 
     @property
     def edge_shared_pixels(self) -> float:
-        """The same for edges: 1 where the quantiser is known, because `displaced_px` then states the shared error."""
+        """Number of pixels with a common error for edge fits; 1 if `displaced_px` already accounts for the codec."""
         return EDGE_SHARED_PIXELS[self.frame.coding] if self.frame.quantiser is None else 1.0
 
     def displaced_px(
@@ -73,9 +73,9 @@ class Picture:
         place_px : (float, float)
             Middle of the edge.
         half_px : (float, float)
-            The pixels that carry it reach so far to the sides, and up and down.
+            Half width and half height of the area of pixels that determine the edge.
         inside, contrast : float
-            Light on one side of it, and how much more there is on the other.
+            Light on one side of the edge, and light on the other side minus this.
         """
         quantiser = self.frame.quantiser
         if quantiser is None:
@@ -87,7 +87,7 @@ class Picture:
         return displaced_px(quantiser.near(*place_px, *half_px), (levels[1] - levels[0]) * EIGHT_BITS / self.top)
 
     def part(self, x_px: int, y_px: int, width_px: int, height_px: int) -> tuple[Floats, tuple[int, int]]:
-        """Light in a rectangle cut to the picture, with the first column and row of the cut rectangle."""
+        """Light in a rectangle clipped to the picture, with the first column and row of the clipped rectangle."""
         width, height = self.size_px
         left, top = min(max(x_px, 0), width), min(max(y_px, 0), height)
         right, bottom = min(max(x_px + width_px, left), width), min(max(y_px + height_px, top), height)

@@ -24,7 +24,7 @@ class PlaneScale:
     Parameters
     ----------
     scale : Scale
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
     frame_size_px : (int, int)
         Width and height.
     """
@@ -45,7 +45,7 @@ class PlaneScale:
 
     @property
     def middle_px(self) -> tuple[float, float]:
-        """The picture's middle."""
+        """Centre of the picture."""
         return 0.5 * (self.frame_size_px[0] - 1), 0.5 * (self.frame_size_px[1] - 1)
 
     def flatten(self, points_px: Floats) -> Floats:
@@ -53,7 +53,7 @@ class PlaneScale:
         return self.scale.flatten(points_px) if isinstance(self.scale, Calibration) else points_px
 
     def relative_u(self, point_px: tuple[float, float], direction_rad: float) -> float:
-        """Relative standard uncertainty, common to all frames, of a length at a point; 0 where it is unknown.
+        """Relative standard uncertainty of a length at a point, common to all frames; 0 if it is unknown.
 
         It includes scale, plane, tilt, lens and temperature, but not the bias and phase error of edges.
         """
@@ -77,19 +77,19 @@ class PlaneScale:
         return sqrt(variance / length_mm**2 + of_scale)
 
     def u_edge_px(self, u_response_px: float) -> float:
-        """Uncertainty of one edge common to all frames: half of the edge bias, phase, camera response (pixels)."""
+        """Standard uncertainty (px) of one edge, common to all frames: half of the bias', phase, camera response."""
         if not isinstance(self.scale, Calibration):
             return 0.0
         return hypot(0.5 * self.scale.u_edge_bias_px, self.u_phase_px, u_response_px)
 
     @property
     def u_phase_px(self) -> float:
-        """Uncertainty of an edge or registered patch from the sub-pixel phase (`estimator_px` of the calibration)."""
+        """Standard uncertainty of an edge or registered patch due to the sub-pixel phase (`estimator_px`)."""
         return rectangular(self.scale.limits.estimator_px) if isinstance(self.scale, Calibration) else 0.0
 
     @property
     def u_angle_rad(self) -> float:
-        """Uncertainty of an angle from tilt and lens (rad): half of the distortion of one axis against the other."""
+        """Standard uncertainty of an angle due to tilt and lens (rad): half of the relative distortion of the axes."""
         if not isinstance(self.scale, Calibration):
             return 0.0
         limits = self.scale.limits

@@ -1,8 +1,8 @@
-"""Quantities that a gauge can measure: a number in pixels with its uncertainty, and the points that define it.
+"""Quantities that a gauge can measure: a value in pixels with its uncertainty, and the points that define it.
 
-The measured points are corrected for lens and perspective; the picture is never resampled. In millimetres `u` includes
-the whole uncertainty budget of a calibration. With a bare scale, which has no uncertainty, it is the fit's own part
-only, as in pixels.
+The measured points are corrected for lens and perspective; the picture is never resampled. In millimetres, `u` includes
+the whole uncertainty budget of a calibration. With a bare scale, which has no stated uncertainty, `u` is the
+uncertainty of the fit only, as in pixels.
 """
 
 from dataclasses import dataclass
@@ -45,21 +45,21 @@ class Quantity(Protocol):
 class Position:
     """Position of a point or an edge along a direction.
 
-    In pixels it is counted from the centre of the picture's first pixel; in millimetres from the picture's centre, as
-    `left_mm` in gaps.csv.
+    In pixels the position is measured from the centre of the picture's first pixel; in millimetres from the picture's
+    centre, like `left_mm` in gaps.csv.
 
     Parameters
     ----------
     point_px : (float, float)
-        The point, or the edge's point on the gauge's line.
+        The point, or the point at which the edge crosses the gauge's axis.
     direction_rad : float
-        0 to the right, pi / 2 downwards.
+        Direction of the position: 0 to the right, pi / 2 downwards.
     u_px : float
         Standard uncertainty along the direction, from the fit.
     dark_side : int
-        For an edge: +1 where it is dark beyond it, -1 where it is light; 0 for what is no edge.
+        For an edge: +1 if the side beyond the edge (along the direction) is dark, -1 if it is light; 0 for a point.
     u_response_px : float
-        What an unknown camera response leaves open of an edge.
+        Standard uncertainty of an edge's position due to an unknown camera response.
     """
 
     point_px: Point
@@ -74,12 +74,12 @@ class Position:
         return (self.point_px,)
 
     def in_pixels(self) -> Cell:
-        """Along the direction."""
+        """Position along the direction, in pixels."""
         x, y = self.point_px
         return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """Millimetres from the picture's centre; half of the edge bias is added where the edge has a dark side."""
+        """Position in millimetres from the picture's centre; for an edge, corrected by half of the edge bias."""
         ((x, y),) = flat
         x, y = x - scale.middle_px[0], y - scale.middle_px[1]
         away_px = x * cos(self.direction_rad) + y * sin(self.direction_rad)
@@ -96,14 +96,14 @@ class Distance:
     Parameters
     ----------
     first_px, second_px : (float, float)
-        The points.
+        The two points.
     u_px : float
         Standard uncertainty of the distance, from the fit.
     polarity : int
-        +1 where it is light between the edges and dark beyond, -1 where it is dark between; 0 where both edges have
-        the same sense, so that their biases cancel.
+        +1 if it is light between the edges and dark beyond, -1 if it is dark between; 0 if both edges have the same
+        polarity, so that their biases cancel.
     u_response_px : float
-        What an unknown camera response leaves open of each edge.
+        Standard uncertainty of each edge's position due to an unknown camera response.
     """
 
     first_px: Point
@@ -118,12 +118,12 @@ class Distance:
         return (self.first_px, self.second_px)
 
     def in_pixels(self) -> Cell:
-        """Between the points."""
+        """Distance between the points, in pixels."""
         (x, y), (to_x, to_y) = self.points_px
         return Cell(hypot(to_x - x, to_y - y), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """`(distance_px + p b) / s`, corrected for the edge bias as a gap is."""
+        """Distance in millimetres, `(distance_px + p b) / s`, corrected for the edge bias like a gap."""
         (x, y), (to_x, to_y) = flat
         apart_px = hypot(to_x - x, to_y - y)
         direction = atan2(to_y - y, to_x - x)
@@ -141,9 +141,9 @@ class Shift:
     Parameters
     ----------
     from_px, to_px : (float, float)
-        The point then and now.
+        The point in the first frame, and now.
     direction_rad : float
-        0 to the right, pi / 2 downwards.
+        Direction of the displacement: 0 to the right, pi / 2 downwards.
     u_px : float
         Standard uncertainty of the shift, from the registration.
     """
@@ -155,16 +155,16 @@ class Shift:
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """Then and now."""
+        """The point in the first frame, and now."""
         return (self.from_px, self.to_px)
 
     def in_pixels(self) -> Cell:
-        """Along the direction."""
+        """Displacement along the direction, in pixels."""
         x, y = self.to_px[0] - self.from_px[0], self.to_px[1] - self.from_px[1]
         return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """Millimetres; a bias common to both pictures cancels, the phase error of a registration does not."""
+        """Displacement in millimetres; a bias common to both pictures cancels, the phase error does not."""
         (x, y), (to_x, to_y) = flat
         moved_px = (to_x - x) * cos(self.direction_rad) + (to_y - y) * sin(self.direction_rad)
         shared_px = scale.relative_u(self.from_px, self.direction_rad) * moved_px
@@ -180,13 +180,13 @@ class Angle:
     Parameters
     ----------
     point_px : (float, float)
-        Its middle.
+        Middle of the line or object.
     angle_rad : float
         From the x axis towards the y axis, clockwise on the screen.
     u_rad : float
         Standard uncertainty from the fit.
     is_turn : bool
-        Whether it is counted from the first frame: a turn has no direction of its own.
+        Whether the angle is a rotation since the first frame, rather than a direction.
     """
 
     point_px: Point
@@ -200,7 +200,7 @@ class Angle:
         return (*_ends(self.point_px, self.angle_rad), *(_ends(self.point_px, 0.0) if self.is_turn else ()))
 
     def in_pixels(self) -> Cell:
-        """In the picture."""
+        """Angle in the picture."""
         return Cell(1e3 * self.angle_rad, 1e3 * self.u_rad, "mrad")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
@@ -223,12 +223,12 @@ def _between(first: Point, second: Point) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """A quantity that is already computed, in pixels and in millimetres.
+    """A quantity that is already computed in pixels and in millimetres.
 
     Parameters
     ----------
     pixels, millimetres : Cell
-        The number in the picture and on the plane.
+        The value in the picture and in the object plane.
     """
 
     pixels: Cell
@@ -236,13 +236,13 @@ class Ready:
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """None are needed."""
+        """No points, because the values are already computed."""
         return ()
 
     def in_pixels(self) -> Cell:
-        """In the picture."""
+        """Value in the picture."""
         return self.pixels
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """On the plane."""
+        """Value in the object plane."""
         return self.millimetres

@@ -10,12 +10,12 @@ from fingervision.gauges.status import GaugeStatus
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A shape to draw: a polyline of two or more points, or a cross at one point.
+    """A shape to be drawn: a polyline of two or more points, or a cross at one point.
 
     Parameters
     ----------
     points_px : tuple of (float, float)
-        In the picture's pixels.
+        Points of the shape, in the picture's pixels.
     """
 
     points_px: tuple[tuple[float, float], ...]
@@ -28,15 +28,15 @@ class Reading:
     Parameters
     ----------
     status : GaugeStatus
-        Whether there are numbers.
+        Whether there are values, or why not.
     quantities : tuple of Quantity
-        The numbers, in the order of the kind's names; empty where there are none.
+        Values in the order of the kind's names; empty if there are none.
     marks : tuple of Mark
-        What was found, to be drawn.
+        Shapes that show the result in the picture.
     zone : Mark
-        Where it was looked for, to be drawn.
+        Shape of the searched zone in the picture.
     words : str
-        Why there is no number, where more is known than the status says.
+        Reason why there is no value, if more is known than the status says.
     """
 
     status: GaugeStatus
@@ -47,16 +47,16 @@ class Reading:
 
 
 def unread(frame: object, status: Status, gauges: int) -> list[Reading]:
-    """Readings of all gauges in a frame whose picture is lost, or not believed: no number, with the frame's reason.
+    """Readings of all gauges in a frame whose picture is lost or rejected: no values, with the frame's reason.
 
     Parameters
     ----------
     frame : Frame or LostFrame
-        What came; a lost frame states its reason in words.
+        The frame; a lost frame states its reason.
     status : Status
-        Of the frame.
+        Status of the frame.
     gauges : int
-        How many gauges there are.
+        Number of gauges.
     """
     words = frame.words if isinstance(frame, LostFrame) else ""
     return [Reading(GaugeStatus(status.value), words=words)] * gauges

@@ -30,16 +30,16 @@ FRAMES_AT_ONCE = 64
 
 @dataclass(slots=True)
 class Tally:
-    """Summary of one gauge, kept until the end of the recording.
+    """Summary of one gauge over the frames of a recording.
 
     Parameters
     ----------
     counts : Counter of str
-        Frames with each status.
+        Number of frames with each status.
     words : dict of str to str
-        The first frame's sentence of each status, where there is one.
+        Sentence of the first frame with each status, if it has one.
     least, most : dict of str to float
-        Range of each quantity.
+        Smallest and largest value of each quantity.
     """
 
     counts: Counter[str] = field(default_factory=Counter)
@@ -54,20 +54,20 @@ class GaugeRecording:
     Parameters
     ----------
     gauges : tuple of Gauge
-        As read from the file.
+        Gauges read from the file.
     scale : Scale or None
-        From pixels to millimetres; without one everything stays in pixels.
+        Conversion from pixels to millimetres; without one all values stay in pixels.
     frame_size_px : (int, int)
         Width and height of the frames.
     settings : Settings
-        How the recording is measured.
+        Settings of the measurement.
     path : Path or GaugeRows
-        gauges.csv, or a list in memory that takes its rows.
+        Path of gauges.csv, or a list in memory that receives its rows.
 
     Raises
     ------
     FingervisionError
-        A gauge lies outside of the frames, or the table cannot be written.
+        If a gauge lies outside the frames, or the table cannot be written.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class GaugeRecording:
 
     @property
     def has_numbers(self) -> bool:
-        """Whether any gauge has given a number in any frame so far."""
+        """Whether any gauge has given a value in any frame so far."""
         pending = any(reading.quantities for _, _, readings in self._pending for reading in readings)
         return pending or any(tally.counts[GaugeStatus.OK.value] for tally in self.tallies.values())
 
@@ -104,14 +104,14 @@ class GaugeRecording:
         Parameters
         ----------
         frame : Frame or LostFrame
-            As it came.
+            The next frame.
         outcome : object
-            What was measured in it; where that is a `LostFrame` its picture is not believed here either.
+            Result of the gap measurement in this frame; if it is a `LostFrame`, the gauges reject the picture too.
 
         Returns
         -------
         sequence of Reading
-            In the order of the gauges.
+            Readings in the order of the gauges.
         """
         lost = outcome if isinstance(outcome, LostFrame) else frame
         readings: Sequence[Reading]
@@ -126,7 +126,7 @@ class GaugeRecording:
         return readings
 
     def draw(self, canvas: NDArray[np.uint8]) -> None:
-        """Draw the newest frame's gauges into its picture (red, green and blue), in place."""
+        """Draw the gauges' readings of the newest frame into its picture (red, green and blue), in place."""
         draw_gauges(canvas, self._gauges, self._newest)
 
     def steps(self, frame: Frame) -> list[tuple[str, Pixels]]:
@@ -184,7 +184,7 @@ class GaugeRecording:
 
 
 def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:
-    """Quantities in millimetres, or in pixels where there is no scale."""
+    """Values of the quantities in millimetres, or in pixels without a scale."""
     if plane is None:
         return [quantity.in_pixels() for quantity in quantities]
     points = [quantity.points_px for quantity in quantities]
@@ -199,7 +199,7 @@ def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:
 
 
 def gauge_sentence(name: str, gauge: Mapping[str, Any]) -> str:
-    """Summary of one gauge of summary.json in a sentence."""
+    """Sentence about one gauge, from its entry in summary.json."""
     frames = sum(gauge["counts"].values())
     ranges = [
         f"{quantity} {found['least']:.4f} to {found['greatest']:.4f} {found['unit']}"

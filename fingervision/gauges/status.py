@@ -1,4 +1,4 @@
-"""Status of a gauge in a frame: it has a number, or a reason why it has none."""
+"""Status of a gauge in a frame: it has a value, or a reason why it has none."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ from fingervision.domain.status import Status
 
 
 class GaugeStatus(StrEnum):
-    """The status of one gauge in one frame; statuses that gaps.csv has mean the same here."""
+    """The status of one gauge in one frame; statuses that also occur in gaps.csv have the same meaning here."""
 
     OK = Status.OK.value
     DAMAGED = Status.DAMAGED.value

@@ -1,4 +1,4 @@
-"""One straight edge as gauges see it: its own axes, what was found of it, and the limits within which it counts."""
+"""One straight edge as measured by gauges: its axes, its fitted parameters, and the limits for accepting it."""
 
 from dataclasses import dataclass
 from math import atan, cos, pi, sin
@@ -49,17 +49,17 @@ class EdgeFound:
     Parameters
     ----------
     position_px : float
-        Along the gauge's direction, from the gauge's middle.
+        Position along the gauge's direction, from the gauge's middle.
     slope : float
-        Change of that with the distance along the edge.
+        Change of the position per distance along the edge.
     u_position_px, u_slope, covariance_px : float
-        Standard uncertainties and their covariance.
+        Standard uncertainties of position and slope, and their covariance.
     contrast, inside : float
-        Level beyond less level before it; level before it.
+        Level beyond the edge minus level before it; level before it.
     blur_px : float
         Gaussian sigma of the optics.
     u_response_px : float
-        What an unknown camera response leaves open.
+        Standard uncertainty of the position due to an unknown camera response.
     """
 
     position_px: float
@@ -74,7 +74,7 @@ class EdgeFound:
 
     @property
     def dark_side(self) -> int:
-        """+1 where the dark side lies beyond the edge, -1 where it lies before it."""
+        """+1 if the dark side lies beyond the edge (along the direction), -1 if it lies before it."""
         return -1 if self.contrast > 0.0 else 1
 
 
@@ -88,14 +88,14 @@ class NotFound:
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """A gauge's own axes in the picture: t along its direction, s turned by 90 degrees.
+    """The gauge's own axes in the picture: t along its direction, s turned by 90 degrees from t.
 
     Parameters
     ----------
     x_px, y_px : float
-        Where both are zero.
+        Origin, where t and s are zero.
     direction_rad : float
-        Of t.
+        Direction of the axis t.
     """
 
     x_px: float
@@ -103,16 +103,16 @@ class Axes:
     direction_rad: float
 
     def point(self, t_px: float, s_px: float = 0.0) -> tuple[float, float]:
-        """Picture coordinates of a point given in the gauge's axes."""
+        """Picture coordinates of a point given by its coordinates t and s."""
         cosine, sine = cos(self.direction_rad), sin(self.direction_rad)
         return self.x_px + cosine * t_px - sine * s_px, self.y_px + sine * t_px + cosine * s_px
 
     def box(self, t_px: float, half_t_px: float, half_s_px: float) -> Mark:
-        """A rectangle about a position on t, for drawing."""
+        """A rectangle around a position on the axis t, for drawing."""
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
         return Mark(tuple(self.point(t_px + a * half_t_px, b * half_s_px) for a, b in signs))
 
 
 def normal_of(axes: Axes, slope: float) -> float:
-    """Direction across an edge whose slope in the axes is `slope` (radians)."""
+    """Direction perpendicular to an edge whose slope in the axes is `slope` (radians)."""
     return (axes.direction_rad - atan(slope) + pi) % (2.0 * pi) - pi

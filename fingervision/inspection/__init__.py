@@ -1,1 +1,1 @@
-"""What limits the measurement with this set-up: one finding per file, with its cost in micrometres and its remedy."""
+"""Limits of a measurement with the present set-up: one finding per module, with its cost in µm and its remedy."""

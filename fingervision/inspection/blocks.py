@@ -1,4 +1,4 @@
-"""Block artefacts of a codec: steps of level at the borders of blocks."""
+"""Block artefacts of a codec: steps of the grey level at the borders of blocks."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ def blockiness(pixels: Pixels) -> float:
     Parameters
     ----------
     pixels : ndarray, shape (height, width) or (height, width, 3)
-        The picture; of colours the green.
+        The picture; of a colour picture the green channel is used.
     """
     grey = pixels if pixels.ndim == 2 else pixels[..., 1]
     ratios = []

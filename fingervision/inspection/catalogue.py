@@ -1,4 +1,4 @@
-"""All findings: the modules of the package `findings`, collected automatically."""
+"""All findings, from the modules of the package `findings`, which are collected automatically."""
 
 import importlib
 import pkgutil
@@ -9,12 +9,12 @@ from fingervision.inspection.sample import Sample
 
 
 def inspect(sample: Sample) -> list[Finding]:
-    """All findings of a sample, the most severe first.
+    """Compute all findings of a sample, the most severe first.
 
     Parameters
     ----------
     sample : Sample
-        Frames, measured.
+        Measured frames.
     """
     package = fingervision.inspection.findings
     names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
@@ -23,7 +23,7 @@ def inspect(sample: Sample) -> list[Finding]:
 
 
 def to_mend(findings: list[Finding]) -> list[Finding]:
-    """Findings that are significant and worth correcting, the largest cost first."""
+    """Findings that are certain and worth correcting, the largest cost first."""
     return [finding for finding in findings if finding.severity is not Severity.GOOD and not finding.is_doubt]
 
 

@@ -1,4 +1,4 @@
-"""Finding about one limit of a set-up."""
+"""Finding: one property of a set-up that limits the measurement."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -21,7 +21,7 @@ MOSTLY_REFUSED = 0.5
 
 
 class Severity(StrEnum):
-    """A traffic light."""
+    """Severity of a finding, as a traffic light."""
 
     GOOD = "good"
     FAIR = "fair"
@@ -30,29 +30,30 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One limit of a measurement.
+    """One property of a set-up that limits the measurement.
 
     Parameters
     ----------
     name : str
-        Which limit.
+        Name of the limit.
     severity : Severity
-        Traffic light: green, amber, red.
+        Severity: green, amber or red.
     figure : str
-        What was seen, with numbers, in a sentence.
+        Sentence with the observed numbers.
     cost_px : float or None
-        What it costs: the standard uncertainty (or the error, where it has one) that the gap would lose if this alone
-        were mended. None where it keeps frames from being measured at all.
+        Cost: the standard uncertainty of the gap (or the error, if the limit causes one) that would be removed if only
+        this limit were corrected. None if the limit prevents frames from being measured.
     cost_um : float or None
-        The same in micrometres; None also without a scale.
+        Cost in micrometres; None without a scale, or if `cost_px` is None.
     remedy : str
-        What to change, in a sentence; empty where there is nothing to mend.
+        Sentence that says what to change; empty if nothing needs to be corrected.
     formula : str
-        Where the cost comes from.
+        Formula or source of the cost.
     share_refused : float
-        Share of the frames that it keeps from being measured.
+        Share of the frames that the limit prevents from being measured.
     is_doubt : bool
-        Whether it may be there or not: better pictures would settle it, so what spoils them goes first.
+        Whether the finding is uncertain: better pictures would decide it, so that the causes of bad pictures must be
+        corrected first.
     """
 
     name: str
@@ -67,14 +68,14 @@ class Finding:
 
     @property
     def rank(self) -> tuple[float, bool, float]:
-        """Sort key, larger is worse: missing numbers first, then certain findings, then doubts, each by cost."""
+        """Sort key, larger is worse: unmeasured frames, then certain findings, then uncertain ones, each by cost."""
         sure = self.severity is not Severity.GOOD and not self.is_doubt
         first = self.share_refused if self.share_refused > MOSTLY_REFUSED else 0.0
         return first, sure, self.cost_px or 0.0
 
 
 def severity_of(cost_px: float, good_px: float) -> Severity:
-    """Severity (traffic light) of a cost in pixels; costs below `good_px` are not worth correcting."""
+    """Severity of a cost in pixels; costs below `good_px` are not worth correcting."""
     if cost_px <= good_px:
         return Severity.GOOD
     return Severity.FAIR if cost_px <= POOR_TIMES * good_px else Severity.POOR
@@ -90,7 +91,7 @@ def weighed(
     *,
     is_doubt: bool = False,
 ) -> Finding:
-    """Make the finding of a cost in pixels: its severity, and its micrometres where the scale is known."""
+    """Make a finding from a cost in pixels: add its severity, and the cost in micrometres if the scale is known."""
     severity = severity_of(cost_px, sample.good_px)
     cost_um = None if sample.scale is None else 1e3 * cost_px / sample.scale.px_per_mm
     remedy = "" if severity is Severity.GOOD else remedy
@@ -98,7 +99,7 @@ def weighed(
 
 
 def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy: str) -> Finding | None:
-    """Finding of frames that have no number for one of these reasons; None where they are too few."""
+    """Finding for frames that were not measured for one of these reasons; None if they are too few."""
     count = sum(sample.counts[status] for status in statuses)
     if not count or count < FEW_REFUSED * sample.frames:
         return None
@@ -109,5 +110,5 @@ def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy
 
 
 def without(u_px: float, mended_px: float) -> float:
-    """Part of the standard uncertainty that is removed if `u_px` becomes `mended_px`: the quadratic difference."""
+    """Part of the standard uncertainty that is removed if `u_px` becomes `mended_px` (quadratic difference)."""
     return sqrt(max(u_px**2 - mended_px**2, 0.0))

@@ -1,4 +1,4 @@
-"""The mean profile of light across both inner flanks, over all frames and their many sub-pixel phases."""
+"""Mean profile of light across each inner flank, from all frames with their different sub-pixel phases."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ class FlankProfile:
     Parameters
     ----------
     away_px : ndarray of float
-        Outwards from the fitted edge, across it.
+        Distance outwards from the fitted edge, perpendicular to it.
     level : ndarray of float
-        Mean light there, on the levels' own scale.
+        Mean light at this distance, on the scale of the levels.
     u_level : ndarray of float
-        Its standard uncertainty from the scatter within the bin.
+        Standard uncertainty of the mean, from the scatter within the bin.
     pixel_px : float
-        Width of a pixel across the edge.
+        Width of a pixel, measured across the edge.
     """
 
     away_px: Floats
@@ -43,16 +43,16 @@ class FlankProfile:
 
 
 def flank_profile(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, light: Floats) -> FlankProfile | None:
-    """Mean profile of the left (0) or right (1) inner flank; None where it is too short, bent, or out of view.
+    """Mean profile of the left (0) or right (1) inner flank; None if it is too short, bent, or out of view.
 
     Parameters
     ----------
     seen : sequence of (ndarray, EdgePoints)
-        Pictures with the tips up, and the edges found in them.
+        Pictures turned so that the tips point up, and the edges fitted in them.
     side : int
-        Which finger.
+        0 for the left finger, 1 for the right finger.
     light : ndarray of float, shape (levels,)
-        Light of every grey level, rising.
+        Light for every grey level (look-up table), increasing.
     """
     away, levels, pixel = [], [], 1.0
     for upright, edges in seen:
@@ -86,7 +86,7 @@ def flank_profile(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, light
 
 
 def _one(upright: GreyImage, edges: EdgePoints, side: int) -> tuple[Floats, GreyImage, float] | None:
-    """Distances from the edge, stored levels, and a pixel's width across the edge."""
+    """Distances from the edge, stored levels, and width of a pixel across the edge, for one picture."""
     real = np.flatnonzero(edges.lines.weight[side, :INNER] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS:

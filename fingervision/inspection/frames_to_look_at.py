@@ -11,16 +11,16 @@ MOST_FRAMES = 150
 
 
 def frames_to_look_at(source: FrameSource, seconds: float, most: int = MOST_FRAMES) -> Iterator[Frame | LostFrame]:
-    """Frames of the first seconds, by their own times, or by the computer's clock where a camera sends none.
+    """Yield the frames of the first seconds, by their own times, or by the computer's clock if they have none.
 
     Parameters
     ----------
     source : FrameSource
         The recording or camera.
     seconds : float
-        How long to look.
+        Duration of the inspected part.
     most : int
-        The most frames.
+        Largest number of frames.
     """
     first_s: float | None = None
     is_live = not source.description.files

@@ -1,7 +1,8 @@
-"""Vibration of the camera: the background above the fingers' tips registered against the first frame.
+"""Vibration of the camera, from registration of the background beyond the fingers' tips against the first frame.
 
-The background is registered in two halves separately. A motion of the camera shifts both halves equally. A difference
-between the two shifts means that the background has too little texture; it is the uncertainty of their mean.
+The background is divided into two halves, which are registered separately. A motion of the camera shifts both halves
+equally. If the two shifts differ, the background has too little texture; the difference gives the uncertainty of the
+mean shift.
 """
 
 from collections.abc import Callable
@@ -39,9 +40,9 @@ class GroundShift:
     Parameters
     ----------
     across_px, along_px : ndarray of float, shape (n,)
-        Of each frame against the first, across and along the fingers.
+        Displacement of each frame relative to the first, across and along the fingers.
     u_px : float or None
-        Standard uncertainty of each, from the two halves; None where the ground cannot be followed.
+        Standard uncertainty of each displacement; None if the background cannot be registered.
     """
 
     across_px: Floats
@@ -51,7 +52,7 @@ class GroundShift:
 
 @dataclass(slots=True)
 class GroundTracker:
-    """Follows the background from frame to frame."""
+    """Tracks the background from frame to frame."""
 
     _reference: list[Floats] | None = None
     _rows: int = 0
@@ -59,7 +60,7 @@ class GroundTracker:
     _found: list[Floats] = field(default_factory=list)
 
     def add(self, frame: Frame, outcome: GapMeasurement) -> None:
-        """Add one more frame that gave a number."""
+        """Add a frame in which the gap was measured."""
         if len(self._found) >= MOST_FRAMES or (self._direction not in (None, outcome.direction)):
             return
         grey = to_grey(frame.pixels)
@@ -82,7 +83,7 @@ class GroundTracker:
                 self._register(halves)
 
     def shift(self) -> GroundShift:
-        """What was found."""
+        """Return the displacement of the background in the frames added."""
         if len(self._found) < 2:
             return GroundShift(np.zeros(0), np.zeros(0), None)
         both = np.array(self._found)

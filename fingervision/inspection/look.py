@@ -1,4 +1,4 @@
-"""One frame that was inspected in detail: its noise, contrast and blur, and what another noise or blur would cost."""
+"""One frame inspected in detail: its noise, contrast and blur, and the effect of another noise or blur."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.inspection.noise_bound import edge_noise_px
-from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.grey import GreyImage
-from fingervision.vision.profile_choice import WIDER
 from fingervision.vision.residuals import SHARED_POINTS
+from fingervision.vision.wall_width import WIDER
 
 Floats = NDArray[np.float64]
 
@@ -25,20 +25,20 @@ CAMERA_NOISE = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """One frame that was inspected in detail.
+    """One frame inspected in detail.
 
     Parameters
     ----------
     frame : Frame
         The picture.
     upright : ndarray or None
-        Its grey levels, seen with the tips up; None where no fingers were found.
+        Grey levels of the picture, turned so that the tips point up; None if no fingers were found.
     outcome : GapMeasurement
-        What it measured.
+        Result of the gap measurement.
     fingers : CoarseFingers
-        Where the fingers are.
+        The fingers to the nearest pixel.
     edges : EdgePoints
-        Their outlines.
+        Sub-pixel outlines of the fingers.
     top_level : int
         Full scale of the picture.
     """
@@ -52,38 +52,39 @@ class Look:
 
     @property
     def contrast(self) -> float:
-        """Difference of light between background and the weaker finger (light, on the levels' own scale)."""
+        """Smaller of the two fingers' contrasts with the background, in light on the scale of the levels."""
         return min(abs(self.outcome.left.contrast), abs(self.outcome.right.contrast))
 
     @property
     def focus_blur_px(self) -> float:
-        """Blur of the optics including the pixel: that of flanks or tips, whichever is less (pixels)."""
+        """Blur of the optics, the pixel's width included (pixels): of flanks or tips, whichever is smaller."""
         return float(np.sqrt(self.edges.blur_px.min(axis=1).max() ** 2 + PIXEL_VARIANCE))
 
     @property
     def widened_px2(self) -> Floats:
         """Variance that motion has added to the blur of each finger's flanks, compared with the tips; shape (2,)."""
-        flanks, tips = (self.edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
+        resolved = np.maximum(self.edges.blur_px, LEAST_RESOLVED_BLUR_PX)
+        flanks, tips = (resolved[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
         return np.asarray(np.where(flanks > (1.0 + WIDER) * tips, flanks - tips, 0.0))
 
     @property
     def flank_blur_px(self) -> float:
-        """Blur of the flanks including the pixel (pixels)."""
+        """Blur of the flanks, the pixel's width included (pixels)."""
         return float(np.sqrt(self.edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
 
     @property
     def u_camera_px(self) -> float:
-        """Random uncertainty of the gap from the camera's noise alone, without shared errors of a codec (pixels)."""
+        """Random uncertainty of the gap from the camera's noise alone, without common errors of a codec (pixels)."""
         alone = max(self.outcome.u_gap_px**2 - self.outcome.u_coding_px**2, 0.0)
         shared = 1.0 if self.frame.quantiser is not None else SHARED_POINTS[self.frame.coding]
         return float(np.sqrt(alone / shared))
 
     @property
     def noise(self) -> float:
-        """Ratio of noise to contrast, from the flat parts beside the edges where they are in view.
+        """Ratio of noise to contrast, from the flat parts beside the edges if they are in view.
 
-        A codec removes the noise from flat parts; then the noise of a typical camera is assumed, unless the edges show
-        less.
+        A codec removes the noise from flat parts; for a coded picture the noise of a typical camera is assumed, unless
+        the noise at the edges is lower.
         """
         flat = self.edges.noise_flat
         if self.frame.lossy or not flat:
@@ -91,9 +92,9 @@ class Look:
         return flat / max(self.contrast, 1e-9)
 
     def u_with(self, noise: float | None = None, blur_px: float | None = None) -> float:
-        """Random uncertainty of the gap for another ratio of noise to contrast, or another blur of the flanks (pixels).
+        """Random uncertainty of the gap (pixels) for another noise-to-contrast ratio, or another blur of the flanks.
 
-        The Cramer-Rao bound gives the ratio to the uncertainty that is stated for this frame.
+        The uncertainty stated for this frame is multiplied by the ratio of the two Cramer-Rao bounds.
         """
         now = edge_noise_px(self.noise, self.flank_blur_px)
         then = edge_noise_px(self.noise if noise is None else noise, self.flank_blur_px if blur_px is None else blur_px)

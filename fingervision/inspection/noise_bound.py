@@ -1,4 +1,7 @@
-"""Random uncertainty of an edge against noise, blur and number of rows: the Cramer-Rao bound, used for ratios."""
+"""Random uncertainty of an edge as a function of noise, blur and number of rows: the Cramer-Rao bound.
+
+Only ratios of these values are used.
+"""
 
 from math import pi, sqrt
 
@@ -10,19 +13,19 @@ REACH_BLURS, REACH_EXTRA_PX = 4.0, 4.0
 
 
 def edge_noise_px(noise: float, blur_px: float, rows: int = 1) -> float:
-    """Standard uncertainty of one edge of unknown levels and blur (pixels).
+    """Standard uncertainty of the position of one edge with unknown levels and blur (pixels).
 
-    sigma_x^2 = r^2 / (N (1 / (2 sqrt(pi) sigma_e) - 1 / W)); Gatherer, Stanford CSL-TR-93-560; Kakarala & Hero, IEEE
-    PAMI 14(7), 777-781, 1992.
+    The formula is sigma_x^2 = r^2 / (N (1 / (2 sqrt(pi) sigma_e) - 1 / W)), with W the length of the window; Gatherer,
+    Stanford CSL-TR-93-560; Kakarala & Hero, IEEE PAMI 14(7), 777-781, 1992.
 
     Parameters
     ----------
     noise : float
-        Standard deviation of the grey levels over the contrast of the edge, r.
+        Ratio r of the noise's standard deviation to the contrast of the edge.
     blur_px : float
-        Standard deviation of the edge's spread, the pixel included, sigma_e.
+        Standard deviation sigma_e of the blur, the pixel's width included.
     rows : int
-        Independent rows, N.
+        Number N of independent rows.
     """
     window_px = 2.0 * (REACH_BLURS * blur_px + REACH_EXTRA_PX)
     return noise / sqrt(rows * (1.0 / (2.0 * sqrt(pi) * blur_px) - 1.0 / window_px))

@@ -1,4 +1,4 @@
-"""Picture of an inspection: a measured frame, and the cost of each limit."""
+"""Picture of an inspection: a measured frame, and a bar chart of the cost of each limit."""
 
 from pathlib import Path
 
@@ -26,16 +26,16 @@ def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None
     Parameters
     ----------
     path : Path
-        The picture.
+        Path of the picture.
     sample : Sample
-        What was looked at.
+        The inspected frames.
     findings : list of Finding
-        The worst first.
+        Findings, the most severe first.
 
     Raises
     ------
     OutputError
-        The picture cannot be written.
+        If the picture cannot be written.
     """
     figure = Figure(figsize=(12.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.1, 1.0))

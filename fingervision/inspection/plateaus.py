@@ -1,4 +1,4 @@
-"""Brightness of background and fingers in stored levels, and how much of them is clipped at the ends of the scale."""
+"""Stored levels of background and fingers, and how much of them is clipped at the ends of the scale."""
 
 from dataclasses import dataclass
 
@@ -24,9 +24,9 @@ class Plateaus:
     Parameters
     ----------
     bright, dark : float
-        The brighter plateau (ground, or light fingers) and the darker one.
+        Levels of the brighter plateau (background, or light fingers) and of the darker one.
     at_top, at_zero : float
-        Share of the pixels of each that stand at the end of the scale.
+        Share of the brighter plateau's pixels at the upper end of the scale, and of the darker plateau's at zero.
     """
 
     bright: float
@@ -36,7 +36,7 @@ class Plateaus:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the background or the finger is clipped."""
+        """Whether the background or a finger is clipped."""
         return self.at_top > AT_END_SHARE or self.at_zero > AT_END_SHARE
 
 

@@ -1,4 +1,4 @@
-"""A symmetric blurred step between two plateaus, which may slope, fitted to the mean profile of a flank."""
+"""Fit of a symmetrically blurred step between two plateaus, which may slope, to the mean profile of a flank."""
 
 from dataclasses import dataclass
 
@@ -24,13 +24,13 @@ class ProfileFit:
     Parameters
     ----------
     position_px : float
-        The edge, outwards from where the profile has its zero.
+        Position of the edge, outwards from the profile's zero.
     chi_square : float
-        What is left, in units of the bins' own noise.
+        Sum of squared residuals, in units of the bins' own noise.
     freedom : int
-        Bins less parameters.
+        Number of bins minus number of parameters.
     slope_share : float
-        Larger change of either plateau over its part of the window, as a share of the contrast; 0 where they are level.
+        Larger of the two plateaus' changes of level over the window, as a share of the contrast; 0 for level plateaus.
     """
 
     position_px: float
@@ -47,7 +47,7 @@ def fit_step(profile: FlankProfile, blur_px: float, *, sloping: bool) -> Profile
     profile : FlankProfile
         Mean light across the flank.
     blur_px : float
-        Where the search for the blur begins.
+        Initial estimate of the blur.
     sloping : bool
         Whether the plateaus may slope (uneven light).
     """
@@ -87,7 +87,7 @@ def _design(profile: FlankProfile, position: float, blur: float, sloping: bool) 
 
 
 def _pixel_step(away: Floats, sigma: float, pixel: float) -> Floats:
-    """A Gaussian-blurred unit step, averaged over the pixel's width across the edge."""
+    """Gaussian-blurred unit step, averaged over the pixel's width across the edge."""
     upper, lower = (away + 0.5 * pixel) / sigma, (away - 0.5 * pixel) / sigma
     density = (np.exp(-0.5 * upper**2) - np.exp(-0.5 * lower**2)) / np.sqrt(2.0 * np.pi)
     return np.asarray(sigma / pixel * (upper * ndtr(upper) - lower * ndtr(lower) + density))

@@ -1,4 +1,4 @@
-"""Results of an inspection: as text, and for programs."""
+"""Results of an inspection as text and as data for other programs."""
 
 from dataclasses import asdict
 from typing import Any
@@ -13,14 +13,14 @@ LIGHTS = {Severity.GOOD: "good", Severity.FAIR: "FAIR", Severity.POOR: "POOR"}
 
 
 def as_json(sample: Sample, findings: list[Finding]) -> dict[str, Any]:
-    """Inspection for programs.
+    """Return the inspection as data that JSON can represent.
 
     Parameters
     ----------
     sample : Sample
-        What was looked at.
+        The inspected frames.
     findings : list of Finding
-        The worst first.
+        Findings, the most severe first.
     """
     mend = to_mend(findings)
     gap_px = sample.track[:, 2] - sample.track[:, 1]
@@ -41,7 +41,7 @@ def as_json(sample: Sample, findings: list[Finding]) -> dict[str, Any]:
 
 
 def as_text(sample: Sample, findings: list[Finding]) -> str:
-    """Inspection as text: the most severe finding first, each with its cost and what to change."""
+    """Return the inspection as text: the most severe finding first, each with its cost and what to change."""
     mend = to_mend(findings)
     lines = [_head(sample), ""]
     for number, finding in enumerate(mend, start=1):

@@ -1,9 +1,9 @@
-"""Which camera response the shape of the edges supports: optics blur an edge symmetrically in light, not in levels.
+"""Evidence for the camera response from the shape of edges: optics blur an edge symmetrically in light, not in levels.
 
-Both inner flanks are fitted with a symmetric step, once in the light of the assumed response and once in that of the
-alternative. The likelihood ratio of the two fits tells how likely the alternative is. An aberration (coma) skews the
-edges of both fingers to the same side of the picture, and a response skews both towards their dark side, so that the
-two flanks together distinguish them.
+Each inner flank is fitted by a symmetrically blurred step, once in the light of the assumed response and once in that
+of the alternative response. The likelihood ratio of the two fits gives the probability of the alternative. An optical
+aberration (coma) skews the edges of both fingers to the same side of the picture, whereas a wrong response skews each
+edge towards its dark side, so that the two flanks together distinguish these causes.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage, top_level
 from fingervision.vision.pipeline import Settings
-from fingervision.vision.profile_choice import WIDER
+from fingervision.vision.wall_width import WIDER
 
 Floats = NDArray[np.float64]
 
@@ -39,18 +39,18 @@ CUT_OFF_SHARE = 0.995
 
 @dataclass(frozen=True, slots=True)
 class ResponseEvidence:
-    """Result of comparing two responses by the shape of the edges.
+    """Result of comparing two camera responses by the shape of the edges.
 
     Parameters
     ----------
     share_other : float
-        Probability of the other response, 0 to 1; one half where the edges cannot tell.
+        Probability of the alternative response, 0 to 1; one half if the edges do not decide.
     assumed, other : str
-        Names of both; `other` is empty where the response is known.
+        Names of the assumed and the alternative response; `other` is empty if the response is known.
     shift_px : float
-        How much larger the gap is read than if the other one were true.
+        Excess of the measured gap if the alternative response is the true one.
     flanks : int
-        Flanks that could be used.
+        Number of flanks that could be used.
     """
 
     share_other: float
@@ -63,18 +63,18 @@ class ResponseEvidence:
 def response_evidence(
     seen: Sequence[tuple[GreyImage, EdgePoints]], settings: Settings, shift_px: float, *, lossy: bool = False
 ) -> ResponseEvidence:
-    """Compare the assumed response with the alternative one.
+    """Compare the assumed camera response with the alternative response.
 
     Parameters
     ----------
     seen : sequence of (ndarray, EdgePoints)
-        Pictures with the tips up, and the edges found in them.
+        Pictures turned so that the tips point up, and the edges fitted in them.
     settings : Settings
-        With both responses.
+        Settings with both responses.
     shift_px : float
-        What the other one would change.
+        Change of the gap between the two responses.
     lossy : bool
-        Whether a lossy codec stood between the sensor and the pixels.
+        Whether the pictures were compressed with loss.
     """
     assumed, other = settings.response, settings.other_response
     if other is None:
@@ -86,14 +86,14 @@ def response_evidence(
 
 
 def _agreed(odds: list[float]) -> float:
-    """Combine the estimates of both flanks; None where one is missing or they contradict each other."""
+    """Sum of the two flanks' values (`_odds`); 0 if one is missing or they contradict each other."""
     if len(odds) < 2 or (odds[0] * odds[1] < 0.0 and min(map(abs, odds)) > CONTRADICTING):
         return 0.0
     return sum(odds)
 
 
 def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Settings, floor: float) -> float | None:
-    """Twice the log likelihood ratio for the alternative response from one flank; None where it is undecided."""
+    """Twice the log likelihood ratio for the alternative response from one flank; None if the flank is unsuitable."""
     levels = int(np.iinfo(seen[0][0].dtype).max) + 1
     top = settings.response.top_level or top_level(seen[0][0], settings.bits)
     identity = np.arange(levels, dtype=np.float64)
@@ -125,7 +125,7 @@ def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Set
 
 
 def _pattern(stored: FlankProfile, ends: int) -> Floats:
-    """Scatter that a pattern on the finger or on the background leaves in each bin."""
+    """Scatter in each bin due to a pattern on the finger or on the background."""
     level = stored.level
     inner, outer = float(np.median(level[:ends])), float(np.median(level[-ends:]))
     outside = np.clip((level - inner) / (outer - inner), 0.0, 1.0) if outer != inner else np.zeros_like(level)
@@ -134,7 +134,7 @@ def _pattern(stored: FlankProfile, ends: int) -> Floats:
 
 
 def _scatter(away: Floats, level: Floats) -> float:
-    """Standard deviation about a straight line; zero where there are too few bins."""
+    """Standard deviation about a straight line; zero if there are too few bins."""
     if away.size < FEWEST_FOR_SCATTER:
         return 0.0
     slope, at = np.polyfit(away, level, 1)

@@ -1,4 +1,4 @@
-"""The inspected sample: some frames of a recording, measured, with the intermediate results of the measurement."""
+"""The inspected sample: some frames of a recording, with their measurements and intermediate results."""
 
 from __future__ import annotations
 
@@ -53,26 +53,26 @@ class Sample:
     description : Description
         The recording.
     settings : Settings
-        What it was measured with; the response is the one that the edges speak for.
+        Settings of the measurement; the response is the one that the edges support.
     scale : Scale or None
-        From pixels to millimetres; None where nobody has stated it.
+        Conversion from pixels to millimetres; None if not stated.
     looks : tuple of Look
-        Frames that gave a number, looked at closely.
+        Frames with a measured gap, inspected in detail.
     refused : dict of Status to NoGap
-        The first refusal of each kind.
+        First refusal of each kind.
     refused_frame : Frame or None
-        The first picture that gave no number.
+        First picture without a measured gap.
     counts : Counter of Status
-        Frames with each status.
+        Number of frames with each status.
     track : ndarray, shape (n, 7)
-        Of every frame that gave a number: its place, x of the left and right measuring point across the fingers, both
-        tips along them, standard uncertainty across and of the tips (pixels).
+        For every frame with a measured gap: its number, position of the left and right measuring point across the
+        fingers, positions of both tips along the fingers, standard uncertainties across and of the tips (pixels).
     ground : GroundShift
-        How the ground moved against the first frame.
+        Motion of the background relative to the first frame.
     response : ResponseEvidence
-        What the edges' shape says of the camera's response.
+        Evidence for the camera response from the shape of the edges.
     last_frame : Frame or None
-        For the picture.
+        Frame to be shown in the picture of the inspection.
     """
 
     description: Description
@@ -101,9 +101,9 @@ class Sample:
 
     @property
     def fill(self) -> float:
-        """Fraction of the picture across the fingers that both fingers and the gap fill.
+        """Share of the picture's extent across the fingers that fingers and gap occupy.
 
-        1 where they extend beyond it.
+        It is 1 if they extend beyond the picture.
         """
         shares = [0.0]
         for look in self.looks:
@@ -114,9 +114,10 @@ class Sample:
 
     @property
     def good_px(self) -> float:
-        """Cost below which correcting is not worth while, in pixels of this picture.
+        """Cost below which a correction is not worth while, in pixels of this picture.
 
-        In a picture that is not filled, the pixels are larger than necessary, and the limit is lower in proportion.
+        If the fingers do not fill the picture, a pixel covers more of the object than necessary, and the limit is
+        proportionally lower.
         """
         return GOOD_PX * min(1.0, self.fill / FILLED) if self.looks else GOOD_PX
 
@@ -127,7 +128,7 @@ class Sample:
 
     @property
     def is_lost_in_noise(self) -> bool:
-        """Whether the first picture without a number has fingers or background that hardly exceed its noise."""
+        """Whether fingers or background in the first unmeasured picture hardly exceed its noise."""
         if self.refused_frame is None:
             return False
         grey = to_grey(self.refused_frame.pixels)
@@ -137,9 +138,9 @@ class Sample:
 
     @property
     def refused_blur_px(self) -> float:
-        """Approximate blur of the steepest edges of the first picture without a number (pixels).
+        """Approximate blur of the steepest edges in the first unmeasured picture (pixels).
 
-        It is the contrast divided by the steepest slope.
+        It is derived from the contrast divided by the steepest slope.
         """
         if self.refused_frame is None:
             return 0.0
@@ -153,12 +154,12 @@ class Sample:
 
     @property
     def is_smeared(self) -> bool:
-        """Whether frames have no number because the fingers moved too far during the exposure."""
+        """Whether frames are not measured because the fingers moved too far during the exposure."""
         return Status.BLURRED in self.refused and self.refused[Status.BLURRED].words.startswith(SMEARED)
 
     @property
     def is_lost_in_blur(self) -> bool:
-        """Whether pictures without a number are out of focus: strong blur rounds a tip off until it is not found."""
+        """Whether unmeasured pictures are out of focus: strong blur rounds off a tip until it is not found."""
         return not self.is_lost_in_noise and self.refused_blur_px > LOST_BLUR_PX
 
     @property
@@ -168,7 +169,7 @@ class Sample:
 
     @property
     def u_shift_px(self) -> float:
-        """Standard uncertainty that `measure` states for structures beside the edges and clipping (pixels)."""
+        """Standard uncertainty stated by `measure` for disturbances beside the edges and for clipping (pixels)."""
         return self.median(look.outcome.u_shift_px for look in self.looks)
 
     @property
@@ -177,7 +178,7 @@ class Sample:
         return self.median(look.noise for look in self.looks) <= SEEING_NOISE
 
     def median(self, values: Iterable[float]) -> float:
-        """Median over the frames inspected in detail; 0 where there are none."""
+        """Median over the frames inspected in detail; 0 without such frames."""
         each = list(values)
         return float(np.median(each)) if each else 0.0
 
@@ -185,18 +186,18 @@ class Sample:
 def take_sample(
     frames: Iterable[Frame | LostFrame], description: Description, settings: Settings, scale: Scale | None
 ) -> Sample:
-    """Measure frames and keep what the findings need.
+    """Measure frames and keep the data from which findings are computed.
 
     Parameters
     ----------
     frames : iterable of Frame or LostFrame
-        Already as few as are looked at.
+        Frames to be inspected, already limited in number.
     description : Description
         The recording.
     settings : Settings
-        How frames are measured.
+        Settings of the measurement.
     scale : Scale or None
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
     """
     kept: list[Frame] = []
     every, read = 1, 0

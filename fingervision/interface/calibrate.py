@@ -67,9 +67,9 @@ def calibrate(
         Of a line scale the distance of neighbouring lines, the standard uncertainty of every line's place, and of the
         length over all lines.
     roi : (int, int, int, int) or None
-        Look in this part of every picture: first column, first row, width, height; not for boards.
+        Use only this part of every picture: first column, first row, width, height; not for boards.
     response : str
-        Which light a grey level stands for: auto, linear, srgb, bt709 or a file.
+        Light that each grey level stands for: auto, linear, srgb, bt709 or a file.
     certificate, date : str
         Of the reference.
     camera : mapping of str to str, or None
@@ -85,7 +85,7 @@ def calibrate(
     Raises
     ------
     ArgumentError
-        An argument that cannot be meant, or is missing for this kind.
+        An argument has an impossible value, or is missing for this kind of reference.
     DataError, InputFileError, UsageError
         A picture cannot be read, or does not show the reference.
 

@@ -35,11 +35,11 @@ class Calibration:
     path : Path or None
         The file that it was read from.
     lines : tuple of str
-        What was found on the way to it, in sentences.
+        Findings of the calibration, in sentences.
     pictures : mapping of str to ndarray of uint8, shape (height, width, 3)
-        What was found in each picture, drawn in; red, green and blue.
+        Each picture (red, green, blue) with the found edges drawn in.
     details : mapping
-        Figures of the fit, for programs.
+        Numbers of the fit, for programs.
 
     Examples
     --------
@@ -75,9 +75,9 @@ class Calibration:
         Parameters
         ----------
         path : path
-            A calibration that stands there is replaced, anything else is not.
+            An existing calibration of this name is replaced; any other existing file is refused.
         pictures : bool
-            Also write what was found in each picture, beside it.
+            Also write each picture with the found edges drawn in, in the same folder.
 
         Raises
         ------
@@ -140,19 +140,19 @@ class Calibration:
         u_size_mm : float
             Standard uncertainty of every size.
         roi : (int, int, int, int) or None
-            Look in this part of every picture.
+            Use only this part of every picture.
 
         Returns
         -------
         tuple of calib.Agreement
-            One a picture, in order: `measured_mm`, `e_n`, `agrees`.
+            One result per picture, in order: `measured_mm`, `e_n`, `agrees`.
 
         Raises
         ------
         UsageError
-            An item that cannot be meant.
+            An item has an impossible value.
         DataError, InputFileError
-            A picture cannot be read, or is of another size than the calibration's.
+            A picture cannot be read, or its size differs from that of the calibration.
         """
         from fingervision.interface.reference_pictures import known_sizes, references_of
 

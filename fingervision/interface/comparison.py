@@ -32,15 +32,15 @@ CALL = "fingervision.compare(...) in Python"
 class Comparison:
     """Where a measurement and models disagree; made by `fingervision.compare`.
 
-    Iterating gives the models' names; indexing by a name gives that model's result. The plain properties are those of
-    the first model.
+    Iterating gives the names of the models; indexing by a name gives the result for that model. The properties below
+    are those of the first model.
 
     Parameters
     ----------
     models : mapping of str to fingervision.diagnosis.compare.Comparison
-        What was found, by the model's name.
+        Result for each model, by the name of the model.
     measured : Path
-        The table's file, or a name for what was in memory.
+        File of the table, or a name for a table in memory.
     made : Provenance
         Files with their hashes, versions and time.
     """
@@ -164,13 +164,13 @@ def compare(
     model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
         Also a list of these, or a mapping of them by name.
     seed : int
-        Of the bootstrapped threshold.
+        Seed of the bootstrap for the threshold.
     kind : str
         Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
     columns : path or None
         A columns.toml for foreign tables.
     call : str
-        How the call is named among what the results come from.
+        Name of this call in the provenance of the results.
 
     Returns
     -------
@@ -180,7 +180,7 @@ def compare(
     Raises
     ------
     ArgumentError
-        An argument that cannot be meant.
+        An argument has an impossible value.
     FingervisionError
         Table or model cannot be read, or do not fit together.
 

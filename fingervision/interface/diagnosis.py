@@ -45,7 +45,7 @@ class Diagnosis:
     model : CorrectedModel
         What was diagnosed.
     measured : Path
-        The table's file, or a name for what was in memory.
+        File of the table, or a name for a table in memory.
     made : Provenance
         Files with their hashes, versions and time.
     own_effects : tuple of Effect
@@ -65,7 +65,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict: one of agrees, named, ambiguous, unknown."""
+        """The verdict, one of agrees, named, ambiguous, unknown."""
         return self.report.verdict
 
     @property
@@ -163,19 +163,19 @@ def diagnose(
     model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
         The model to be diagnosed.
     with_effects, without_effects : iterable of str
-        Effects that are insisted on, or ruled out.
+        Effects that every explanation must include, or must not include.
     effects : iterable of Effect
-        Effects of one's own that are tried beside the catalogue in this call; see `fingervision.effect`.
+        User-defined effects that are tried beside the catalogue in this call; see `fingervision.effect`.
     seed : int
-        Of the bootstrap; the same seed gives the same report.
+        Seed of the bootstrap; the same seed gives the same report.
     kind : str
         Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
     columns : path or None
         A columns.toml for foreign tables.
     progress : callable or None
-        Told the share that is done, from 0 to 1.
+        Called with the share of the work that is done, from 0 to 1.
     call : str
-        How the call is named among what the results come from.
+        Name of this call in the provenance of the results.
 
     Returns
     -------
@@ -185,7 +185,7 @@ def diagnose(
     Raises
     ------
     ArgumentError
-        An argument that cannot be meant; an effect that there is not comes with the nearest one.
+        An argument has an impossible value; for an unknown effect, the message names the nearest known effect.
     FingervisionError
         Table or model cannot be read, or do not fit together.
 

@@ -74,7 +74,7 @@ def measure(
     calibration : path, Calibration or None
         The scale with its uncertainty; one of `calibration` and `px_per_mm` is required.
     px_per_mm : float or None
-        The scale alone; the uncertainty then holds the random part alone.
+        The scale without its uncertainty; uncertainties then have only the random part.
     below_tip_mm : float
         How far below each finger's tip the gap is measured.
     tips : str
@@ -82,21 +82,21 @@ def measure(
     roi : (int, int, int, int) or None
         Region of interest: first column, first row, width, height in pixels.
     rate_hz : float or None
-        Pictures in a second, where they have no times of their own.
+        Pictures per second, if the pictures carry no times.
     times_s : sequence of float or None
         Time of every picture of an array.
     drive : path, DriveHistory, DataFrame or mapping of columns, or None
         The recorded input, `time_s,input_mm[,run][,force_n]`.
     drive_offset_s : float or None
-        Added to the drive's times to get the recording's; None finds it from the motion.
+        Clock offset, added to the drive's times; None determines it from the motion.
     columns : path or None
         A columns.toml that says how a foreign drive table is read.
     response : str, path or CameraResponse
-        Which light a grey level stands for: auto, linear, srgb, bt709 or a file.
+        Light that each grey level stands for: auto, linear, srgb, bt709 or a file.
     bits : int or None
-        Depth of levels stored in 16 bits, where it is not 16.
+        True bit depth of levels that are stored in 16 bits, if it is not 16.
     fingers : str
-        Whether the fingers are darker or lighter than their ground: auto, dark or light.
+        Whether the fingers are darker or lighter than the background: auto, dark or light.
     face : str
         Edge of a thick part: front, of the face towards the camera, or outline.
     coding : str
@@ -106,9 +106,9 @@ def measure(
         How many frames of a camera are measured; or the first and the last frame of a recording, counted from 0 and
         both included.
     gauges : path, sequence of Gauge, or None
-        Gauges to read beside the gap, as a gauges.toml states them; what they read is in `gauge_rows`.
+        Gauges to measure beside the gap, as a gauges.toml states them; their values are in `gauge_rows`.
     progress : callable or None
-        Called now and then with the frames done and the frames that the source announces.
+        Called repeatedly with the number of measured frames and the number of frames that the source announces.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def measure(
     Raises
     ------
     UsageError
-        An argument that cannot be meant; as `ArgumentError` it names the argument and says what it must be.
+        An argument has an impossible value; `ArgumentError` names the argument and says what it must be.
     DataError, InputFileError, OpenQuestionError
         The recording, the calibration or the drive cannot be read.
 

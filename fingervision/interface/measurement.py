@@ -136,7 +136,7 @@ class Measurement:
 
     @property
     def budget(self) -> Budget:
-        """Uncertainty budget of `gap_mm`: every source with its standard uncertainty for each gap, shape (n,).
+        """Uncertainty budget of `gap_mm`, with every source and its standard uncertainty for each gap, shape (n,).
 
         The squares of the sources add to the square of `u_gap_mm` (JCGM 100:2008, equation 10); what is not `shared` is
         `u_random_mm`. With a scale that has no stated uncertainty, only the sources within the pictures are listed.

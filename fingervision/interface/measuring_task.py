@@ -93,7 +93,7 @@ def measuring_task(
     Raises
     ------
     UsageError
-        An argument that cannot be meant.
+        An argument has an impossible value.
     DataError, InputFileError, OpenQuestionError
         A file cannot be read.
     """

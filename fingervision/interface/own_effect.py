@@ -40,15 +40,15 @@ def effect(
         Where it acts: drive (the function gets and gives the input in mm, shape (n,)), mechanism or camera (it gets and
         gives a `Response`, the two measuring points).
     parameters : Parameter or iterable of Parameter
-        With bounds; one of them, the size, has a neutral value at which nothing happens.
+        Parameters with bounds; one parameter, the size, has a neutral value at which the effect changes nothing.
     name : str or None
-        None takes the function's name.
+        Name of the effect; None takes the name of the function.
     source : str
-        Where the law is from.
+        Source of the law.
     residual : str
-        How it looks in measured minus simulated.
+        Description of the residual (measured minus simulated) that the effect causes.
     after : str or None
-        The effect that it acts after, of the same stage; None puts it behind all of its stage.
+        Effect of the same stage after which this effect acts; None puts it after all effects of its stage.
     **needs
         Further fields of an effect: needs_times, needs_shared_clock, needs_edges, needs_force, memory, start, narrow.
 
@@ -60,7 +60,7 @@ def effect(
     Raises
     ------
     ArgumentError
-        An argument that cannot be meant; a name that a built-in effect has.
+        An argument has an impossible value, or the name of a built-in effect.
 
     Examples
     --------

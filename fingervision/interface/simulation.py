@@ -212,7 +212,7 @@ def simulate(
     Raises
     ------
     ArgumentError
-        The inputs are none, or lie beyond what the model covers.
+        There is no input, or an input lies outside the range of the model.
     FingervisionError
         Model or drive cannot be read.
 

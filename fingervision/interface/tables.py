@@ -72,7 +72,7 @@ def read_table(
     Raises
     ------
     OpenQuestionError
-        The table can be read in more than one way; the sentence says how to settle it.
+        The table can be read in more than one way; the message says how to decide which.
     DataError, InputFileError
         The table cannot be read, or its content cannot be used.
 

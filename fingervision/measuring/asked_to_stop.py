@@ -11,12 +11,12 @@ from types import FrameType
 def asked_to_stop() -> Iterator[threading.Event]:
     """Record a first Ctrl-C or SIGTERM instead of raising it; a second one is raised as usual.
 
-    Nothing is recorded outside the main thread, or in a worker process that leaves the signal to its parent.
+    Signals are not recorded outside the main thread, or in a worker process that leaves them to its parent process.
 
     Yields
     ------
     threading.Event
-        Set from the first Ctrl-C on.
+        Event that is set by the first Ctrl-C or SIGTERM.
     """
     asked = threading.Event()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}

@@ -1,13 +1,13 @@
-"""Detect blocks with wrong content in a decoded picture, where damage of the stream went unnoticed.
+"""Detect blocks with wrong content in a decoded picture, caused by damage of the stream that the decoder missed.
 
 JPEG and H.264 code the picture in squares of 8 or 16 pixels. Damage puts wrong content into whole squares. The picture
-then has steps along the grid of the squares that end at its corners, where the previous picture has none. Motion of
+then has steps along the borders of squares, ending at their corners, where the previous picture has none. Motion of
 objects does not follow this grid, and optics never change an edge within a single pixel.
 
 Method: steps across the borders of blocks are compared with steps inside them, as in measures of blocking artefacts (Z.
 Wang, H. R. Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP
-2002, doi:10.1109/ICIP.2002.1038064). Here this is done for the change since another picture, and for each segment
-separately.
+2002, doi:10.1109/ICIP.2002.1038064). Here the comparison is made for the difference between two pictures, and for each
+border segment separately.
 """
 
 import numpy as np
@@ -27,19 +27,19 @@ Levels = NDArray[np.float32]
 
 
 def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
-    """Count corners of squares that are visible in a picture and were not in the previous one.
+    """Count corners of codec squares that are visible in a picture and were not in the previous one.
 
     Parameters
     ----------
     picture, before : ndarray of float32, shape (height, width)
-        Grey levels of the same part, which begins at a corner of squares and holds whole ones.
+        Grey levels of the same part of both pictures, which starts at a corner of a square and contains whole squares.
     least_step : float
-        Grey levels: what is less is left by sound coding as well.
+        Least step in grey levels; smaller steps also occur with undamaged coding.
 
     Returns
     -------
     int
-        Places where an outstanding step along a column's border meets one along a row's border.
+        Number of points where an outstanding step along a vertical border meets one along a horizontal border.
     """
     change = picture - before
     upright = _outstanding(change, picture, before, least_step)
@@ -52,7 +52,7 @@ def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
 
 
 def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: float) -> NDArray[np.bool_]:
-    """Segments of vertical borders at which the change has a step, shape (block rows, block columns - 1)."""
+    """Border segments between block columns at which the change has a step, shape (block rows, block columns - 1)."""
     at = np.arange(SQUARE_PX - 1, change.shape[1] - 1, SQUARE_PX)
     stands_out = np.zeros((change.shape[0] // SQUARE_PX, len(at)), dtype=bool)
     for steps, least in ((_levelled, least_step), (_sized, WAVES * least_step)):
@@ -69,12 +69,12 @@ def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: fl
 
 
 def _levelled(levels: Levels) -> Levels:
-    """Absolute mean step from each column to the next along each block's height, shape (block rows, width - 1)."""
+    """Absolute value of the mean step between columns over each block's height, shape (block rows, width - 1)."""
     rows = levels.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, levels.shape[1]).mean(axis=1)
     return np.asarray(np.abs(np.diff(rows, axis=1)))
 
 
 def _sized(levels: Levels) -> Levels:
-    """Mean absolute step from each column to the next along each block's height, shape (block rows, width - 1)."""
+    """Mean of the absolute steps between columns over each block's height, shape (block rows, width - 1)."""
     steps = np.abs(np.diff(levels, axis=1))
     return np.asarray(steps.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, -1).mean(axis=1))

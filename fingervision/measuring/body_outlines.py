@@ -13,9 +13,10 @@ from fingervision.vision.outline_chunks import REACH_PX, Chunks, FlatMap
 Array = NDArray[np.float64]
 
 CHUNK_PX = 24.0
-"""Length of a chunk: long enough for a blur of its own, short enough to be covered as a whole or not."""
+"""Length of a chunk: long enough for an estimate of its blur, and short enough that usually all or nothing of it is
+covered."""
 FROM_CORNERS_PX = 4.0
-"""Beside a corner the blur of the other edge counts: three blurs of 1.2 px."""
+"""Distance of chunks from corners, where the blur of the adjoining edge matters: three times a blur of 1.2 px."""
 BESIDE = 1e-4
 
 
@@ -26,16 +27,16 @@ class Placement:
     Parameters
     ----------
     px_per_mm : float
-        Scale.
+        Pixels per millimetre.
     origin_px : ndarray of float, shape (2,)
-        The drawing's origin in the picture.
+        Position of the drawing's origin in the picture.
     angle_rad : float
         Direction of the drawing's x axis in the picture, from the picture's x towards its y.
     is_mirrored : bool
-        Whether the picture shows the drawing's back: its y axis then lies to the right of its x axis as the picture is
-        seen, and not to the left.
+        Whether the picture shows the back of the drawing: its y axis then points to the right of its x axis in the
+        picture, instead of to the left.
     flat : FlatMap or None
-        Lens and perspective of the picture; origin and angle are then those on the plane without them.
+        Lens distortion and perspective of the picture; origin and angle are then those in the undistorted plane.
     """
 
     px_per_mm: float
@@ -46,14 +47,14 @@ class Placement:
 
     @property
     def axes(self) -> Array:
-        """The drawing's unit vectors in the picture, by column."""
+        """Unit vectors of the drawing's axes in the picture, as columns."""
         c, s = np.cos(self.angle_rad), np.sin(self.angle_rad)
         # Rows of a picture run downwards: a drawing seen from its front has its y axis upwards.
         side = 1.0 if self.is_mirrored else -1.0
         return np.array([[c, -side * s], [s, side * c]])
 
     def to_flat_px(self, points_mm: Array) -> Array:
-        """Convert points of the drawing, shape (2, n), to the flat plane without perspective and distortion."""
+        """Convert points of the drawing, shape (2, n), to the plane without perspective and distortion."""
         return np.asarray(self.origin_px[:, None] + self.px_per_mm * self.axes @ points_mm)
 
     def to_px(self, points_mm: Array) -> Array:
@@ -68,7 +69,7 @@ class Placement:
 
     @property
     def turn_sign(self) -> float:
-        """Sign by which a rotation in the picture is converted to the drawing."""
+        """Sign of a rotation in the drawing that corresponds to a positive rotation in the picture."""
         return float(np.sign(np.linalg.det(self.axes)))
 
 
@@ -79,9 +80,9 @@ class BodyOutline:
     Parameters
     ----------
     body : LinkBody
-        As drawn.
+        The body in the drawing.
     starts_mm, ends_mm : ndarray of float, shape (2, k)
-        Ends of the stretches, the body on their left.
+        Ends of the stretches, with the body on their left.
     """
 
     body: LinkBody
@@ -89,7 +90,7 @@ class BodyOutline:
     ends_mm: Array
 
     def chunks(self, place: Placement) -> Chunks:
-        """Divide the straight stretches into chunks, placed on the flat plane."""
+        """Divide the straight stretches into chunks, in pixels of the undistorted plane."""
         starts, ends = place.to_flat_px(self.starts_mm), place.to_flat_px(self.ends_mm)
         length = np.hypot(*(ends - starts))
         middles, normals = [], []
@@ -112,12 +113,12 @@ class BodyOutline:
         )
 
     def about_px(self, place: Placement) -> Array:
-        """Reference point of the body on the flat plane."""
+        """Reference point of the body, in pixels of the undistorted plane."""
         return np.asarray(place.to_flat_px(self.body.centroid_mm[:, None])[:, 0])
 
 
 def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
-    """Select the straight edges of every body of the drawing, without cuts through flexures."""
+    """Select the straight edges of every body of the drawing, without the cuts through flexures."""
     region = mechanism.region
     beside = BESIDE * region.size_mm
     found = []
@@ -138,7 +139,7 @@ def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
 
 
 def silhouette(mechanism: Mechanism, place: Placement, width_px: int, height_px: int, step_px: int) -> Array:
-    """Mask of the drawing in the picture, one value every few pixels; shape (height / step, width / step), 0 or 1."""
+    """Mask (0 or 1) of the drawing in the picture, one value every `step_px`; (height / step, width / step)."""
     x, y = np.meshgrid(np.arange(0, width_px, step_px), np.arange(0, height_px, step_px))
     points = place.to_mm(np.stack([x.ravel(), y.ravel()]).astype(float))
     return np.asarray(mechanism.region.holds(points).reshape(x.shape), dtype=np.float64)

@@ -40,8 +40,9 @@ from fingervision.vision.rigid_outline import LEAST_IN_VIEW, RigidFit, capture_r
 Array = NDArray[np.float64]
 
 LEAST_SIZE_ERROR, MOST_SIZE_ERROR, SURE = 1e-3, 0.01, 4.0
-"""Relative: printed parts are off by 0.2 % (mechanics.md, section 5), and a scale by no more; beyond 1 % it is another
-scale or drawing. And standard uncertainties at which an error of the size is none of the noise."""
+"""Smallest relative size error that is reported, largest that is accepted, and standard uncertainties from which on an
+error counts as significant. Printed parts are off by 0.2 % (mechanics.md, section 5), and a scale by no more; beyond 1
+% the scale or the drawing is wrong."""
 BODIES, GAPS = "bodies.csv", "gaps.csv"
 LAID_BY_ALL = (
     "no fixed body is in view: the drawing was laid by all bodies together, so that poses count from their mean place "
@@ -56,13 +57,13 @@ class BodiesMeasured:
     Parameters
     ----------
     path : Path
-        bodies.csv.
+        Path of bodies.csv.
     poses : list of FramePoses
-        Of every frame.
+        Poses of all bodies, for every frame.
     counts : mapping of str to Counter
-        Statuses of every body and hinge.
+        Number of frames with each status, for every body and hinge.
     placed : Placed or None
-        Where the drawing lies; None where no frame could be read.
+        Position of the drawing in the picture; None if no frame could be read.
     """
 
     path: Path
@@ -72,18 +73,19 @@ class BodiesMeasured:
 
 
 class BodyTracker:
-    """Follows the bodies of a mechanism from frame to frame.
+    """Tracks the bodies of a mechanism from frame to frame.
 
     Parameters
     ----------
     mechanism : Mechanism
         The drawing.
     scale : Scale
-        From pixels to millimetres; lens and plane of a calibration are taken off the outlines' points.
+        Conversion from pixels to millimetres; lens distortion and perspective of a calibration are removed from the
+        outlines' points.
     points : sequence of GivenPoint
-        Where points of the drawing lie in the first picture; none to find it by its silhouette.
+        Points of the drawing and their positions in the first picture; if empty, the silhouette is used.
     settings : Settings
-        How the recording is measured: which light a level is taken for.
+        Settings of the measurement, such as the camera response.
     """
 
     def __init__(
@@ -97,12 +99,12 @@ class BodyTracker:
         self.placed: Placed | None = None
 
     def poses(self, frames: Iterable[Frame | LostFrame]) -> Iterator[FramePoses]:
-        """Yield the poses of each frame; the first readable frame determines where the drawing lies.
+        """Yield the poses for each frame; the first readable frame determines the position of the drawing.
 
         Raises
         ------
         DataError, UsageError
-            The drawing cannot be laid on that frame, or the scale is for frames of another size.
+            If the drawing cannot be placed on that frame, or the scale is for frames of another size.
         """
         for item in frames:
             if isinstance(item, LostFrame):
@@ -119,7 +121,7 @@ class BodyTracker:
         return [*bodies, *(flexure.name for flexure in self.mechanism.flexures)]
 
     def _view(self, picture: Picture) -> EdgeView:
-        """How edges appear: edge bias widens a dark body by half of it on each side."""
+        """How edges appear: the edge bias widens a dark body by half of the bias on each side."""
         dark = self.placed is None or self.placed.body_is_dark
         outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
         flat, shared_pixels = flat_map_of(self.scale), picture.shared_pixels
@@ -166,7 +168,7 @@ class BodyTracker:
         self._check_size(grey, index, self._view(picture))
 
     def _check_size(self, grey: Array, index: int, view: EdgeView) -> None:
-        """Compare the sizes of the bodies with the drawing: a difference means a wrong scale, or another mechanism."""
+        """Compare the sizes of the bodies with the drawing; a difference means a wrong scale or another mechanism."""
         fits = [self._fit(grey, [], number, view) for number in range(len(self.outlines))]
         self._note_shadows([o.body.name for o, fit in zip(self.outlines, fits, strict=True)
                             if fit is not None and fit.by_shadows.any()], index)  # fmt: skip
@@ -199,7 +201,7 @@ class BodyTracker:
         self.placed = replace(self.placed, notes=(*self.placed.notes, words))
 
     def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
-        """Fit from the pose in the last frame, or else by a search from farther away."""
+        """Fit a body's motion from its pose in the last frame, or else by a search from farther away."""
         dark = self.placed is not None and self.placed.body_is_dark
         chunks, about, last = self._chunks[number], self._about[number], self._last[number]
         found = fit_rigid(grey, chunks, about, dark, last, view)
@@ -250,7 +252,7 @@ class BodyTracker:
         return COVERED if inside.size and inside.mean() >= LEAST_IN_VIEW else OUT_OF_VIEW
 
     def _hinges(self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose]) -> dict[str, SeenPose]:
-        """Angles of hinges: rotation of the body beyond a hinge against the body before it."""
+        """Angles of hinges: rotation of the body on one side of a hinge relative to the body on the other side."""
         found = {}
         for joint in self._joints:
             flexure, (first, last) = joint.flexure, (body.name for body in joint.bodies)
@@ -284,22 +286,22 @@ def measure_bodies(
     out: Path,
     settings: Settings | None = None,
 ) -> BodiesMeasured:
-    """Measure the bodies of a recording into bodies.csv, and add them to the rows of an existing gaps.csv.
+    """Measure the bodies of a recording into bodies.csv, and add columns for them to an existing gaps.csv.
 
     Parameters
     ----------
     source : iterable of Frame or LostFrame
-        The recording; read once.
+        The recording; its frames are read once, in order.
     mechanism : Mechanism
         The drawing.
     scale : Scale
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
     points : sequence of GivenPoint
-        Where points of the drawing lie in the first picture; none to find it by its silhouette.
+        Points of the drawing and their positions in the first picture; if empty, the silhouette is used.
     out : Path
         Folder of the results.
     settings : Settings or None
-        How the recording is measured; plain ones where None.
+        Settings of the measurement; None for the defaults.
     """
     tracker = BodyTracker(mechanism, scale, points, settings)
     poses = list(tracker.poses(source))

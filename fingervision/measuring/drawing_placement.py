@@ -1,4 +1,4 @@
-"""Place a drawing on a picture: by its silhouette, or by two or three points given in both."""
+"""Place a drawing on a picture: by its silhouette, or by two or three points given in picture and drawing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,26 +16,28 @@ from fingervision.vision.rigid_outline import RigidFit, capture_rigid, halved
 Array = NDArray[np.float64]
 
 TURNS = 36
-"""Directions that are tried: 10 degrees apart, half of which every thin bar still overlaps itself."""
+"""Number of directions tried: they are 10 degrees apart, and at half of that every thin bar still overlaps itself."""
 GRID = 160
-"""Points along the picture's longer side at which silhouettes are compared."""
+"""Grid points along the picture's longer side for the comparison of silhouettes."""
 SKIPPED = 2
-"""Of these, every second one is looked at for a first idea of the direction."""
+"""Only every second grid point is used for the first estimate of the direction."""
 LEAST_OVERLAP = 0.7
-"""Common share of the area of picture and drawing (intersection over union) below which a drawing is not this one."""
+"""Least overlap (intersection over union) of the areas of picture and drawing; below it the picture shows something
+else."""
 AS_GOOD = 0.03
-"""Difference of that share within which two ways of laying a drawing are as good: blur and a moved finger give it."""
+"""Difference of overlap within which two placements count as equally good: blur and a moved finger cause as much."""
 ALIKE = 0.9
-"""Share at which two ways of laying the drawing are one and the same picture, which is then symmetric: bars of 50 px
-that lie half a point of the grid apart have that much in common."""
+"""Overlap of two placements with each other above which they are the same, so that the picture is symmetric: bars of 50
+px that are half a grid step apart overlap this much."""
 APART_RAD = 0.35
 LEVELS = 4
-"""Times that the picture is halved for the first fit: edges are then found from up to 50 px away."""
+"""Number of times the picture is halved for the first fit: edges up to 50 px away are then found."""
 LEAST_LAID = 0.6
-"""Of the chunks in view of what the drawing is laid by: with less, something covers it, or edges of a shadow are taken
-for its own, and all poses would count from there."""
+"""Least share of the chunks in view that must be found for a placement: with less, the bodies are covered, or edges of
+a shadow are taken for theirs, and all poses would refer to a wrong placement."""
 OTHER_SCALE = 0.1
-"""Relative: a given point is set to a few pixels in some hundred."""
+"""Largest relative difference between the scale of given points and the stated scale: points are given to a few pixels
+in some hundred."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +47,9 @@ class GivenPoint:
     Parameters
     ----------
     x_px, y_px : float
-        In the picture.
+        Position in the picture.
     x_mm, y_mm : float
-        In the drawing.
+        Position in the drawing.
     """
 
     x_px: float
@@ -63,11 +65,11 @@ class Placed:
     Parameters
     ----------
     place : Placement
-        Where.
+        Position, rotation and scale of the drawing.
     body_is_dark : bool
-        Whether the mechanism is darker than its ground.
+        Whether the mechanism is darker than the background.
     notes : tuple of str
-        What a reader must know.
+        Remarks that a reader must know.
     """
 
     place: Placement
@@ -76,7 +78,7 @@ class Placed:
 
 
 def parse_point(text: str) -> GivenPoint:
-    """Read `X,Y=XMM,YMM`.
+    """Parse a point given as `X,Y=XMM,YMM`.
 
     Raises
     ------
@@ -94,7 +96,10 @@ def parse_point(text: str) -> GivenPoint:
 
 
 def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | None = None) -> Placement:
-    """Place a drawing by points; two leave its front towards the camera, three also determine which side is seen.
+    """Place a drawing by given points.
+
+    With two points the front of the drawing is assumed to face the camera; three points also determine which side is
+    seen.
 
     Raises
     ------
@@ -127,7 +132,7 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
 
 
 def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: FlatMap | None = None) -> Placed:
-    """Place a drawing so that its silhouette covers what is dark, or light, in the picture.
+    """Place a drawing so that its silhouette covers what is dark, or what is light, in the picture.
 
     Raises
     ------
@@ -189,18 +194,18 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Laid:
-    """A drawing placed by its edges.
+    """A drawing placed by a fit of its edges.
 
     Parameters
     ----------
     place : Placement
-        Where.
+        Position, rotation and scale of the drawing.
     fit : RigidFit
-        The fit of these edges, counted from where the drawing was thought to lie.
+        Fit of the edges, relative to the initial placement.
     about_px : ndarray of float, shape (2,)
-        The point about which it was fitted, where it was found, on the flat plane.
+        Point about which the rotation was fitted, at its fitted position in the undistorted plane.
     by_fixed : bool
-        Whether they are those of fixed bodies.
+        Whether the fitted edges are those of fixed bodies.
     """
 
     place: Placement
@@ -212,9 +217,9 @@ class Laid:
 def refined(
     grey: Array, outlines: Sequence[BodyOutline], place: Placement, body_is_dark: bool, view: EdgeView = PLAIN
 ) -> Laid | None:
-    """Refine the placement by the edges of the fixed bodies, or of all bodies where no fixed one is in view.
+    """Refine the placement by the edges of the fixed bodies, or of all bodies if no fixed body is in view.
 
-    None where too few edges are found.
+    None is returned if too few edges are found.
     """
     height, width = grey.shape
     cut = [outline.chunks(place) for outline in outlines]
@@ -242,7 +247,7 @@ def together(parts: Sequence[Chunks]) -> Chunks:
 
 
 def levels_of(grey: Array, mechanism: Mechanism, place: Placement) -> tuple[float, float]:
-    """Median level of the mechanism, and of its background."""
+    """Median level of the mechanism in the picture, and of the background."""
     height, width = grey.shape
     step = max(1, max(width, height) // GRID)
     inside = silhouette(mechanism, place, width, height, step) > 0.5
@@ -289,7 +294,7 @@ def _wrapped(angle: float) -> float:
 def _climbed(
     mask: NDArray[np.bool_], mechanism: Mechanism, place: Placement, size: tuple[int, int, int], overlap: float
 ) -> tuple[float, Placement]:
-    """Turn and shift a drawing as long as its overlap with the mask grows, with steps that are halved."""
+    """Rotate and shift a drawing as long as its overlap with the mask grows, with steps that are halved."""
     width, height, step = size
     turn, shift = np.pi / TURNS, 6.0 * step
     while shift > 0.5 * step:

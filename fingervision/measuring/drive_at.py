@@ -34,14 +34,14 @@ def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
     Parameters
     ----------
     drive : DriveHistory
-        Times increase over the whole table.
+        Drive history whose times increase over the whole table.
     time_s : float
-        On the drive's clock.
+        Time on the drive's clock.
 
     Returns
     -------
     DriveState or None
-        None where no run brackets the instant.
+        None if no run brackets the instant.
     """
     after = int(np.searchsorted(drive.time_s, time_s, side="left"))
     if after == drive.time_s.size:

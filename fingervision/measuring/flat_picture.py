@@ -1,4 +1,4 @@
-"""Lens and plane of a calibration, as a map between the picture and the plane without perspective and distortion."""
+"""Lens and plane of a calibration as a map between the picture and the plane without perspective and distortion."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,8 @@ from fingervision.vision.outline_chunks import FlatMap
 Array = NDArray[np.float64]
 
 FOLDED_PX = 0.5
-"""A point that does not come back to itself lies where the lens's polynomial folds over: it is in no picture."""
+"""Largest error of mapping a point forth and back: beyond it the lens's distortion polynomial is not invertible, and
+the point lies in no picture."""
 NOWHERE_PX = -1e6
 
 
@@ -23,7 +24,7 @@ class FlatPicture:
     Parameters
     ----------
     calibration : Calibration
-        With a lens, a plane or both.
+        Calibration that includes a lens, a plane or both.
     """
 
     calibration: Calibration
@@ -33,7 +34,7 @@ class FlatPicture:
         return self.calibration.flatten(points.T).T
 
     def to_picture(self, points: Array) -> Array:
-        """Apply lens distortion and perspective; a point that the lens cannot show is put far outside the picture."""
+        """Apply lens distortion and perspective; points that the lens cannot image are mapped far outside."""
         seen = self.calibration.unflatten(points.T).T
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             apart = np.hypot(*(self.to_flat(seen) - points))

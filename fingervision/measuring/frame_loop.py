@@ -1,4 +1,4 @@
-"""Measure every frame of a recording in order, and pass on its rows as they come."""
+"""Measure every frame of a recording in order, and pass on the rows as soon as they are complete."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -36,18 +36,18 @@ SeeItem = Callable[[Frame | LostFrame, Result], None]
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A recording with the settings of its measurement, each completed from the other.
+    """A recording with the settings of its measurement, each completed by information from the other.
 
     Parameters
     ----------
     description : Description
-        The recording, with notes on what its camera and the scale's have in common.
+        Description of the recording, with notes that compare its camera with that of the scale.
     settings : Settings
-        What vision needs.
+        Settings for the image processing.
     row_maker : RowMaker
-        From pixels to rows.
+        Conversion of results from pixels to rows.
     frames : (int, int) or None
-        First and last frame that are measured; None measures all.
+        First and last frame to be measured; None measures all.
     """
 
     description: Description
@@ -57,7 +57,7 @@ class Prepared:
 
 
 def prepared(description: Description, task: Task) -> Prepared:
-    """Collect what is known of a recording before its frames are read."""
+    """Collect the information on a recording that is known before its frames are read."""
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
     # What is stored without loss may have come compressed from the camera.
@@ -86,22 +86,22 @@ def measure_frames(
     Parameters
     ----------
     source : FrameSource
-        Read once, by a thread of its own.
+        Recording, read once, by a separate thread.
     how : Prepared
-        As `prepared` gives it.
+        Result of `prepared`.
     series : GapSeries
-        Takes in every row.
+        Series to which every row is added.
     take_rows : callable
-        Given results with their rows, many frames at once, in order; also what came before an error.
+        Called with results and their rows, many frames at once, in order; also with those before an error.
     see_item : callable or None
-        Given every frame, also a lost one, with its result.
+        Called with every frame, also a lost one, and its result.
     on_progress : callable or None
-        Called now and then with the frames done and the frames that the source announces.
+        Called at intervals with the number of frames done and the number that the source announces.
 
     Returns
     -------
     bool
-        Whether the user stopped it before the recording's end; everything until then was handed over.
+        Whether the user stopped the measurement before the recording's end; all rows up to then were passed on.
     """
     description = how.description
     marks = lost_frames(description.files)

@@ -1,4 +1,4 @@
-"""Uncertainty budget of each gap: the scale's contributions, and those of each picture."""
+"""Uncertainty budget of each gap: contributions of the scale, and of each picture."""
 
 from collections.abc import Sequence
 
@@ -20,20 +20,21 @@ RESPONSE = "assumed camera response"
 def gap_budget(measured: Sequence[GapMeasurement], scale: Scale) -> Budget:
     """Every contribution to the standard uncertainty of each gap; its `u_mm` is `u_gap_mm` of gaps.csv.
 
-    Squares of independent contributions add (JCGM 100:2008, equation 10). A bare scale has no uncertainty; then only
-    the contributions of the pictures are listed, and their sum is not the uncertainty of the gap in mm.
+    The squares of independent contributions add (JCGM 100:2008, equation 10). A bare scale (pixels per millimetre
+    without calibration) has no stated uncertainty; then only the contributions of the pictures are listed, and their
+    sum is not the uncertainty of the gap in mm.
 
     Parameters
     ----------
     measured : sequence of GapMeasurement
-        n of them, at least one.
+        At least one measurement; n is their number.
     scale : Scale
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
 
     Returns
     -------
     Budget
-        With parts of shape (n,), in millimetres; those that change from frame to frame are not `shared`.
+        Budget with parts of shape (n,), in millimetres; parts that change from frame to frame are not `shared`.
     """
     u_random_px = np.array([m.u_gap_px for m in measured], dtype=float)
     u_shift_mm = np.array([m.u_shift_px for m in measured], dtype=float) / scale.px_per_mm

@@ -1,4 +1,4 @@
-"""Figure of the gap over time with its uncertainty."""
+"""Plot of the gap over time with its uncertainty."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -27,12 +27,12 @@ Floats = NDArray[np.float64]
 def draw_gap(
     path: Path, series: GapSeries, drive: DriveHistory | None = None, clock: ClockOffset | float | None = None
 ) -> None:
-    """Draw the gap into a file; see `gap_figure`.
+    """Draw the plot of the gap into a picture file; see `gap_figure`.
 
     Raises
     ------
     OutputError
-        The picture cannot be written.
+        If the picture cannot be written.
     """
     figure = gap_figure(series, drive, clock)
     part = path.with_name(f".{path.name}.part")
@@ -50,10 +50,10 @@ def draw_gap(
 def gap_figure(
     series: GapSeries, drive: DriveHistory | None = None, clock: ClockOffset | float | None = None
 ) -> Figure:
-    """Draw the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
+    """Plot the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
 
-    Frames without a number are marked along the lower edge. With a drive and its clock offset, the input is drawn over
-    the gap on the recording's clock, and the offset is stated above.
+    Frames without a measured gap are marked along the lower edge. With a drive and its clock offset, the input is drawn
+    over the gap on the recording's clock, and the offset is stated above the plot.
     """
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
@@ -68,7 +68,7 @@ def draw_gap_axes(
     drive: DriveHistory | None = None,
     clock: ClockOffset | float | None = None,
 ) -> None:
-    """Draw the gap into the upper axes, its expanded uncertainty into the lower ones; see `gap_figure`."""
+    """Plot the gap into the upper axes, and its expanded uncertainty into the lower axes; see `gap_figure`."""
     where, where_not, label = _axis(series)
     pieces = _pieces(series)
     gap_mm, expanded_um = series.gap_mm, COVERAGE_FACTOR * 1e3 * series.u_mm
@@ -104,7 +104,7 @@ def draw_gap_axes(
 
 
 def _draw_input(axes: Axes, drive: DriveHistory, clock: ClockOffset | float) -> None:
-    """Draw the input on the recording's clock, with an axis of its own at the right, and state the offset."""
+    """Plot the input on the recording's clock, with a separate axis on the right, and state the clock offset."""
     if isinstance(clock, ClockOffset):
         times = clock.recording_time_s(drive.time_s)
         said = f"clock offset {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion"
@@ -120,7 +120,7 @@ def _draw_input(axes: Axes, drive: DriveHistory, clock: ClockOffset | float) -> 
 
 
 def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
-    """Positions of frames with and without a number along the axis, and the axis label."""
+    """Positions of frames with and without a measured gap along the axis, and the axis label."""
     times = series.times_s()
     if times is not None:
         return (*times, "time (s)")
@@ -129,7 +129,7 @@ def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
 
 
 def _pieces(series: GapSeries) -> list[slice]:
-    """Stretches of frames without a hole, because no line is drawn across missing frames."""
+    """Stretches of successive frames with a gap, because no line is drawn across missing frames."""
     frames, _ = series.frame_numbers()
     if not frames.size:
         return []
@@ -140,7 +140,7 @@ def _pieces(series: GapSeries) -> list[slice]:
 
 
 def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats, series: GapSeries, *, named: bool) -> None:
-    """Draw one stretch; only the first is named in the legend."""
+    """Plot one stretch; only the first stretch is named in the legend."""
     band_words = "U = 2 u" if series.has_budget else "U = 2 u (from frame to frame)"
     gap_label, band_label = ("gap", band_words) if named else (None, None)
     low, high = gap_mm - expanded_mm, gap_mm + expanded_mm
@@ -165,7 +165,7 @@ def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats, series
 
 
 def _thinned(where: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Keep the largest value in each column of the picture."""
+    """Keep the largest value in each pixel column of the plot."""
     if values.size <= MOST_POINTS:
         return where, values
     starts = _starts(values.size)

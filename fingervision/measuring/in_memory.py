@@ -29,27 +29,27 @@ class MeasuredInMemory:
     source : FrameSource
         The recording.
     task : Task
-        What was measured.
+        Settings of the measurement.
     how : Prepared
-        What was known before.
+        Information known before the measurement.
     rows : tuple of GapRow
-        One a frame.
+        One row per frame.
     results : tuple of Result
-        One a frame, in pixels.
+        One result per frame, in pixels.
     series : GapSeries
         The gap over time.
     clock : ClockOffset, NoClockOffset or None
-        The drive's, where its offset was to be found.
+        Relation to the drive's clock, if the offset was to be found.
     summary : dict
-        As in summary.json.
+        Content of summary.json.
     first_frame : Frame or None
         The first picture that could be read.
     stopped : bool
-        Whether the user stopped it before the recording's end.
+        Whether the user stopped the measurement before the end of the recording.
     refusal : DataError or None
-        Why the drive gave no frame an input, where there is a drive and it gave none.
+        Reason why the drive gave no frame an input; None if it did, or there is no drive.
     gauge_rows : tuple of GaugeRow
-        What the gauges read; as in gauges.csv.
+        Results of the gauges, as in gauges.csv.
     """
 
     source: FrameSource
@@ -67,16 +67,16 @@ class MeasuredInMemory:
 
 
 def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | None = None) -> MeasuredInMemory:
-    """Measure a recording from its first frame to its last, and write nothing.
+    """Measure a recording from its first frame to its last, without writing files.
 
     Parameters
     ----------
     source : FrameSource
-        The recording; it must end.
+        The recording; it must have an end.
     task : Task
-        What shall be measured.
+        Settings of the measurement.
     on_progress : callable or None
-        Called now and then with the frames done and the frames that the source announces.
+        Called at intervals with the number of frames done and the number that the source announces.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
 
 
 def _with_drive(row: GapRow, task: Task, clock: ClockOffset) -> GapRow:
-    """Add the drive's state at a frame's time, rounded as in gaps.csv."""
+    """Add the drive's state at a frame's time to the frame's row, rounded as in gaps.csv."""
     if row.time_s is None or task.drive is None:
         return row
     found = drive_at(task.drive, clock.log_time_s(round(row.time_s, TIME_PLACES)))

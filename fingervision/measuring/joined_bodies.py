@@ -1,4 +1,4 @@
-"""Check that bodies joined by a flexure are still joined: one that is not was taken for something that looks like it.
+"""Detect bodies that were mistaken for something else, because flexures could not join them where they were measured.
 
 A flexure bends but is hardly stretched. In pure bending its chord lies along the bisector of the directions in which
 it leaves the two bodies, and is shorter than the flexure by the square of the bending angle over 24; a shear force adds
@@ -18,24 +18,25 @@ from fingervision.models.mechanism_bodies import LinkBody
 Array = NDArray[np.float64]
 
 LONGEST, SHORTEST = 1.1, 0.6
-"""Chord over the flexure's length. Polymers yield at strains of 2 to 5 %, and a bending body moves the ends of its
-flexures some per cent otherwise than a rigid one; an arc of 3 rad has a chord of 0.66."""
+"""Range of the ratio of a flexure's chord to its length. Polymers yield at strains of 2 to 5 %, and the ends of a
+flexure on a deforming body move a few per cent differently from those on a rigid body; an arc of 3 rad has a chord of
+0.66."""
 MOST_ACROSS, MOST_ACROSS_NECK = 0.3, 0.1
-"""Displacement across the chord over the flexure's length: a leaf guided in parallel is used up to a fifth, and the thin
-part of a notch is a third of its length, so that shear moves it by a third of that."""
+"""Displacement across the chord over the flexure's length: a leaf guided in parallel is used up to a fifth of it. The
+part of a notch that bends is a third of its length, and is moved by up to a third of that."""
 SURE = 4.0
-"""Standard uncertainties of the distance: 1 of 16 000 by chance."""
+"""Number of standard uncertainties of the distance that is exceeded in 1 of 16 000 cases by chance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """A flexure and the two bodies that it joins, the one before it first."""
+    """A flexure and the two bodies that it joins, in the order of its axis."""
 
     flexure: Flexure
     bodies: tuple[LinkBody, LinkBody]
 
     def is_torn(self, poses: Mapping[str, SeenPose]) -> bool:
-        """Whether two measured bodies lie where this flexure cannot join them; False where one was not measured."""
+        """Whether the flexure cannot join the bodies at their measured poses; False if one of them was not measured."""
         half, ends, turned, variance = self.flexure.half_length_mm, [], 0.0, 0.0
         for body, along in zip(self.bodies, (-half, half), strict=True):
             pose = poses[body.name]
@@ -44,8 +45,8 @@ class Joint:
             turn = 1e-3 * pose.angle_mrad
             c, s = np.cos(turn), np.sin(turn)
             arm = np.array(self.flexure.point_mm(along, 0.0)) - body.centroid_mm
-            ends.append(body.centroid_mm + (pose.x_mm, pose.y_mm) + np.array([c * arm[0] - s * arm[1],
-                                                                              s * arm[0] + c * arm[1]]))  # fmt: skip
+            moved = np.array([pose.x_mm + c * arm[0] - s * arm[1], pose.y_mm + s * arm[0] + c * arm[1]])
+            ends.append(body.centroid_mm + moved)
             turned += 0.5 * turn
             variance += float(pose.random[0, 0] + pose.random[1, 1])
             variance += float(pose.random[2, 2]) * 1e-6 * float(arm @ arm)
@@ -59,11 +60,11 @@ class Joint:
 
 
 def torn_off(joints: Sequence[Joint], poses: Mapping[str, SeenPose]) -> set[str]:
-    """Names of the bodies that lie where their flexures cannot join them to the others.
+    """Names of the bodies whose measured poses do not fit the flexures that join them to the others.
 
-    A fixed body is where it was drawn. Of the others, the one with the largest share of its flexures torn is left out,
-    and of several the one with the most of them, until the rest is joined; where two are alike in both, it is not known
-    which of them was mistaken, and both are left out.
+    Fixed bodies are taken to be at their drawn positions. The other body with the largest share of violated flexures
+    (at equal shares, the one with the largest number) is left out; this is repeated until the remaining bodies are
+    joined. If two bodies are equal in both respects, it is not known which of them was mistaken, and both are left out.
     """
     found: set[str] = set()
     while True:

@@ -1,4 +1,4 @@
-"""Mark those frames of a recording as lost that were lost while it was recorded."""
+"""Insert markers for frames that were lost while the recording was made."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,19 +13,19 @@ TICKS_AFTER = 3
 
 
 def marked(source: Iterable[Frame | LostFrame], marks: Sequence[LostFrame]) -> Iterator[Frame | LostFrame]:
-    """Insert lost frames at the times at which they belong, or between the recording's frames.
+    """Insert lost frames into a recording, according to their times.
 
     Parameters
     ----------
     source : iterable of Frame or LostFrame
         The recording.
     marks : sequence of LostFrame
-        With times, in order.
+        Lost frames with times, in order.
 
     Yields
     ------
     Frame or LostFrame
-        Counted anew.
+        Frames and lost frames in order, numbered again.
     """
     waiting = deque(marks)
     index = 0

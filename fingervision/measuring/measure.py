@@ -1,4 +1,4 @@
-"""Measure a recording: write the gap over time, a summary and a figure."""
+"""Measure a recording: write the gap over time, a summary and a plot."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -33,15 +33,15 @@ class Measured:
     Parameters
     ----------
     folder : OutputFolder
-        The files.
+        Folder with the written files.
     series : GapSeries
         The gap over time.
     summary : dict
-        As in summary.json.
+        Content of summary.json.
     stopped : bool
-        Whether the user stopped it before the recording's end.
+        Whether the user stopped the measurement before the end of the recording.
     has_gauge_numbers : bool
-        Whether any gauge gave a number.
+        Whether any gauge gave a value.
     """
 
     folder: OutputFolder
@@ -66,16 +66,16 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     source : FrameSource
         The recording; read once, by a thread of its own.
     task : Task
-        What shall be measured.
+        Settings of the measurement.
     out : Path
         Folder for the results; see `claimed`.
     on_progress : callable, optional
-        Called now and then with the frames done and the frames that the source announces.
+        Called at intervals with the number of frames done and the number that the source announces.
 
     Returns
     -------
     Measured
-        Also where the user stopped it: everything until then is in the files.
+        The result; if the user stopped the measurement, everything measured until then is in the files.
 
     Raises
     ------
@@ -146,12 +146,12 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
 
 
 def refuse_camera(source: FrameSource) -> None:
-    """Refuse a source that does not end.
+    """Refuse a source without an end.
 
     Raises
     ------
     UsageError
-        The source is a camera or a stream.
+        If the source is a camera or a stream.
     """
     if hasattr(source, "received"):
         raise UsageError(

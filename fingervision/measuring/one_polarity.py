@@ -1,8 +1,8 @@
 """Decide once per recording whether the fingers are darker or lighter than the background.
 
-Where the user has not stated it, the first frames decide by majority. A finger does not change its tone within a
-recording. A frame in which the bright regions left and right of a dark object look like two light fingers is no
-measurement of the fingers.
+If the user has not stated the polarity, the first frames decide by majority, because fingers do not change from dark to
+light within a recording. This excludes frames in which the bright regions on either side of a dark object look like two
+light fingers.
 """
 
 from collections import Counter
@@ -25,24 +25,25 @@ def one_polarity(
     votes: Counter[str],
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> Iterator[tuple[Frame | LostFrame, Outcome]]:
-    """Measure frames in order, all with the polarity of most of the first frames that have a number.
+    """Measure frames in order, all with the polarity found in most of the first frames that have a measured gap.
 
     Parameters
     ----------
     frames : iterable of Frame or LostFrame
-        The recording; read once.
+        The recording; its frames are read once, in order.
     settings : Settings
-        Where they state the polarity, it stays.
+        Settings of the measurement; a polarity stated in them is kept.
     votes : Counter of str
-        Takes in how many of the first frames show `dark` and `light` fingers.
+        Counter to which the numbers of first frames with `dark` and `light` fingers are added.
     is_stopped : callable
-        Asked after every frame; when it says so no more frames are read, and what was measured is still handed over.
+        Called after every frame; if it returns True no more frames are read, and the frames measured so far are still
+        yielded.
 
     Yields
     ------
     (Frame or LostFrame, GapMeasurement or NoGap or LostFrame)
-        Every frame with what it says. The first ones come once they have voted; until a frame has a number, those
-        without one come at once.
+        Every frame with its result. The first frames with a gap are yielded after all of them have voted; frames
+        without a gap that come before these are yielded at once.
     """
     source = iter(frames)
     if settings.fingers_are_dark is None:

@@ -1,4 +1,4 @@
-"""Check that the camera has the settings at which it was calibrated."""
+"""Check that the camera has the same settings as at its calibration."""
 
 from collections.abc import Mapping
 
@@ -8,19 +8,19 @@ from fingervision.measuring.scale import Scale
 
 
 def other_camera(scale: Scale | None, camera: Mapping[str, str]) -> str:
-    """Sentence naming the settings that differ from the calibration's.
+    """Sentence that names the camera settings that differ from those of the calibration.
 
     Parameters
     ----------
     scale : Scale or None
-        A bare scale knows no camera.
+        Scale of the measurement; a bare scale contains no camera settings.
     camera : mapping of str to str
-        Settings, as far as they are known.
+        Camera settings of the recording, as far as known.
 
     Returns
     -------
     str
-        A sentence; empty where nothing that both state differs.
+        A sentence; empty if no setting known for both differs.
     """
     if isinstance(scale, Calibration):
         try:

@@ -1,4 +1,4 @@
-"""Steps after the last frame: find the drive's clock, write the summary, and explain frames without input."""
+"""Steps after the last frame: find the drive's clock, write the summary, and explain frames without an input."""
 
 from collections.abc import Set
 from dataclasses import replace
@@ -18,17 +18,17 @@ Clock = ClockOffset | NoClockOffset | None
 
 
 def clock_for(series: GapSeries, task: Task) -> Clock:
-    """Find the drive's clock from the motion; None where there is no drive, or its offset was given."""
+    """Find the offset of the drive's clock from the motion; None without a drive, or if the offset was given."""
     return None if task.drive is None or task.drive_offset_s is not None else clock_of(series, task.drive)
 
 
 def clock_drawn(clock: Clock, task: Task) -> ClockOffset | float | None:
-    """The clock with which the figure draws the drive: found, given, or none."""
+    """Clock offset with which the plot shows the drive: found, given, or None."""
     return clock if isinstance(clock, ClockOffset) else task.drive_offset_s
 
 
 def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, complete: bool) -> dict[str, Any]:
-    """Compose summary.json of a recording; `complete` tells whether it was measured to its end."""
+    """Compose summary.json of a recording; `complete` states whether it was measured to its end."""
     description = how.description
     if isinstance(clock, ClockOffset):
         description = replace(description, notes=(*description.notes, sentence(clock), *clock.notes))
@@ -38,25 +38,25 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
 
 
 def undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[bool], where: str) -> DataError | None:
-    """Sentence why the drive gave no frame an input; None where it gave some, or there is no drive.
+    """Error that explains why the drive gave no frame an input; None if it gave some, or there is no drive.
 
     Parameters
     ----------
     task : Task
-        With the drive.
+        Settings of the measurement, with the drive.
     series : GapSeries
         The gap over time.
     clock : ClockOffset, NoClockOffset or None
-        As `clock_for` gives it.
+        Result of `clock_for`.
     driven : set of bool
-        Whether rows got an input, as far as the offset was given.
+        Whether rows received an input, if the offset was given.
     where : str
-        Where the gaps are, for the sentence.
+        Place of the table of gaps, for the sentence.
 
     Returns
     -------
     DataError or None
-        The offset was not found, or the one that was given leaves no frame within the drive's times.
+        Error for an offset that was not found, or for a given offset that leaves no frame within the drive's times.
     """
     if isinstance(clock, NoClockOffset) and series.counts[Status.OK]:
         return refusal(clock, where)

@@ -1,4 +1,4 @@
-"""The folder for results: it is created if needed, and files of other programs in it are never replaced."""
+"""The folder for results: it is created if needed, and files of other programs in it are never overwritten."""
 
 import shutil
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ class OutputFolder:
 
     @property
     def gaps(self) -> Path:
-        """The table."""
+        """Path of the table of gaps, gaps.csv."""
         return self.path / GAPS
 
     @property
@@ -34,7 +34,7 @@ class OutputFolder:
 
     @property
     def summary(self) -> Path:
-        """The summary."""
+        """Path of summary.json."""
         return self.path / SUMMARY
 
     @property
@@ -54,14 +54,14 @@ class OutputFolder:
 
 
 def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
-    """Create the folder, or take over that of an earlier measurement and remove its files.
+    """Create the folder for results, or take over that of an earlier measurement and remove its files.
 
     Parameters
     ----------
     path : Path
         The folder.
     recording_files : tuple of Path
-        What is measured; none of it may be replaced, and results may not lie among the images.
+        Files of the recording; none of them may be overwritten, and results may not lie among a recording's images.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
 
 
 def _is_ours(table: Path) -> bool:
-    """Whether a table starts with the header that only a measurement writes."""
+    """Whether a table starts with the header that only this program writes."""
     if not table.is_file():
         return False
     with table.open("rb") as file:
@@ -113,7 +113,7 @@ def held(out: Path) -> Iterator[None]:
 
 
 def usual_folder(recording: str) -> Path:
-    """Return measured/<file or folder>; for a glob its folder's name; with more of the path where the name is taken."""
+    """Return measured/<file or folder>; for a glob its folder's name; with more of the path if the name is in use."""
     path = Path(recording)
     named = path.resolve() if path.exists() else path.parent.resolve()
     parts = [part for part in named.parts if part != named.anchor] or ["images"]

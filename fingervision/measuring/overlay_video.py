@@ -1,4 +1,4 @@
-"""overlay.mp4: the recording with the measured edges drawn in, at the recording's own times."""
+"""Write overlay.mp4: the recording with the measured edges drawn in, at the recording's own times."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -26,14 +26,15 @@ OPTIONS = {"crf": "20", "preset": "veryfast"}
 class OverlayVideo:
     """Writes the overlay frame by frame.
 
-    Frames that could not be decoded are left out, and so is a frame whose time is not later than the previous one's.
+    Frames that could not be decoded are left out, and so are frames whose time is not later than that of the frame
+    before.
 
     Parameters
     ----------
     path : Path
-        The video.
+        Path of the video.
     description : Description
-        Of the recording.
+        Description of the recording.
 
     Raises
     ------
@@ -77,7 +78,7 @@ class OverlayVideo:
         row: GapRow,
         draw_more: Callable[[NDArray[np.uint8]], None] | None = None,
     ) -> None:
-        """Draw one frame and write it; `draw_more` draws into the same picture."""
+        """Draw the result into one frame and write it; `draw_more` draws into the same picture."""
         time_s = frame.index / SHOWN_AT_HZ if frame.time_s is None else frame.time_s
         if self._first_s is None:
             self._first_s = min(0.0, time_s)  # a video cannot start before 0
@@ -105,7 +106,7 @@ class OverlayVideo:
 
 
 def words_of_row(row: GapRow) -> str:
-    """Frame, time and value in a line, with U = 2 u; u is the random part where no budget is known."""
+    """Frame, time and gap in one line, with U = 2 u; without an uncertainty budget, u is the random part."""
     place = f"{row.frame}" if row.time_s is None else f"{row.frame}  {row.time_s:.3f} s"
     if row.gap_mm is None or row.u_random_mm is None:
         return f"{place}  {row.status.value}"

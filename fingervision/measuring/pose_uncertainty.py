@@ -1,8 +1,8 @@
 """Uncertainty of a body's pose: from its own edges in each frame, and from errors common to all frames.
 
-Common errors are those of the drawing's placement (itself a fit), the scale, the edge bias, lens and plane. A pose is
-counted from the drawing, so that an error of the scale grows with the distance from the features by which the drawing
-was placed.
+Common errors are those of the drawing's placement in the picture (itself a fit), the scale, the edge bias, lens and
+plane. A pose is measured relative to the drawing, so that the effect of a scale error grows with the distance from the
+edges by which the drawing was placed.
 """
 
 from dataclasses import dataclass
@@ -25,15 +25,15 @@ class SharedErrors:
     Parameters
     ----------
     laid : RigidFit or None
-        The fit by which the drawing was laid; None where it was laid exactly.
+        Fit by which the drawing was placed; None if it was placed exactly.
     about_px : ndarray of float, shape (2,)
-        The point about which it was fitted, on the flat plane.
+        Point about which the rotation was fitted, in the undistorted plane.
     plane : PlaneScale or None
-        The calibration with its budget; None where nothing is known of it.
+        Calibration with its uncertainty budget; None if not known.
     u_response_px : float
-        What an unknown camera response leaves open of where an edge is seen.
+        Standard uncertainty of the edges' positions due to an unknown camera response.
     size_error : float
-        By how much bodies are seen larger or smaller than drawn: an error of the scale, or of the drawing.
+        Relative difference of the bodies' sizes from the drawing: an error of the scale, or of the drawing.
     """
 
     laid: RigidFit | None
@@ -43,7 +43,7 @@ class SharedErrors:
     size_error: float = 0.0
 
     def at(self, size_px: tuple[int, int]) -> tuple[float, float]:
-        """Standard uncertainties of edges' positions (px) and of sizes (relative), in the centre of a picture."""
+        """Standard uncertainties of edge positions (px) and of sizes (relative), at the centre of a picture."""
         if self.plane is None:
             return 0.0, self.size_error
         return self.plane.u_edge_px(self.u_response_px), self._relative((0.5 * size_px[0], 0.5 * size_px[1]))
@@ -59,11 +59,11 @@ class SharedErrors:
         Parameters
         ----------
         fit : RigidFit
-            The body's motion.
+            Fit of the body's motion.
         about_px : ndarray of float, shape (2,)
-            Its reference point where it is drawn, on the flat plane.
+            Drawn position of the body's reference point, in the undistorted plane.
         in_picture : ndarray of float, shape (2,)
-            The same point as the picture shows it now.
+            Present position of the reference point in the picture.
         """
         arm = about_px + fit.shift_px - self.about_px
         # A drawing that was laid off by a shift and a turn puts the body's reference point off by both.
@@ -88,13 +88,13 @@ class SharedPose:
     Parameters
     ----------
     placed : ndarray of float, shape (3, 3)
-        Covariance by where the drawing was laid.
+        Covariance due to the placement of the drawing.
     by_bias, by_scale : ndarray of float, shape (3,)
-        What one standard uncertainty of the edges' bias and of the scale does.
+        Change of the pose by one standard uncertainty of the edge bias, and of the scale.
     by_shadows : ndarray of float, shape (3, 3)
-        Covariance by what may lie along some of the body's own edges.
+        Covariance due to possible shadows along some of the body's own edges.
     u_angle_rad : float
-        What tilt and lens leave open of an angle.
+        Standard uncertainty of an angle due to camera tilt and lens.
     """
 
     placed: Array
@@ -118,7 +118,7 @@ class SharedPose:
     def u_turn_against(self, other: "SharedPose") -> float:
         """Standard uncertainty, common to all frames, of the angle between two bodies (rad).
 
-        The placement's error cancels.
+        The error of the drawing's placement cancels in this angle.
         """
         bias = float(self.by_bias[2] - other.by_bias[2])
         scale = float(self.by_scale[2] - other.by_scale[2])
@@ -127,7 +127,7 @@ class SharedPose:
 
 
 def in_drawing(place: Placement) -> Array:
-    """Matrix that converts (x px, y px, rad) of the flat plane to (x mm, y mm, mrad) of the drawing's axes."""
+    """Matrix that converts (px, px, rad) in the undistorted plane to (mm, mm, mrad) in the drawing's axes."""
     into = np.zeros((3, 3))
     into[:2, :2] = place.axes.T / place.px_per_mm
     into[2, 2] = 1e3 * place.turn_sign

@@ -1,4 +1,4 @@
-"""Warm-up: measure rendered frames first, so that no real frame waits for one-time initialisation."""
+"""Warm-up: measure rendered frames first, so that no real frame is delayed by one-time initialisation."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ BELOW_TIP_PX, GAP_PX, FRAME_PX = 10.0, 60.0, (320, 240)
 
 
 def rehearse() -> None:
-    """Measure a drawn frame with the tips in every direction, and compute the filter tables for every blur."""
+    """Measure a rendered frame with the tips in every direction, and compute the filter tables for every blur."""
     for direction in Direction:
         scene = two_fingers(
             GAP_PX, below_tip_px=BELOW_TIP_PX, radius_px=BELOW_TIP_PX, frame=FRAME_PX, direction=direction

@@ -1,4 +1,4 @@
-"""The camera response of a recording, and the uncertainty that arises where it is assumed instead of measured."""
+"""The camera response of a recording, and the uncertainty if it is assumed instead of measured."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,11 +14,11 @@ from fingervision.measuring.scale import Scale
 
 
 def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDArray[np.float64]:
-    """Standard uncertainty of each gap from an assumed camera response, shape (n,) (mm).
+    """Standard uncertainty of each gap due to an assumed camera response, shape (n,) (mm).
 
-    The same response also displaced the edges in the calibration's pictures. That displacement is contained in the
-    calibration's edge bias, or in its budget; only the difference to this recording's edges remains. A calibration that
-    does not state its response is taken to have used the response of the recording.
+    An error of the response also displaced the edges in the calibration's pictures. That displacement is contained in
+    the calibration's edge bias, or in its budget; only its difference from that of this recording's edges remains. If a
+    calibration does not state its response, it is taken to be that of the recording.
     """
     if not isinstance(scale, Calibration) or scale.response_shift_px is None:
         return np.zeros(len(measured))
@@ -31,19 +31,19 @@ def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDA
 def choose_response(
     stated: CameraResponse | None, scale: Scale, files: tuple[Path, ...]
 ) -> tuple[CameraResponse, CameraResponse | None, str]:
-    """Choose the response of a recording, an alternative that is also possible, and a warning if needed.
+    """Choose the response of a recording, another response that is also possible, and a warning if needed.
 
-    The order is: what the user states, what the calibration states, the recording's own tag; without any of these the
-    response is taken as linear.
+    The response stated by the user has priority, then that stated by the calibration, then the recording's own tag;
+    without any of these the response is taken as linear.
 
     Returns
     -------
     response : CameraResponse
-        What the levels are taken for.
+        Response by which levels are converted to light.
     other : CameraResponse or None
-        What they may be as well; None where the response is known.
+        Another possible response; None if the response is known.
     words : str
-        A warning; empty where there is none.
+        A warning; empty if none is needed.
     """
     calibrated = scale.camera_response if isinstance(scale, Calibration) else None
     known = isinstance(scale, Calibration) and scale.response_known

@@ -1,4 +1,4 @@
-"""From measurements in pixels to the rows of the table, many frames at once."""
+"""Convert measurements in pixels to rows of the table, many frames at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,11 +21,11 @@ class Result:
     Parameters
     ----------
     index : int
-        Place in the recording.
+        Number of the frame in the recording.
     time_s : float or None
         Presentation time.
     outcome : GapMeasurement, NoGap or LostFrame
-        The number, or why there is none.
+        The measured gap, or the reason why there is none.
     """
 
     index: int
@@ -34,24 +34,24 @@ class Result:
 
 
 def result_of(item: Frame | LostFrame, outcome: GapMeasurement | NoGap | LostFrame) -> Result:
-    """Keep what the table needs of a frame, without its picture."""
+    """Keep what the table needs from a frame and its result, without the picture."""
     return Result(item.index, item.time_s, outcome)
 
 
 @dataclass(frozen=True, slots=True)
 class RowMaker:
-    """Turns results into rows of gaps.csv.
+    """Converts results to rows of gaps.csv.
 
     Parameters
     ----------
     scale : Scale
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
     frame_size_px : (int, int)
         Width and height of the frames.
     drive : DriveHistory or None
         The recorded input.
     drive_offset_s : float
-        What is added to the drive's times to get the recording's.
+        Offset that is added to the drive's times to give times of the recording.
     """
 
     scale: Scale
@@ -60,7 +60,7 @@ class RowMaker:
     drive_offset_s: float = 0.0
 
     def rows(self, results: Sequence[Result]) -> list[GapRow]:
-        """Rows in the order of the results, all converted by the scale in one call."""
+        """Rows in the order of the results; the scale converts all of them in one call."""
         measured = [result.outcome for result in results if isinstance(result.outcome, GapMeasurement)]
         millimetres = iter(self._millimetres(measured))
         return [
@@ -69,7 +69,7 @@ class RowMaker:
         ]
 
     def _millimetres(self, measured: Sequence[GapMeasurement]) -> list[tuple[float, float | None, float, float, float]]:
-        """Gap, its uncertainty, the random part, left and right, for each measurement."""
+        """Gap, standard uncertainty, its random part, left and right position (all in mm), for each measurement."""
         if not measured:
             return []
         points = np.array([((m.left.x_px, m.left.y_px), (m.right.x_px, m.right.y_px)) for m in measured], dtype=float)
@@ -143,7 +143,7 @@ class RowMaker:
         )
 
     def _held(self, outcome: GapMeasurement | NoGap | LostFrame) -> tuple[float | None, float | None]:
-        """Width of a held part; the part between dark fingers is bounded by the same edges as the gap."""
+        """Width of a held part and its uncertainty; between dark fingers, its edges are those of the gap."""
         held = None if isinstance(outcome, LostFrame) else outcome.held
         if held is None:
             return None, None

@@ -1,4 +1,4 @@
-"""Write a recording that was measured in memory to the files that the command writes."""
+"""Write a recording measured in memory to the same files as the command writes."""
 
 from pathlib import Path
 
@@ -23,20 +23,20 @@ from fingervision.storage.summary_json import refuse_other_recording, write_summ
 def save_measured(
     found: MeasuredInMemory, again: FrameSource, out: Path, *, overlay: bool = False, steps_frame: int | None = None
 ) -> OutputFolder:
-    """Write gaps.csv, summary.json, gap.png and, where asked, overlay.mp4 and steps/.
+    """Write gaps.csv, summary.json, gap.png and, if requested, overlay.mp4 and steps/.
 
     Parameters
     ----------
     found : MeasuredInMemory
-        What was measured.
+        The measured recording.
     again : FrameSource
-        The same recording, from which pictures are read once more where they are asked for.
+        The same recording, from which pictures are read again if needed.
     out : Path
-        The folder.
+        Folder for the results.
     overlay : bool
         Whether to write overlay.mp4.
     steps_frame : int or None
-        The frame of which every step is written.
+        Number of the frame of which every step is written as a picture.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def save_measured(
 
 
 def _draw_overlay(found: MeasuredInMemory, again: FrameSource, path: Path) -> None:
-    """Draw the overlay video; gauges are measured again, because they follow the frames in order."""
+    """Draw the overlay video; gauges are measured again, because they track features from frame to frame."""
     description, task = found.how.description, found.task
     marks = lost_frames(found.source.description.files)
     frames = marked(again, marks) if marks else again

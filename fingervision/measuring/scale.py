@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 def check_px_per_mm(px_per_mm: float) -> None:
-    """Refuse a stated scale that is outside of any camera's range.
+    """Refuse a stated scale outside the range of real cameras.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def check_px_per_mm(px_per_mm: float) -> None:
 
 
 class Scale(Protocol):
-    """From pixels to millimetres; see `calib.calibration.BareScale` for shapes and units."""
+    """Conversion from pixels to millimetres; see `calib.calibration.BareScale` for shapes and units."""
 
     @property
     def px_per_mm(self) -> float:
@@ -39,7 +39,7 @@ class Scale(Protocol):
 
     @property
     def edge_bias_px(self) -> float:
-        """The calibration's b: width that a light gap between straight dark edges loses in the picture (pixels)."""
+        """Edge bias b of the calibration: loss of width of a light gap between straight dark edges (pixels)."""
         ...
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
@@ -49,7 +49,7 @@ class Scale(Protocol):
     def positions_mm(
         self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
     ) -> Floats:
-        """Coordinates of both points of each distance along an axis, from the picture's centre, in mm."""
+        """Coordinates (mm) along an axis, from the picture's centre, of the two points of each distance."""
         ...
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:

@@ -1,4 +1,4 @@
-"""The gap over time, kept as a few numbers per frame, so that an hour of video needs a few megabytes."""
+"""Series of gaps over time, with a few numbers per frame, so that an hour of video needs a few megabytes."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class FirstBad:
     Parameters
     ----------
     frame : int
-        Place in the recording.
+        Number of the frame in the recording.
     time_s : float or None
         Presentation time, where it is known.
     words : str
-        What happened to it, in a sentence.
+        Sentence that says what happened to the frame.
     """
 
     frame: int
@@ -48,18 +48,18 @@ class GapSeries:
     Parameters
     ----------
     counts : Counter of Status
-        Frames with each status.
+        Number of frames with each status.
     first_without : dict of Status to FirstBad
-        The first frame with each status but ok, and why.
+        First frame with each status other than ok, and the reason.
     fingers : Counter of str
-        Frames with dark and with light fingers.
+        Number of frames with dark and with light fingers.
     beside : Counter of str
-        Frames in which something stands beside the edges or has moved them, by what it is; rough edges and fields of
-        interlaced pictures among them.
+        Number of frames with a disturbance of the edges, by kind of disturbance; kinds include rough edges and
+        interlaced fields.
     votes : Counter of str
-        The same among the first frames, before they agreed on one answer.
+        Number of dark and light results among the first frames, before the polarity was decided.
     has_budget : bool
-        Whether the scale said how surely it is known.
+        Whether the scale has an uncertainty budget.
     """
 
     counts: Counter[Status] = field(default_factory=Counter)
@@ -122,7 +122,7 @@ class GapSeries:
 
     @property
     def frames(self) -> int:
-        """Number of frames so far, with or without a gap."""
+        """Number of frames so far, including those without a gap."""
         return sum(self.counts.values())
 
     @property
@@ -137,7 +137,7 @@ class GapSeries:
 
     @property
     def u_mm(self) -> NDArray[np.float64]:
-        """Standard uncertainty of each gap (mm): the whole budget, or the random part where no budget is known."""
+        """Standard uncertainty of each gap (mm): all contributions, or the random part if no budget is known."""
         return np.array(self._u_mm)
 
     @property
@@ -152,26 +152,26 @@ class GapSeries:
 
     @property
     def response_px(self) -> NDArray[np.float64]:
-        """Change of each gap if the camera's response were the alternative one (pixels).
+        """Change of each gap (pixels) if the camera response were the other possible one.
 
-        0 where the response is known.
+        It is 0 if the response is known.
         """
         return np.array(self._response_px)
 
     def times_s(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Give the times of the frames with and without a gap; None where frames have no times."""
+        """Times of the frames with, and of those without, a gap; None if frames have no times."""
         times, bad = np.array(self._time_s), np.array(self._bad_time_s)
         if np.isnan(times).any() or times.size + np.count_nonzero(~np.isnan(bad)) == 0:
             return None
         return times, bad[~np.isnan(bad)]
 
     def frame_numbers(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Numbers of the frames with and without a gap."""
+        """Numbers of the frames with, and of those without, a gap."""
         return np.array(self._frame, dtype=np.int64), np.array(self._bad_frame, dtype=np.int64)
 
 
 def _beside(outcome: object) -> list[str]:
-    """Name the disturbances that were found beside the edges."""
+    """Names of the disturbances found at the edges of a measurement."""
     if not isinstance(outcome, GapMeasurement):
         return []
     seen = [outcome.beside] if outcome.beside else []

@@ -1,9 +1,9 @@
 """Distinguish a real jump of the fingers from picture damage that the decoder did not report.
 
-A jump alone is no damage, since stages make steps. Visible blocks alone are no damage either, since coarse coding shows
-them. A picture is taken for damaged if the measured position jumps and squares of the codec's grid appear that are
-neither in the previous picture nor in that picture moved along with the fingers. All pictures coded as differences to
-it are damaged as well.
+A jump alone does not prove damage, because stages make steps. Visible blocks alone do not prove damage either, because
+coarse coding makes them visible. A picture counts as damaged if the measured position jumps and squares of the codec's
+grid appear that are neither in the previous picture nor in that picture shifted with the fingers. All later pictures
+that are coded as differences from a damaged picture are damaged as well.
 """
 
 from dataclasses import dataclass
@@ -38,14 +38,14 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sound:
-    """The last frame accepted as sound, its result and its number."""
+    """The last frame accepted as undamaged, with its result and its number."""
 
     frame: Frame
     outcome: GapMeasurement
 
 
 class SoundPictures:
-    """Checks the frames of one recording in order; losslessly stored frames have checksums, and pass."""
+    """Checks the frames of one recording in order; losslessly stored frames have checksums and are not checked."""
 
     def __init__(self) -> None:
         self._last: _Sound | None = None
@@ -53,19 +53,19 @@ class SoundPictures:
         self._is_broken = False
 
     def judged(self, frame: Frame, outcome: GapMeasurement | NoGap) -> GapMeasurement | NoGap | LostFrame:
-        """Return the result of a frame, or state that it is damaged.
+        """Return the result of a frame, or report the frame as damaged.
 
         Parameters
         ----------
         frame : Frame
             The picture.
         outcome : GapMeasurement or NoGap
-            What was measured in it.
+            Result of the measurement.
 
         Returns
         -------
         GapMeasurement, NoGap or LostFrame
-            The same, or that the frame is damaged.
+            The same result, or a lost frame if the frame is damaged.
         """
         if frame.coding is Coding.LOSSLESS:
             return outcome
@@ -81,7 +81,7 @@ class SoundPictures:
         return outcome
 
     def _jumps(self, frame: Frame, outcome: GapMeasurement | NoGap) -> bool:
-        """Whether a position departs from the motion of the two previous frames, or cannot be compared with it."""
+        """Whether a position deviates from the motion in the two previous frames, or cannot be compared with it."""
         last, before = self._last, self._before
         if last is None or before is None or not isinstance(outcome, GapMeasurement):
             return True
@@ -95,7 +95,7 @@ class SoundPictures:
 
 
 def _points(outcome: GapMeasurement) -> tuple[Points, Points]:
-    """Edge and tip of both fingers, each along its own axis, and their standard uncertainties (pixels)."""
+    """Edge and tip of both fingers, each with its coordinate and its standard uncertainty (pixels)."""
     sides = (outcome.left, outcome.right)
     vertical = outcome.direction.is_vertical
     across = [side.x_px if vertical else side.y_px for side in sides]
@@ -106,7 +106,7 @@ def _points(outcome: GapMeasurement) -> tuple[Points, Points]:
 
 
 def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> bool:
-    """Whether the picture contains squares that the last sound picture lacks, both as it was and moved."""
+    """Whether the picture shows codec squares that are missing in the last undamaged picture, shifted or not."""
     if frame.pixels.shape != last.frame.pixels.shape:
         return False
     rows, columns = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)
@@ -124,7 +124,7 @@ def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> 
 
 
 def _part(outcome: GapMeasurement, frame: Frame) -> tuple[slice, slice]:
-    """Region of a measurement, in whole blocks of the codec's grid."""
+    """Region of the picture that contains the measurement, in whole blocks of the codec's grid."""
     sides = (outcome.left, outcome.right)
     vertical = outcome.direction.is_vertical
     across = [side.x_px if vertical else side.y_px for side in sides]
@@ -152,7 +152,7 @@ def _levels(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> Levels:
 
 
 def _moved(levels: Levels, before: GapMeasurement, now: GapMeasurement) -> Levels:
-    """Move each finger's half of a picture by the displacement of that finger."""
+    """Shift each finger's half of a picture by the displacement of that finger."""
     vertical = now.direction.is_vertical
     middle = 0.5 * ((now.left.x_px + now.right.x_px) if vertical else (now.left.y_px + now.right.y_px))
     halves = []

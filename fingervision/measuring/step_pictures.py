@@ -1,4 +1,4 @@
-"""One picture for each processing step, numbered in order."""
+"""Write one picture for each processing step, numbered in order."""
 
 import re
 from collections.abc import Sequence
@@ -21,21 +21,21 @@ def write_steps(
     frame : Frame
         The frame.
     settings : Settings
-        As for its measurement.
+        Settings of the measurement.
     folder : Path
-        Made if it is not there.
+        Folder for the pictures; created if missing.
     more : sequence of (str, ndarray)
         Names and pictures of further steps.
 
     Returns
     -------
     tuple of Path
-        The pictures in order.
+        Paths of the pictures, in order.
 
     Raises
     ------
     OutputError
-        A picture cannot be written.
+        If a picture cannot be written.
     """
     written = []
     try:

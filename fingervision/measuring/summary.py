@@ -1,4 +1,4 @@
-"""The summary of a measurement: counts, sizes, uncertainties, and what these do not include."""
+"""The summary of a measurement: counts, lengths, uncertainties, and what the uncertainties do not include."""
 
 import hashlib
 from collections.abc import Mapping
@@ -44,7 +44,8 @@ BESIDE = {
 }
 BYTES_AT_ONCE = 1 << 20
 LEAST_BITS_A_PIXEL = 0.05
-"""H.264 at 1 Mbit/s of 640x480 at 25 Hz has 0.13 and is measured (tests/benchmarks/accuracy.py); at 0.4 it has this."""
+"""Bits per pixel below which compression may hide the fingers: H.264 at 1 Mbit/s of 640x480 at 25 Hz has 0.13 and can
+be measured (tests/benchmarks/accuracy.py); at 0.4 Mbit/s it has 0.05."""
 HIDDEN_BY_COMPRESSION = (
     Status.NO_FINGERS,
     Status.ONE_FINGER,
@@ -63,18 +64,18 @@ def summarise(
     *,
     complete: bool,
 ) -> dict[str, Any]:
-    """Put together summary.json.
+    """Compose the content of summary.json.
 
     Parameters
     ----------
     description : Description
         The recording.
     settings : mapping
-        What the user chose.
+        Settings of the user.
     scale : Scale
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
     scale_file : Path or None
-        Where the scale was read from.
+        Path from which the scale was read.
     series : GapSeries
         The gap over time.
     complete : bool
@@ -83,7 +84,7 @@ def summarise(
     Returns
     -------
     dict
-        Only what JSON knows; None for what is not known.
+        Content that JSON can represent; None for unknown values.
     """
     first = series.first_damaged
     return {
@@ -124,7 +125,7 @@ def summarise(
 
 
 def _about_unseen(description: Description, series: GapSeries) -> list[str]:
-    """Warning where compression may hide the fingers, so that light, region and focus would be the wrong advice."""
+    """Warning for a compression that may hide the fingers, for which other advice (light, focus) would be wrong."""
     count = sum(series.counts[status] for status in HIDDEN_BY_COMPRESSION)
     pixels = series.frames * description.width_px * description.height_px
     if not (description.lossy and count and pixels):
@@ -140,7 +141,7 @@ def _about_unseen(description: Description, series: GapSeries) -> list[str]:
 
 
 def _about_fingers(series: GapSeries) -> list[str]:
-    """Warning where the frames disagree about whether the fingers are dark or light."""
+    """Warning if frames disagree about whether the fingers are dark or light."""
     if len(series.votes) < 2:
         return []
     counts = " and ".join(f"{tone} in {count}" for tone, count in series.votes.most_common())
@@ -152,7 +153,7 @@ def _about_fingers(series: GapSeries) -> list[str]:
 
 
 def about_edges(series: GapSeries) -> list[str]:
-    """Sentences about disturbances beside the edges: which, in how many frames, and their remedy."""
+    """Sentences about disturbances of the edges: which kind, in how many frames, and the remedy."""
     return [
         f"In {count} {'frame' if count == 1 else 'frames'} {BESIDE[what]}"
         for what, count in series.beside.most_common()
@@ -250,7 +251,7 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
 def _sha256(files: tuple[Path, ...]) -> str | None:
     """Hash of one file's bytes; for several files, the hash of their names and hashes in order.
 
-    None for a live source.
+    None is returned for a live source.
     """
     if not files:
         return None

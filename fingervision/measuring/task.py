@@ -1,4 +1,4 @@
-"""Settings of a measurement of a recording or live view."""
+"""Settings of a measurement of a recording or of a live view."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -24,35 +24,35 @@ class Task:
     Parameters
     ----------
     scale : Scale
-        From pixels to millimetres.
+        Conversion from pixels to millimetres.
     scale_file : Path or None
-        The calibration that the scale was read from.
+        Calibration file from which the scale was read.
     below_tip_mm : float
         Height of measuring below each finger's tip.
     direction : Direction or None
-        Where the tips point; None finds out in every frame.
+        Direction in which the tips point; None determines it in every frame.
     region : Region or None
-        The part of the frame that is looked at.
+        The part of the frame that is measured; None for the whole frame.
     drive : DriveHistory or None
         The recorded input.
     drive_offset_s : float or None
-        Added to the drive's times to get the recording's; None finds it from the motion.
+        Offset that is added to the drive's times to give times of the recording; None finds it from the motion.
     overlay : bool
-        Whether a video is written with what was measured drawn in.
+        Whether a video with the measured edges drawn in is written.
     steps_frame : int or None
         The frame of which every step is written as a picture.
     response : CameraResponse or None
-        The camera's response, where the user knows it.
+        Camera response, if the user knows it.
     bits : int or None
-        Depth of levels that are stored in 16 bits; None finds it in every frame.
+        Bit depth of levels stored in 16 bits; None determines it in every frame.
     fingers_are_dark : bool or None
-        Whether the fingers are darker than the ground; None finds out in every frame.
+        Whether the fingers are darker than the background; None determines it from the first frames.
     is_outline : bool
-        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
+        Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
     frames : (int, int) or None
-        First and last frame that are measured, counted from 0, both included; None measures all.
+        First and last frame to be measured, counted from 0, both included; None measures all.
     gauges : tuple of Gauge
-        What is measured beside the gap; none by default.
+        Other measurements beside the gap; none by default.
     """
 
     scale: Scale
@@ -85,11 +85,11 @@ class Task:
 
     @property
     def settings(self) -> Settings:
-        """Settings for the image processing, without regard to the recording."""
+        """Settings for the image processing, as far as they do not depend on the recording."""
         return self.settings_for(())[0]
 
     def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
-        """Settings for the image processing of a recording made of these files, and a warning where there is one."""
+        """Settings for the image processing of a recording that consists of these files, and a warning if needed."""
         response, other, words = choose_response(self.response, self.scale, files)
         below_px = self.below_tip_mm * self.scale.px_per_mm
         settings = Settings(
@@ -113,14 +113,14 @@ class Task:
 
 
 def check_task(task: Task, description: Description) -> None:
-    """Refuse settings that are impossible for these frames.
+    """Refuse settings that are impossible for the given frames.
 
     Parameters
     ----------
     task : Task
-        What shall be measured.
+        Settings of the measurement.
     description : Description
-        What is known of the frames.
+        Known properties of the frames.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def check_task(task: Task, description: Description) -> None:
 
 
 def in_words(task: Task, settings: Settings) -> dict[str, Any]:
-    """The settings as listed in the summary."""
+    """The settings in the form in which the summary lists them."""
     region = task.region
     return {
         "below_tip_mm": task.below_tip_mm,

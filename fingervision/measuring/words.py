@@ -1,4 +1,4 @@
-"""The result of a measurement in sentences, as the command prints them, and in one line."""
+"""The result of a measurement as sentences, as the command prints them, and as one line."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ COVERAGE_FACTOR = 2.0
 
 
 def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
-    """Sentences with the number of measured frames, why others failed, the gap, its uncertainty, and what to change."""
+    """Sentences with the number of measured frames, reasons for the others, the gap, its uncertainty, and advice."""
     gap = summary["gap"]
     lines = [f"{gap['count']} of {series.frames} frames measured."]
     lines += [
@@ -36,7 +36,7 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
 
 
 def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
-    """Sentence about the error of an assumed response, where no budget includes it and it exceeds the uncertainty."""
+    """Sentence about the error due to an assumed response, if no budget includes it and it exceeds the uncertainty."""
     gap, settings = summary["gap"], summary["settings"]
     if settings.get("response_known", True) or gap["median_u_gap_mm"] is not None:
         return []

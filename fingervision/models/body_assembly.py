@@ -14,6 +14,7 @@ from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_faces import driven_components, nodes_on, supports_of, turns_with
 from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.point_in_mesh import element_weights
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -79,29 +80,18 @@ class BodyAssembly:
 
     def motion_mm(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
         """Displacement of a point of the nearest body, from the frames' motions."""
-        nearest = int(np.argmin(np.hypot(*(self.plate.nodes_mm - np.array(point)[:, None]))))
-        number = int(self.piece[nearest])
+        plate = self.plate
+        nodes, weights = element_weights(plate.nodes_mm, plate.nodes_of_triangles, point)
+        number = int(self.piece[nodes[0]])
         body, turning = self.bodies[number], self.turning[number]
         own = moved[body.unknowns]
         bent = body.shapes_mm @ (turning.strained(own) if large else own)
-        carried = self._interpolated(bent, point, self.piece == number)
+        carried = np.array([bent[plate.x_dofs[nodes]] @ weights, bent[plate.y_dofs[nodes]] @ weights])
         if not large:
             return float(carried[0]), float(carried[1])
         first = turning.places_mm[0]
         x, y = first + own[:2] + turned_axes(float(own[2])) @ (np.array(point) + carried - first) - np.array(point)
         return float(x), float(y)
-
-    def _interpolated(self, field: Array, point: tuple[float, float], own: NDArray[np.bool_]) -> Array:
-        """Interpolate a displacement field at a point, by a quadratic fitted to the 12 nearest nodes of one body."""
-        plate = self.plate
-        places = np.flatnonzero(own)
-        x, y = plate.nodes_mm[:, places] - np.array(point)[:, None]
-        near = places[np.argsort(np.hypot(x, y))[:12]]
-        x, y = plate.nodes_mm[:, near] - np.array(point)[:, None]
-        around = np.column_stack([np.ones(near.size), x, y, x**2, y**2, x * y])
-        scale = np.abs(around).max(axis=0)
-        return np.array([np.linalg.lstsq(around / scale, field[dofs[near]], rcond=None)[0][0] / scale[0]
-                         for dofs in (plate.x_dofs, plate.y_dofs)])  # fmt: skip
 
 
 class _Frames:

@@ -20,6 +20,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from fingervision.domain.gripper import Material
 from fingervision.models.driven_body import factorised
 from fingervision.models.plane_mesh import PlaneMesh
+from fingervision.models.point_in_mesh import element_weights
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -28,9 +29,6 @@ _ORDER = 3
 """Order of the polynomials through the depth for the in-plane components; one less for the out-of-plane component. The
 first mode of the published sample is then 0.04 % above that of order 5, and for hinges 1 to 20 times as wide as thick
 within 0.2 % of CalculiX's wedge elements (`tests/benchmarks/models_three_dimensions.py`); order 1 is 7 % too high."""
-
-_NEAREST = 12
-"""Number of nodes to which a quadratic is fitted: twice its number of coefficients."""
 
 
 class DeepPlate:
@@ -123,14 +121,10 @@ class DeepPlate:
         return lift
 
     def middle_mm(self, moved: Array, point: tuple[float, float]) -> float:
-        """Out-of-plane displacement of a point of the middle plane, by a quadratic fit about the nearest node (mm)."""
-        x, y = self.nodes_mm - np.array(point)[:, None]
-        near = np.argsort(np.hypot(x, y))[:_NEAREST]
-        x, y = x[near], y[near]
-        values = moved[self.coefficients(near, 2)].reshape(near.size, -1) @ _even_at_middle(len(self._shapes[2]))
-        around = np.column_stack([np.ones(near.size), x, y, x**2, y**2, x * y])
-        scale = np.abs(around).max(axis=0)
-        return float(np.linalg.lstsq(around / scale, values, rcond=None)[0][0] / scale[0])
+        """Out-of-plane displacement of a point of the middle plane (mm)."""
+        nodes, weights = element_weights(self.nodes_mm, self._basis.element_dofs, point)
+        values = moved[self.coefficients(nodes, 2)].reshape(nodes.size, -1) @ _even_at_middle(len(self._shapes[2]))
+        return float(weights @ values)
 
     def supported(self, held: Indices) -> "SupportedPlate":
         """Return the plate with the given coefficients fixed to zero."""

@@ -133,14 +133,21 @@ def column_name(name: str) -> str:
 
 
 def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
-    """Name every piece by the first named shape that lies mostly in it; pieces without one are numbered."""
+    """Name every piece by the first named shape that has more than half of its area in it.
+
+    A piece without one is named by a shape that has no larger part elsewhere, such as a bar that a notch halves; what
+    is left is numbered.
+    """
     names: dict[int, str] = {}
+    halved: dict[int, str] = {}
     polygons = [_polygon(loop) for loop in pieces]
     for (added, shape), name in zip(mechanism.bodies, mechanism.body_names, strict=False):
         if added and name:
             points = _points_in(shape)
             share = [int(polygon.holds(points).sum()) for polygon in polygons]
-            names.setdefault(int(np.argmax(share)), column_name(name))
+            mostly = 2 * max(share) > points.shape[1]
+            (names if mostly else halved).setdefault(int(np.argmax(share)), column_name(name))
+    names = halved | names
     found: list[str] = []
     for number in range(len(pieces)):
         name = names.get(number, f"body_{number + 1}")

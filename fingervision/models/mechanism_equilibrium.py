@@ -114,6 +114,10 @@ class DrivenMechanism:
         moved = self.unit_displacement
         return float(moved @ (self.stiffness_n_mm @ moved))
 
+    def under_load(self, load_n: Array) -> Array:
+        """Small displacements under loads, one or a column each, with the drive fixed."""
+        return np.asarray(self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ load_n)))
+
     def touch_inputs_mm(self) -> list[float | None]:
         """Input nearest to zero at which each contact pair first touches, for small displacements (mm).
 
@@ -157,7 +161,7 @@ class DrivenMechanism:
         """Gaps at rest of the nodes that may touch, the gaps' derivatives, displacements for unit contact forces."""
         gap, sparse, _ = self._all_gaps(self.gaps, np.zeros(self.by_input.size))
         slope = np.where(np.isfinite(gap)[:, None], sparse.toarray(), 0.0)
-        return gap, slope, self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ slope.T))
+        return gap, slope, self.under_load(slope.T)
 
     def _by_pair(self, forces: Array) -> tuple[Array, ...]:
         sizes = [gaps(np.zeros(self.by_input.size))[0].size for gaps in self.gaps]

@@ -2,6 +2,7 @@
 
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_frame import MechanismFrame
+from fingervision.models.mechanism_loads import operating_figures_of
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, out_of_plane
 
@@ -10,6 +11,8 @@ MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 
 def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     """Compute response per 1 mm of input, input range up to yield, inputs of first contact, natural frequencies.
+
+    Finite elements also have the effects of weight, warmth and a part held, and the motions out of the plane.
 
     Parameters
     ----------
@@ -30,6 +33,8 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     for name, (x, y) in unit.probes_mm.items():
         figures[f"{name}: x per input [mm/mm]"] = x
         figures[f"{name}: y per input [mm/mm]"] = y
+    for name, pose in unit.bodies.items():
+        figures[f"{name}: turn per input [mrad/mm]"] = pose.angle_mrad
     for name, value in unit.pairs_mm.items():
         figures[f"{name}: at rest [mm]"] = rest.pairs_mm[name]
         figures[f"{name}: per input [mm/mm]"] = value - rest.pairs_mm[name]
@@ -43,6 +48,7 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
         "model_error_stress_percent": 100.0 * model.stress_error,
     }
     if isinstance(model, MechanismPlate):
+        figures |= operating_figures_of(model)
         across = out_of_plane(model.mechanism)
         figures["first_out_of_plane_mode_hz"] = across.modes_hz[0]
         figures |= {f"{name}: sag out of the plane [mm]": value for name, value in across.sag_mm.items()}

@@ -166,24 +166,30 @@ class MechanismPlate:
         mechanism = self.mechanism
         found = self.driven.equilibrium(input_mm, large_rotation=large_rotation, contact=contact)
         moved = found.displacement
-        probes = {name: self._motion(moved, point) for name, point in mechanism.probes.items()}
+        probes = {name: (float(rows[0] @ moved), float(rows[1] @ moved)) for name, rows in self.probe_rows.items()}
         pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
-        stress = self.plate.von_mises_mpa(moved, large=large_rotation)[:, self._in_flexure]
         pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
-        return MechanismState(input_mm, found.force_n, probes, pairs, float(stress.max()), moved, pressed,
-                              plate_poses(self.plate, self.bodies, moved, large=large_rotation))  # fmt: skip
+        stress = self.stress_mpa(moved, large=large_rotation)
+        poses = plate_poses(self.plate, self.bodies, moved, large=large_rotation)
+        return MechanismState(input_mm, found.force_n, probes, pairs, stress, moved, pressed, poses)
 
-    def _motion(self, moved: Array, point: tuple[float, float]) -> tuple[float, float]:
-        """Displacement of a point, by quadratic interpolation between the nearest nodes."""
-        x, y = self.plate.nodes_mm
-        near = np.argsort(np.hypot(x - point[0], y - point[1]))[:12]
-        around = np.column_stack([np.ones(near.size), x[near] - point[0], y[near] - point[1],
-                                  (x[near] - point[0]) ** 2, (y[near] - point[1]) ** 2,
-                                  (x[near] - point[0]) * (y[near] - point[1])])  # fmt: skip
-        scale = np.abs(around).max(axis=0)
-        found = [np.linalg.lstsq(around / scale, moved[dofs[near]], rcond=None)[0][0] / scale[0]
-                 for dofs in (self.plate.x_dofs, self.plate.y_dofs)]  # fmt: skip
-        return float(found[0]), float(found[1])
+    def stress_mpa(self, moved: Array, *, large: bool = False) -> float:
+        """Largest von Mises stress in the flexures at given displacements (MPa)."""
+        return float(self.plate.von_mises_mpa(moved, large=large)[:, self._in_flexure].max())
+
+    @cached_property
+    def probe_rows(self) -> dict[str, Array]:
+        """Displacements to the motion along x and y of every probe, shape (2, unknowns) each."""
+        return {name: self.plate.rows_at(point) for name, point in self.mechanism.probes.items()}
+
+    @cached_property
+    def pair_rows(self) -> dict[str, Array]:
+        """Small displacements to the change of every pair's distance, shape (unknowns,) each."""
+        found = {}
+        for name, (a, b) in self.mechanism.pairs.items():
+            apart = np.array(self.mechanism.probes[b]) - self.mechanism.probes[a]
+            found[name] = apart @ (self.probe_rows[b] - self.probe_rows[a]) / np.hypot(*apart)
+        return found
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
         """First natural frequencies in the plane, with the drive fixed or free to move along its direction (Hz)."""
@@ -240,13 +246,11 @@ class MechanismPlate:
     def _observed(self, columns: Array) -> dict[str, tuple[float, Array]]:
         """Observables (pairs, then probes): value at rest, and its change by each column of displacements."""
         mechanism = self.mechanism
-        moved = {name: np.array([self._motion(column, point) for column in columns.T])
-                 for name, point in mechanism.probes.items()}  # fmt: skip
         observed = {}
-        for name, (a, b) in mechanism.pairs.items():
-            apart = np.array(mechanism.probes[b]) - mechanism.probes[a]
-            observed[f"{name}_mm"] = float(np.hypot(*apart)), (moved[b] - moved[a]) @ apart / np.hypot(*apart)
-        for name, ways in moved.items():
-            for axis, way in zip("xy", ways.T, strict=True):
-                observed[f"{name}_{axis}_mm"] = 0.0, way
+        for name, row in self.pair_rows.items():
+            a, b = (np.array(mechanism.probes[end]) for end in mechanism.pairs[name])
+            observed[f"{name}_mm"] = float(np.hypot(*(b - a))), row @ columns
+        for name, rows in self.probe_rows.items():
+            for axis, row in zip("xy", rows, strict=True):
+                observed[f"{name}_{axis}_mm"] = 0.0, row @ columns
         return observed

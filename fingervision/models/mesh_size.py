@@ -52,10 +52,16 @@ class SizeField:
     def at(self, points: Array) -> Array:
         """Edge length at points, shape (2, n)."""
         wanted = np.full(points.shape[1], self.body_mm)
+        # From the finest class on: a coarser one has nothing to say where the wanted length is smaller than its own.
         for tree, edge in self._classes:
-            way, place = tree.query(points.T, distance_upper_bound=self.body_mm / _GROWTH)
+            open_ = np.flatnonzero(wanted > edge.min())
+            if open_.size == 0:
+                break
+            reach = (float(wanted[open_].max()) - float(edge.min())) / _GROWTH
+            way, place = tree.query(points.T[open_], distance_upper_bound=reach)
             found = np.isfinite(way)
-            wanted[found] = np.minimum(wanted[found], edge[place[found]] + _GROWTH * way[found])
+            own = open_[found]
+            wanted[own] = np.minimum(wanted[own], edge[place[found]] + _GROWTH * way[found])
         return wanted
 
     @cached_property

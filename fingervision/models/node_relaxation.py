@@ -47,7 +47,7 @@ def seeded_nodes(region: PlanarRegion, field: SizeField, outline: Array) -> Arra
         found.append(centres[:, done][:, random.random(share.size) < share])
         rest = centres[:, ~done]
         # Squares that lie wholly outside are dropped where their middle is far from the outline and not inside.
-        near = tree.query(rest.T)[0] < 1.5 * side + 2.0 * field.at(rest) if rest.size else np.zeros(0, dtype=bool)
+        near = tree.query(rest.T)[0] < 1.5 * side + 2.0 * wanted[~done] if rest.size else np.zeros(0, dtype=bool)
         rest = rest[:, near | region.holds(rest)]
         side *= 0.5
         shifts = 0.5 * side * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
@@ -69,10 +69,11 @@ def relaxed_nodes(region: PlanarRegion, field: SizeField, outline: Array, inside
     """Move the inner nodes until the triangles are well shaped; return all nodes (outline first) and triangles."""
     fixed = outline.shape[1]
     points = np.concatenate([outline, inside], axis=1)
+    at_outline = field.at(outline)
     for _ in range(_ROUNDS):
         triangles = inner_triangles(region, points)
         edges = edges_of(triangles)
-        at_nodes = field.at(points)
+        at_nodes = np.concatenate([at_outline, field.at(points[:, fixed:])])
         wanted = 0.5 * (at_nodes[edges[0]] + at_nodes[edges[1]])
         for _ in range(_MOVES_A_ROUND):
             way = points[:, edges[0]] - points[:, edges[1]]

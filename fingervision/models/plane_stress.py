@@ -13,6 +13,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from skfem.helpers import dot, eye, mul, trace, transpose
 
 from fingervision.domain.gripper import Material
+from fingervision.models.point_in_mesh import element_weights
 from fingervision.models.triangulate import PlaneMesh
 from fingervision.models.width_effect import ConstrainedZone, held_moduli, shares_at
 
@@ -99,10 +100,21 @@ class PlaneStressPlate:
         return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
 
     @cached_property
+    def nodes_of_triangles(self) -> Indices:
+        """Corners, then middles of the edges, of every triangle as indices of `nodes_mm`, shape (6, m)."""
+        return np.vstack([self._mesh.t[:3], int(self._basis.nodal_dofs.shape[1]) + self._mesh.t2f])
+
+    def rows_at(self, point: tuple[float, float]) -> Array:
+        """Displacements to the motion along x and y of a point of the body, shape (2, unknowns)."""
+        nodes, weights = element_weights(self.nodes_mm, self.nodes_of_triangles, point)
+        rows = np.zeros((2, self.unknowns))
+        rows[0, self.x_dofs[nodes]] = rows[1, self.y_dofs[nodes]] = weights
+        return rows
+
+    @cached_property
     def unknowns_of_triangles(self) -> Indices:
         """Unknowns of every triangle, first along x, then along y; shape (m, 12)."""
-        corners, edges = self._mesh.t[:3], self._mesh.t2f
-        nodes = np.vstack([corners, int(self._basis.nodal_dofs.shape[1]) + edges])
+        nodes = self.nodes_of_triangles
         return np.ascontiguousarray(np.vstack([self.x_dofs[nodes], self.y_dofs[nodes]]).T)
 
     @cached_property
@@ -149,6 +161,8 @@ class PlaneStressPlate:
         # All points of a triangle in one product.
         along = strains.reshape(triangles, 3 * points, 12)
         elements = np.swapaxes(along, 1, 2) @ stressed.reshape(triangles, 3 * points, 12)
+        if not displacement_mm.any():
+            return self._assembled(elements, at_rest=True), np.zeros(self.unknowns)
         # The stress that is there already resists a turn: slope, stress, slope.
         sx, sy, txy = (stress[..., k, None] * weights[..., None] for k in range(3))
         pulled = np.stack([sx * dx + txy * dy, txy * dx + sy * dy], axis=2)
@@ -156,7 +170,7 @@ class PlaneStressPlate:
         turned = np.swapaxes(flat, 1, 2) @ pulled.reshape(triangles, 2 * points, 6)
         elements[:, :6, :6] += turned
         elements[:, 6:, 6:] += turned
-        return self._assembled(elements, at_rest=not displacement_mm.any()), self._collected(deformation, stress)
+        return self._assembled(elements, at_rest=False), self._collected(deformation, stress)
 
     def nodal_force_n(self, displacement_mm: Array) -> Array:
         """Nodal forces of the deformed plate without the tangent stiffness, at a tenth of the cost."""

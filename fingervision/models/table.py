@@ -44,17 +44,24 @@ class TableModel:
         lowest, highest = self.input_range_mm
         inside = input_mm.min() >= lowest and input_mm.max() <= highest
         beyond = None if inside else (np.minimum(input_mm - lowest, 0.0), np.maximum(input_mm - highest, 0.0))
+        right = self._at(input_mm, "right", self.right_mm, beyond)
+        left = -right if self._symmetric else self._at(input_mm, "left", self.left_mm, beyond)
+        force = None if self.force_n is None else self._at(input_mm, "force", self.force_n, beyond)
+        return Response(left, right, force)
 
-        def at(name: str, column: NDArray[np.float64]) -> NDArray[np.float64]:
-            found = np.interp(input_mm, self.input_mm, column)
-            if beyond is None:
-                return found
-            low, high = self._end_slopes[name]
-            return np.asarray(found + low * beyond[0] + high * beyond[1], dtype=np.float64)
-
-        right = at("right", self.right_mm)
-        left = -right if self._symmetric else at("left", self.left_mm)
-        return Response(left, right, None if self.force_n is None else at("force", self.force_n))
+    def _at(
+        self,
+        input_mm: NDArray[np.float64],
+        name: str,
+        column: NDArray[np.float64],
+        beyond: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+    ) -> NDArray[np.float64]:
+        """Interpolate one column; `beyond` is how far the inputs lie below and above the table."""
+        found = np.interp(input_mm, self.input_mm, column)
+        if beyond is None:
+            return found
+        low, high = self._end_slopes[name]
+        return np.asarray(found + low * beyond[0] + high * beyond[1], dtype=np.float64)
 
     @cached_property
     def _symmetric(self) -> bool:

@@ -1,7 +1,8 @@
-"""Scenes rendered as frames whose true geometry is known: the outline before blur, accurate to 0.001 px.
+"""Render scenes as frames with known true geometry: the outline before blurring, accurate to 0.001 px.
 
-The names below serve most uses; README.md explains how scenes are rendered and why the result is exact. Compression
-(`jpeg`, `clip`) and calibration objects (`targets`) are imported separately; the former need OpenCV and PyAV.
+The names below suffice for most purposes; README.md explains how scenes are rendered and why the result is exact.
+Compression (`jpeg`, `clip`) and calibration objects (`targets`) are imported separately; the compression modules need
+OpenCV and PyAV.
 """
 
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera

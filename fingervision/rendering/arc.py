@@ -21,12 +21,12 @@ class Arc:
 
     @property
     def start(self) -> tuple[float, float]:
-        """First point."""
+        """First point of the arc."""
         return self._at(0.0)
 
     @property
     def end(self) -> tuple[float, float]:
-        """Last point."""
+        """Last point of the arc."""
         return self._at(1.0)
 
     def _at(self, t: float) -> tuple[float, float]:
@@ -40,7 +40,7 @@ class Arc:
 
     @property
     def box_px(self) -> tuple[float, float, float, float]:
-        """Bounding box of the piece: least x, least y, greatest x, greatest y."""
+        """Bounding box of the arc: smallest x, smallest y, largest x, largest y."""
         # Besides its ends, an arc is outermost where it crosses an axis through its centre.
         quarters = sorted((self.start_rad / (pi / 2), (self.start_rad + self.sweep_rad) / (pi / 2)))
         passed = [quarter * pi / 2 for quarter in range(ceil(quarters[0]), floor(quarters[1]) + 1)]
@@ -77,6 +77,6 @@ class Arc:
         return Arc(x, y, self.radius_px, atan2(first_y - y, first_x - x), sweep)
 
     def grown(self, by_px: float) -> "Arc":
-        """Offset the piece parallel to itself, `by_px` further out."""
+        """Offset the piece parallel to itself by `by_px` outwards."""
         outwards = 1.0 if self.sweep_rad >= 0.0 else -1.0
         return Arc(self.x_px, self.y_px, self.radius_px + outwards * by_px, self.start_rad, self.sweep_rad)

@@ -1,6 +1,6 @@
 """Approximation of a smooth curve by circular arcs: two between each pair of points, with a common tangent.
 
-Everything that is drawn thus consists of lines and arcs, even an ellipse or the image of a line through a lens, so that
+Every rendered outline thus consists of lines and arcs, even an ellipse or the image of a line through a lens, so that
 parallel curves, intersections and areas have closed forms. Source: K. M. Bolton, Biarc curves, Computer-Aided Design
 7(2), 1975. The deviation from the curve falls with the third power of the spacing of the points, in proportion to the
 rate of change of the curvature.
@@ -51,7 +51,7 @@ def biarcs(points: Points, tangents: Points) -> tuple[Piece, ...]:
 
 
 def _arc(start: tuple[float, float], end: tuple[float, float], tangent: tuple[float, float]) -> Piece:
-    """Return the arc that leaves `start` in the direction of the unit vector `tangent` and reaches `end`."""
+    """Return the arc that starts at `start` in the direction of the unit vector `tangent` and ends at `end`."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     aside = tangent[0] * dy - tangent[1] * dx
     if abs(aside) < 4 * STRAIGHT_PX:

@@ -1,4 +1,4 @@
-"""The camera model: tilt, lens, blooming, blur and noise between the ideal scene and the frame."""
+"""The camera model: tilt, lens, edge bias, blur and noise between the ideal scene and the frame."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -13,32 +13,33 @@ LEAST_BLUR_PX = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """How the scene becomes a frame, in the order of the light's path.
+    """Camera model; the parameters are listed in the order in which they act on the light from the scene.
 
     Parameters
     ----------
     blur_px : float
-        Standard deviation of the Gaussian point spread, before pixels integrate.
+        Standard deviation of the Gaussian point spread function, before integration over the pixels.
     noise_grey : float
         Standard deviation of the white noise, in grey levels of 0..255, whatever the bit depth.
     shot_grey : float
-        Variance of the shot noise per grey level: a level g has the variance shot_grey * g.
+        Variance of the shot noise per grey level: at level g the variance is shot_grey * g.
     bloom_px : float
-        How far light spreads over every edge into the dark; a gap of light between dark fingers widens by twice that.
+        Distance by which light spreads over every edge into the dark; a light gap between dark fingers widens by twice
+        this distance.
     tilt : Tilt or None
-        Perspective of a plane that is not square to the optical axis.
+        Perspective of a plane that is not perpendicular to the optical axis.
     lens : RadialLens or None
         Radial distortion.
     bits : int
         8 or 16; with 16 bits a grey level g is 257 g, so that 255 is 65535.
     tint : (float, float, float) or None
-        None gives grey frames; three factors give frames of red, green and blue. The noise is that of the luma, the
-        same in all three.
+        None gives grey frames; three factors give colour frames (red, green and blue). The noise is that of the luma,
+        equal in all three channels.
 
     Raises
     ------
     FingervisionError
-        A blur, noise or depth that no camera has.
+        If a blur, noise or bit depth is not possible for a camera.
     """
 
     blur_px: float = 0.9
@@ -69,7 +70,7 @@ class Camera:
             raise DataError(msg)
 
     def sees(self, outlines: tuple[Outline, ...], width_px: int, height_px: int) -> tuple[Outline, ...]:
-        """Map outlines from the ideal picture to the camera's picture, by tilt and lens; without blooming and blur."""
+        """Map outlines from the ideal picture to the camera's picture by tilt and lens, without edge bias and blur."""
         if self.tilt is None and self.lens is None:
             return outlines
         view = View(self.lens or RadialLens(), self.tilt or Tilt(), width_px, height_px)
@@ -77,4 +78,4 @@ class Camera:
 
 
 IDEAL_CAMERA = Camera()
-"""No tilt and no lens: what it sees is the ideal picture itself."""
+"""Camera without tilt and lens distortion, whose picture is the ideal picture itself."""

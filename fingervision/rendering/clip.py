@@ -1,4 +1,4 @@
-"""Video clips: frames with their own times, coded by a camera's codec into a video file."""
+"""Video clips: frames with their own times, compressed by a codec into a video file."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -69,18 +69,18 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
     Parameters
     ----------
     path : Path
-        The container goes by its suffix: .mp4, .mov or .mkv.
+        Path of the file; its suffix (.mp4, .mov or .mkv) determines the container format.
     frames : iterable of Frame
-        All of one size, with increasing times.
+        Frames of one size, with increasing times.
     codec : H264, Mjpeg or Ffv1
-        How they are compressed.
+        Compression.
 
     Raises
     ------
     DataError
-        Times are missing or do not increase, sizes change, or the clip is empty.
+        If times are missing or do not increase, sizes change, or the clip is empty.
     OutputError
-        The file cannot be written, or the container or codec cannot hold the frames.
+        If the file cannot be written, or the container or codec does not support the frames.
     """
     if path.suffix not in CONTAINERS:
         msg = f"A clip's name must end in {', '.join(CONTAINERS)}, because these keep every time, but is {path.name}."

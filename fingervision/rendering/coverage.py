@@ -1,14 +1,15 @@
 """Fraction of each pixel that a shape covers, after Gaussian blur: computed exactly, as an integral along the outline.
 
-Blur and the pixel's own square act together as the kernel K(x, y) = k(x) k(y), where k is the Gaussian averaged over
-one pixel. The covered fraction of the pixel at p is the integral of K(p - q) over the shape; by Green's theorem this is
+Blur and integration over the square pixel act together as the kernel K(x, y) = k(x) k(y), where k is the Gaussian
+averaged over one pixel. The covered fraction of the pixel at p is the integral of K(p - q) over the shape; by Green's
+theorem this is
 
     V(p) = integral round the outline of  k(p_x - q_x) c(p_y - q_y) dq_x,      c' = k,
 
-and k and c have closed forms (error function and its integral). The outline is cut into panels of a few sigma, each
-integrated by Gauss-Legendre: the integrand is analytic, so the error falls geometrically, without any raster. A panel
-affects only pixels within REACH_SIGMAS; pixels below it follow from a running sum down the columns, so that the sides
-of an upright finger cost no time.
+and k and c have closed forms (error function and its integral). The outline is divided into panels of a few sigma, each
+integrated by Gauss-Legendre quadrature: the integrand is analytic, so that the error falls geometrically with the
+number of nodes, and no raster is needed. A panel affects only pixels within REACH_SIGMAS directly; pixels below it
+follow from a running sum down the columns, so that the sides of an upright finger cost no time.
 """
 
 from collections.abc import Sequence
@@ -45,14 +46,14 @@ np.fill_diagonal(_DERIVATIVE, -_DERIVATIVE.sum(axis=1))
 
 
 def panels(outlines: Sequence[Outline], blur_px: float) -> Points:
-    """Divide outlines into panels and return the integration nodes of each.
+    """Divide outlines into panels and return the quadrature nodes of each panel.
 
     Parameters
     ----------
     outlines : sequence of Outline
         Closed curves; solids and holes.
     blur_px : float
-        Standard deviation of the blur that the panels are short enough for.
+        Standard deviation of the blur, which limits the length of the panels.
 
     Returns
     -------
@@ -83,9 +84,9 @@ def panels(outlines: Sequence[Outline], blur_px: float) -> Points:
 
 
 def _fractions(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fractions of the piece at each panel's nodes, and the piece of each panel.
+    """Position of each panel's nodes as fractions of their piece, and the row of the piece for each panel.
 
-    `rows` begin with the number of panels.
+    The first entry of each of the `rows` is the number of panels of a piece.
     """
     counts = rows[:, 0].astype(int)
     row = np.repeat(rows, counts, axis=0)
@@ -99,16 +100,16 @@ def coverage(outlines: Sequence[Outline], blur_px: float, window: Region) -> NDA
     Parameters
     ----------
     outlines : sequence of Outline
-        Solids that do not overlap, and holes, in the picture.
+        Solids that do not overlap, and holes, in picture coordinates.
     blur_px : float
         Standard deviation of the Gaussian blur; positive.
     window : Region
-        The pixels that are wanted.
+        The pixels to be computed.
 
     Returns
     -------
     ndarray of float, shape (window.height_px, window.width_px)
-        0 outside, 1 inside.
+        Covered fraction: 0 outside, 1 inside.
     """
     height, width = window.height_px, window.width_px
     if height == 0 or width == 0:

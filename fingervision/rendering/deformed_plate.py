@@ -8,30 +8,31 @@ from fingervision.rendering.outline import Outline
 from fingervision.rendering.polygon import polygon
 
 SAGITTA_PX = 2e-4
-"""How far a chord may lie beside the curve that it stands for; five times below what a drawn outline is good to."""
+"""Largest distance of a chord from the curve that it replaces: a fifth of the accuracy of a rendered outline."""
 MOST_CHORDS = 16
 
 
 def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -> tuple[Outline, ...]:
-    """Join the outline's edges into loops, and approximate each edge, a parabola through three nodes, by chords.
+    """Join the edges of the outline into loops; each edge, a parabola through three nodes, is replaced by chords.
 
     Parameters
     ----------
     edges : ndarray of int, shape (3, k)
-        First node, last node and the node between them, of every edge of the outline, in any order; the body on the
-        same side of all.
+        First node, last node and the node between them, for every edge of the outline, in any order; the body is on the
+        same side of all edges.
     nodes_px : ndarray of float, shape (2, n)
-        Places of the nodes in the picture.
+        Positions of the nodes in the picture.
 
     Returns
     -------
     tuple of Outline
-        Closed; holes, which run against the largest loop, run the other way.
+        Closed outlines; a loop whose direction is opposite to that of the largest loop is a hole, and has the direction
+        of one.
 
     Raises
     ------
     DataError
-        The edges do not close.
+        If the edges do not form closed loops.
     """
     following = {int(edge[0]): place for place, edge in enumerate(edges.T)}
     left = set(range(edges.shape[1]))

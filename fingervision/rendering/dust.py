@@ -1,4 +1,4 @@
-"""Specks of dust: small dark or light grains anywhere in the frame."""
+"""Dust: small dark or light grains anywhere in the frame."""
 
 from math import radians
 
@@ -28,23 +28,23 @@ def dust(
     count : int
         Number of grains.
     rng : numpy.random.Generator
-        Source of places, sizes, turns and levels.
+        Generator of positions, sizes, rotations and levels.
     frame : (int, int)
         Width and height of the frame.
     size_px : (float, float)
-        Least and greatest length of a grain.
+        Smallest and largest length of a grain.
     levels : tuple of float
-        Grey levels 0..255, each as likely as the others.
+        Grey levels 0..255, chosen with equal probability.
 
     Returns
     -------
     tuple of Patch
-        One a grain, to be painted over everything.
+        One patch per grain, to be painted over everything else.
 
     Raises
     ------
     DataError
-        A grain without size, or no level to choose from.
+        If a size is not positive, or there is no level to choose from.
     """
     if not (count >= 0 and 0.0 < size_px[0] <= size_px[1] and levels):
         msg = f"Grains must have a number, a size and a level, but these are {count}, {size_px} px and {levels}."

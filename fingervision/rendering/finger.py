@@ -1,4 +1,4 @@
-"""One finger: a bar with a tip of a given shape, placed along an image axis and tilted."""
+"""One finger: a bar with a tip of a given shape, placed along an axis of the picture and tilted."""
 
 from dataclasses import dataclass
 from math import radians, tan
@@ -21,14 +21,14 @@ STEEPEST_DEG = 45.0
 
 @dataclass(frozen=True, slots=True)
 class SquareTip:
-    """Flat tip with equal corners.
+    """Flat tip with two equal corners.
 
     Parameters
     ----------
     radius_px : float
-        Radius of both corners: 0 is sharp, half the finger's width a half circle.
+        Radius of both corners: 0 is sharp; half the finger's width gives a half circle.
     slant_deg : float
-        Slant of the flat; positive if the finger is longer on the side of the greater coordinate across.
+        Slant of the flat end; positive if the finger is longer on the side of the larger coordinate across.
     """
 
     radius_px: float = 0.0
@@ -37,7 +37,7 @@ class SquareTip:
 
 @dataclass(frozen=True, slots=True)
 class EllipticTip:
-    """Half an ellipse across the finger's width.
+    """Tip with the shape of half an ellipse across the finger's width.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ class Highlight:
     level : float
         Grey level 0..255.
     width_px, length_px : float
-        Size.
+        Width and length of the stripe.
     below_tip_px : float
-        Where it begins, along the finger's own axis.
+        Distance of the stripe's start from the tip, along the finger's own axis.
     off_axis_px : float
-        How far its middle lies from the finger's, towards the greater coordinate across.
+        Distance of the stripe's centre line from the finger's, towards the larger coordinate across.
     """
 
     level: float
@@ -81,9 +81,9 @@ class Finger:
     Parameters
     ----------
     outline : Outline
-        Where it lies in the ideal picture.
+        Outline in the ideal picture.
     direction : Direction
-        The image axis in which it points.
+        Axis of the picture along which the finger points.
     """
 
     outline: Outline
@@ -115,17 +115,17 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
     tip : SquareTip or EllipticTip
         Shape of the tip.
     tilt_deg : float
-        Tilt about the tip; positive if the tip leans towards the greater coordinate across.
+        Tilt about the tip; positive if the tip leans towards the larger coordinate across.
 
     Returns
     -------
     Outline
-        The whole finger, its root square.
+        The whole finger, with a square root end.
 
     Raises
     ------
     DataError
-        The tip does not fit on the finger, or it is tilted or slanted by more than STEEPEST_DEG.
+        If the tip does not fit on the finger, or it is tilted or slanted by more than STEEPEST_DEG.
     """
     half = width_px / 2
     if not (width_px > 0.0 and length_px > 0.0):
@@ -166,7 +166,7 @@ def highlight_shape(highlight: Highlight, tilt_deg: float) -> Outline:
 
 
 def half_ellipse(half_width_px: float, height_px: float) -> tuple[Piece, ...]:
-    """Half an ellipse from (-half_width, height) over (0, 0) to (half_width, height), as circular arcs."""
+    """Half an ellipse from (-half_width, height) over (0, 0) to (half_width, height), composed of circular arcs."""
     angle = np.linspace(0.0, np.pi, ELLIPSE_ARCS // 2 + 1)
     points = np.stack([-half_width_px * np.cos(angle), height_px * (1.0 - np.sin(angle))], axis=-1)
     tangents = np.stack([half_width_px * np.sin(angle), -height_px * np.cos(angle)], axis=-1)

@@ -15,17 +15,17 @@ def through_jpeg(pixels: Pixels, quality: int) -> Pixels:
     pixels : ndarray of uint8, shape (height, width) or (height, width, 3)
         Grey levels, or red, green and blue.
     quality : int
-        0..100, as libjpeg counts it.
+        Quality from 0 to 100, as defined by libjpeg.
 
     Returns
     -------
     ndarray of uint8
-        Same shape.
+        Array of the same shape.
 
     Raises
     ------
     DataError
-        The frame has not 8 bits, or the quality does not exist.
+        If the frame is not in 8 bits, or the quality is out of range.
     """
     if pixels.dtype != np.uint8:
         msg = f"JPEG holds 8 bits, but the frame has {pixels.dtype.itemsize * 8}: render with bits=8."

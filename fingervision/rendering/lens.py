@@ -1,7 +1,7 @@
 """Effect of tilt and lens on an outline: the perspective of a tilted plane, then radial distortion.
 
-Outlines are mapped instead of pictures: a mapped outline again consists of lines and arcs, so that it is drawn exactly
-and its true gap can be computed.
+The outlines are mapped, not the pictures: a mapped outline again consists of lines and arcs, so that it is rendered
+exactly and its true gap can be computed.
 """
 
 from dataclasses import dataclass
@@ -25,17 +25,18 @@ SPACING_RAD = 0.03
 
 @dataclass(frozen=True, slots=True)
 class RadialLens:
-    """Radial distortion about the frame's centre, in Brown's form: r becomes r (1 + k1 q^2 + k2 q^4).
+    """Radial distortion about the frame's centre, in Brown's form: radius r becomes r (1 + k1 q^2 + k2 q^4).
 
     Parameters
     ----------
     k1, k2 : float
-        Coefficients for q = r / half the frame's diagonal; k1 is the relative shift at the corners (negative: barrel).
+        Coefficients for q = r / (half the frame's diagonal); k1 is the relative radial displacement at the corners
+        (negative for barrel distortion).
 
     Raises
     ------
     FingervisionError
-        The picture would fold over at its border.
+        If the mapping would not be invertible at the picture's border.
     """
 
     k1: float = 0.0
@@ -58,16 +59,16 @@ class Tilt:
     Parameters
     ----------
     about_x_deg : float
-        Turn about the horizontal axis; positive moves the lower part away from the camera.
+        Rotation about the horizontal axis; positive moves the lower part away from the camera.
     about_y_deg : float
-        Turn about the vertical axis; positive moves the right part away from the camera.
+        Rotation about the vertical axis; positive moves the right part away from the camera.
     distance_px : float
         Distance of the camera from the plane, in pixels of the plane's scale (100 mm at 34 px/mm by default).
 
     Raises
     ------
     FingervisionError
-        The camera is not before the plane, or sees it edge on.
+        If the camera is not in front of the plane, or sees it edge on.
     """
 
     about_x_deg: float = 0.0
@@ -86,12 +87,12 @@ class Tilt:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The map from the ideal picture to the camera's, for frames of one size.
+    """Map from the ideal picture to the camera's picture, for frames of one size.
 
     Parameters
     ----------
     lens : RadialLens
-        Distortion.
+        Lens distortion.
     tilt : Tilt
         Perspective.
     width_px, height_px : int
@@ -116,7 +117,7 @@ class View:
         return distorted
 
     def outline(self, ideal: Outline) -> Outline:
-        """Map an outline; its corners stay corners."""
+        """Map an outline; corners remain corners."""
         pieces: list[Piece] = []
         for piece in ideal.pieces:
             spacing = piece.length_px / SPACING_PX if isinstance(piece, Line) else abs(piece.sweep_rad) / SPACING_RAD

@@ -1,4 +1,4 @@
-"""The light on the scene: levels of background and fingers, a slope across the frame, a step."""
+"""Illumination of the scene: levels of background and fingers, a slope across the frame, a step."""
 
 from dataclasses import dataclass
 from math import cos, hypot, radians, sin, sqrt
@@ -19,9 +19,9 @@ class LightStep:
     factor : float
         Light beyond the border, relative to this side.
     at_px : float
-        Where the border passes, counted from the frame's centre.
+        Distance of the border from the frame's centre.
     towards_deg : float
-        The direction of "beyond": 0 is to the right, 90 is down.
+        Direction of the side beyond the border: 0 is to the right, 90 is down.
     """
 
     factor: float
@@ -31,25 +31,26 @@ class LightStep:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """Grey levels and their change over the frame.
+    """Grey levels of background and fingers, and the variation of light over the frame.
 
     Parameters
     ----------
     ground : float
-        Grey level 0..255 of the ground.
+        Grey level 0..255 of the background.
     fingers : float
         Grey level 0..255 of the fingers; below `ground` for dark fingers on a light ground, above for the reverse.
     slope_x, slope_y : float
-        Relative rise of the light from one border of the frame to the other, 0 at the centre: 0.4 is -20 % to +20 %.
+        Relative rise of the light from one border of the frame to the other, with no change at the centre: 0.4 is -20 %
+        to +20 %.
     step : LightStep or None
         A step in the light.
     exposure : float
-        Factor on everything; above the full scale the picture clips.
+        Factor on all levels; levels above the full scale are clipped.
 
     Raises
     ------
     FingervisionError
-        Somewhere the light would be negative.
+        If the light would be negative somewhere in the frame.
     """
 
     ground: float = 200.0
@@ -69,7 +70,7 @@ class Light:
             raise DataError(msg)
 
     def field(self, width_px: int, height_px: int, blur_px: float) -> NDArray[np.float64] | float:
-        """Factor on each pixel's grey level; a single number where the light is uniform."""
+        """Factor on each pixel's grey level; a single number if the light is uniform."""
         field: NDArray[np.float64] | float = self.exposure
         if self.slope_x:
             field = field * (1.0 + self.slope_x * (np.arange(width_px) - (width_px - 1) / 2) / width_px)

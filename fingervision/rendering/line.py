@@ -20,22 +20,22 @@ class Line:
 
     @property
     def start(self) -> tuple[float, float]:
-        """First point."""
+        """First point of the line."""
         return (self.x0_px, self.y0_px)
 
     @property
     def end(self) -> tuple[float, float]:
-        """Last point."""
+        """Last point of the line."""
         return (self.x1_px, self.y1_px)
 
     @property
     def length_px(self) -> float:
-        """Length."""
+        """Length of the line."""
         return hypot(self.x1_px - self.x0_px, self.y1_px - self.y0_px)
 
     @property
     def box_px(self) -> tuple[float, float, float, float]:
-        """Bounding box of the piece: least x, least y, greatest x, greatest y."""
+        """Bounding box of the line: smallest x, smallest y, largest x, largest y."""
         (x0, y0), (x1, y1) = self.start, self.end
         return (min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
 
@@ -65,7 +65,7 @@ class Line:
         return Line(*motion.place(*self.start), *motion.place(*self.end))
 
     def grown(self, by_px: float) -> "Line":
-        """Offset the piece parallel to itself, `by_px` further out."""
+        """Offset the piece parallel to itself by `by_px` outwards."""
         heading = self.heading_rad(0.0)
         out_x, out_y = by_px * sin(heading), -by_px * cos(heading)
         return Line(self.x0_px + out_x, self.y0_px + out_y, self.x1_px + out_x, self.y1_px + out_y)

@@ -1,6 +1,7 @@
-"""A closed curve of straight lines and circular arcs: the exact geometry of everything that is drawn.
+"""A closed curve of straight lines and circular arcs: the exact geometry of every rendered object.
 
-A solid's curve runs so that its area, the integral of x dy, is positive; a hole's curve runs the other way.
+The direction of a solid's curve is such that its area, the integral of x dy, is positive; a hole's curve has the
+opposite direction.
 """
 
 from dataclasses import dataclass
@@ -24,12 +25,12 @@ class Outline:
     Parameters
     ----------
     pieces : tuple of Line or Arc
-        In the order of travel.
+        Pieces in order.
 
     Raises
     ------
     FingervisionError
-        The pieces leave a hole in the curve.
+        If the curve is not closed.
     """
 
     pieces: tuple[Piece, ...]
@@ -57,7 +58,7 @@ class Outline:
 
     @property
     def box_px(self) -> tuple[float, float, float, float]:
-        """Bounding box of the curve: least x, least y, greatest x, greatest y."""
+        """Bounding box of the curve: smallest x, smallest y, largest x, largest y."""
         boxes = [piece.box_px for piece in self.pieces]
         least_x, least_y, greatest_x, greatest_y = zip(*boxes, strict=True)
         return (min(least_x), min(least_y), max(greatest_x), max(greatest_y))
@@ -67,15 +68,15 @@ class Outline:
         return Outline(tuple(piece.backwards() for piece in reversed(self.pieces)))
 
     def moved(self, motion: Motion) -> "Outline":
-        """Return the curve after a rigid motion; under a reflection it is reversed, so that inside stays inside."""
+        """Return the curve after a rigid motion; a reflection also reverses its direction, to keep solids solid."""
         moved = tuple(piece.moved(motion) for piece in self.pieces)
         return Outline(tuple(piece.backwards() for piece in reversed(moved))) if motion.mirrors else Outline(moved)
 
     def grown(self, by_px: float) -> "Outline":
-        """Offset every edge parallel to itself, `by_px` further out (negative: further in).
+        """Offset every edge parallel to itself by `by_px` outwards (negative: inwards).
 
-        A corner that opens is closed by an arc about the corner; a corner that closes is cut where the parallels meet.
-        If nothing remains, the outline has no pieces.
+        If the offset opens a corner, an arc about the corner is inserted; if the offset edges intersect, they are cut
+        at the intersection. If nothing remains, the outline has no pieces.
         """
         if by_px == 0.0:
             return self
@@ -98,7 +99,7 @@ class Outline:
         return Outline(bridged(grown))
 
     def _vanishes(self, by_px: float, turns: list[float], cuts_px: list[float]) -> bool:
-        """Whether an offset makes the two sides of a curve meet, because a stretch turns by half a turn or more."""
+        """Whether an offset makes two sides of the curve meet, because a stretch turns by half a turn or more."""
         used = []
         for i, piece in enumerate(self.pieces):
             if isinstance(piece, Arc):
@@ -125,8 +126,8 @@ class Outline:
     def winding(self, points: Points) -> NDArray[np.float64]:
         """Winding number of the curve about each point: 1 inside a solid, 0 outside; shape (n,).
 
-        It is the sum of the angles subtended by the pieces' chords, plus a full turn for each arc that bulges past the
-        point.
+        It is the sum of the angles that the pieces' chords subtend at the point, plus a full turn for each arc that
+        bulges past the point.
         """
         x, y = points[..., 0], points[..., 1]
         angle = np.zeros(x.shape)
@@ -155,7 +156,7 @@ def _short(piece: Piece) -> tuple[Piece, ...]:
 
 
 def bridged(pieces: list[Piece]) -> tuple[Piece, ...]:
-    """Close the openings between neighbouring pieces by straight lines."""
+    """Close the gaps between neighbouring pieces by straight lines."""
     closed: list[Piece] = []
     for piece, follower in zip(pieces, pieces[1:] + pieces[:1], strict=True):
         closed.append(piece)
@@ -170,7 +171,7 @@ def disc(x_px: float, y_px: float, radius_px: float) -> Outline:
     Raises
     ------
     DataError
-        The radius is not positive.
+        If the radius is not positive.
     """
     if not radius_px > 0.0:
         msg = f"radius_px of a disc must be positive, but is {radius_px:g}."

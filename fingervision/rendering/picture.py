@@ -1,4 +1,4 @@
-"""Rendering of a frame: scene, light, noise, and rounding to the sensor's integers."""
+"""Rendering of a frame: scene, light, noise, and rounding to integer levels."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +12,16 @@ from fingervision.rendering.union import union
 
 
 def render(scene: Scene, camera: Camera, rng: np.random.Generator) -> Pixels:
-    """Draw one frame.
+    """Render one frame.
 
     Parameters
     ----------
     scene : Scene
-        What stands before the camera.
+        Scene in front of the camera.
     camera : Camera
-        How it is seen.
+        Camera model.
     rng : numpy.random.Generator
-        Source of the noise; not touched where the camera has none.
+        Generator of the noise; not used for a camera without noise.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def digitised(grey: NDArray[np.float64], camera: Camera) -> Pixels:
 def _paint(
     grey: NDArray[np.float64], outlines: tuple[Outline, ...], level: float, around: float, camera: Camera
 ) -> None:
-    """Paint solids of one level; `around` is the level of their surroundings, which decides where light spreads."""
+    """Paint solids of one level; `around` is the level of their surroundings, which decides the edge bias."""
     part, covered = _covered(grey, outlines, level < around, camera)
     # level + (part - level) (1 - covered), in place: fresh arrays of a frame's size cost more than the sums.
     np.subtract(1.0, covered, out=covered)
@@ -89,7 +89,7 @@ def _paint(
 def _covered(
     grey: NDArray[np.float64], outlines: tuple[Outline, ...], dark: bool, camera: Camera
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the part of the picture that solids can change, as a view, and how much of each pixel they cover."""
+    """Return the part of the picture that solids can change, as a view, and their coverage of its pixels."""
     height_px, width_px = grey.shape
     spread_px = -camera.bloom_px if dark else camera.bloom_px
     grown = [outline.grown(spread_px) for outline in camera.sees(outlines, width_px, height_px)]

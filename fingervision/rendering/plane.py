@@ -1,6 +1,7 @@
 """The picture plane: its points and rigid motions.
 
-Coordinates are those of the picture: x right, y down, the centre of the first pixel is (0, 0), lengths in pixels.
+Coordinates are those of the picture: x to the right, y downwards, origin at the centre of the first pixel, lengths in
+pixels.
 """
 
 from dataclasses import dataclass
@@ -37,12 +38,12 @@ class Motion:
 
     @staticmethod
     def turn(angle_rad: float) -> "Motion":
-        """Turn about the origin, from x towards y (clockwise to the eye, because y points down)."""
+        """Rotation about the origin, from x towards y (clockwise on the screen, because y points down)."""
         return Motion(cos(angle_rad), -sin(angle_rad), sin(angle_rad), cos(angle_rad))
 
     @property
     def mirrors(self) -> bool:
-        """Whether left and right hands are exchanged."""
+        """Whether the motion includes a reflection."""
         return self.xx * self.yy - self.xy * self.yx < 0.0
 
     def place(self, x_px: float, y_px: float) -> tuple[float, float]:

@@ -15,19 +15,19 @@ def polygon(corners: tuple[tuple[float, float], ...], radii_px: tuple[float, ...
     Parameters
     ----------
     corners : tuple of (x, y)
-        Corners in order, either sense.
+        Corners in order, clockwise or anticlockwise.
     radii_px : tuple of float, optional
-        Radius of each corner; sharp where 0.
+        Radius of each corner; 0 for a sharp corner.
 
     Returns
     -------
     Outline
-        Each corner's arc touches both of its sides.
+        The polygon; each corner's arc is tangent to both of its sides.
 
     Raises
     ------
     DataError
-        There are fewer than three corners, neighbours coincide, or a radius is negative or does not fit between its
+        If there are fewer than three corners, neighbours coincide, or a radius is negative or does not fit between its
         neighbours.
     """
     if len(corners) < 3:

@@ -10,7 +10,7 @@ from fingervision.rendering.outline import Outline
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """A shape with a grey level of its own, painted over what is below.
+    """A shape with its own grey level, painted over what is below.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ class Rim:
     Parameters
     ----------
     width_px : float
-        How far it reaches outwards.
+        Width of the line outwards from the edge.
     level : float
         Grey level 0..255.
 
     Raises
     ------
     FingervisionError
-        The rim has no width.
+        If the width is not positive.
     """
 
     width_px: float
@@ -52,27 +52,27 @@ class Rim:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Everything that is drawn, in the ideal picture without lens, blur or noise.
+    """All objects to be rendered, in the ideal picture without lens distortion, blur or noise.
 
     Parameters
     ----------
     fingers : tuple of Finger
-        They may overlap: touching fingers are one blob.
+        Fingers; they may overlap, so that touching fingers form one object.
     width_px, height_px : int
         Size of the frame.
     light : Light
-        Levels, slope, step, exposure.
+        Levels, slope and step of the illumination, and exposure.
     behind : tuple of Patch
-        Other things in view; the fingers cover them.
+        Other objects in view, which the fingers cover.
     before : tuple of Patch
-        Dust, and highlights inside the fingers; painted over everything.
+        Dust, and highlights inside the fingers; painted over everything else.
     rim : Rim or None
         A bright rim outside the fingers.
 
     Raises
     ------
     FingervisionError
-        A level outside 0..255, or a frame without pixels.
+        If a level is outside 0..255, or the frame has no pixels.
     """
 
     fingers: tuple[Finger, ...] = ()

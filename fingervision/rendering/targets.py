@@ -19,13 +19,13 @@ def bar(size_px: float, length_px: float, *, x_px: float, y_px: float, turn_deg:
     Parameters
     ----------
     size_px : float
-        The known size, across; along x where `turn_deg` is 0.
+        The known size (width); along x if `turn_deg` is 0.
     length_px : float
-        Length.
+        Length of the bar.
     x_px, y_px : float
         Middle of the bar.
     turn_deg : float
-        Turn about the middle, from x towards y.
+        Rotation about the middle, from x towards y.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def slot(
     turn_deg: float = 0.0,
     frame: tuple[int, int] = (640, 480),
 ) -> tuple[Outline, Outline]:
-    """Slot in a plate that fills the frame: parameters as in `bar`, `frame` is the frame's width and height.
+    """Slot in a plate that fills the frame: parameters as in `bar`; `frame` is the frame's width and height.
 
     Returns
     -------
@@ -68,16 +68,16 @@ def slot(
 
 
 def needle(diameter_px: float, *, x_px: float, end_y_px: float) -> tuple[Outline]:
-    """A needle that hangs into the frame from above, with a square end at `end_y_px`.
+    """A needle that extends into the frame from above, with a square end at `end_y_px`.
 
     Parameters
     ----------
     diameter_px : float
-        The known size, along x.
+        The known diameter, along x.
     x_px : float
-        Its axis.
+        Position of the needle's axis.
     end_y_px : float
-        Where it ends.
+        Position of the needle's end.
 
     Returns
     -------
@@ -91,23 +91,23 @@ def needle(diameter_px: float, *, x_px: float, end_y_px: float) -> tuple[Outline
 def chessboard(
     corners: tuple[int, int], square_px: float, *, x_px: float, y_px: float, turn_deg: float = 0.0
 ) -> tuple[Outline, ...]:
-    """Dark squares of a chessboard.
+    """Dark squares of a chessboard pattern.
 
     Parameters
     ----------
     corners : (int, int)
-        Inner corners along x and y: (9, 6) is a board of 10 x 7 squares.
+        Number of inner corners along x and y: (9, 6) is a board of 10 x 7 squares.
     square_px : float
         Side of a square.
     x_px, y_px : float
         Middle of the board.
     turn_deg : float
-        Turn about the middle, from x towards y.
+        Rotation about the middle, from x towards y.
 
     Returns
     -------
     tuple of Outline
-        One solid a dark square; the first square, least in x and y before the turn, is dark.
+        One solid per dark square; the first square, with the smallest x and y before the rotation, is dark.
     """
     _must_be_positive(corners_x=corners[0], corners_y=corners[1], square_px=square_px)
     columns, rows = corners[0] + 1, corners[1] + 1

@@ -1,4 +1,4 @@
-"""The true gap between two fingers, from their outline before blur."""
+"""The true gap between two fingers, from their outline before blurring."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -30,7 +30,7 @@ class TrueEdge:
     Parameters
     ----------
     x_px, y_px : float
-        Where the inner edge crosses the line below the tip.
+        Point where the inner edge crosses the line at the measuring height below the tip.
     tip_px : float
         The tip's coordinate along the fingers' axis.
     """
@@ -59,22 +59,22 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     Parameters
     ----------
     scene : Scene
-        Its two fingers point the same way.
+        Scene with two fingers that point in the same direction.
     camera : Camera
-        Lens and tilt move the outline, and with it the truth; nothing else of the camera does. For the truth in the
-        ideal picture give `IDEAL_CAMERA`.
+        Camera; only lens and tilt change the outline and thus the true gap. For the true gap in the ideal picture, give
+        `IDEAL_CAMERA`.
     below_tip_px : float
-        Distance of each measuring point from its own finger's tip, along the image axis.
+        Distance of each measuring point from its own finger's tip, along the axis of the picture.
 
     Returns
     -------
     TrueGap or NoGap
-        Exact to 1e-6 px; in the picture's coordinates.
+        True gap, exact to 1e-6 px, in picture coordinates.
 
     Raises
     ------
     DataError
-        More than two fingers, or two that point different ways.
+        If there are more than two fingers, or two that point in different directions.
     """
     if len(scene.fingers) < 2:
         status = Status.ONE_FINGER if scene.fingers else Status.NO_FINGERS
@@ -135,7 +135,7 @@ def _along(point: tuple[float, float], direction: Direction) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Tip:
-    """Least coordinate towards the root, and the range across the finger over which a flat tip reaches it."""
+    """Smallest coordinate towards the root, and the range across the finger over which a flat tip has it."""
 
     along_px: float
     first_px: float
@@ -193,26 +193,26 @@ def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[
 
 
 def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[float, float]:
-    """Inner edge of one finger in its own axes: x across, y towards the root.
+    """Inner edge and tip of one finger in its own axes: x across, y towards the root.
 
     Parameters
     ----------
     shape : Outline
-        The finger, pointing towards negative y.
+        Outline of the finger, which points towards negative y.
     below_tip_px : float
-        Distance from the tip.
+        Distance of the measuring point from the tip.
     side : int
-        -1 for the left finger, whose inner edge is its right one; 1 for the right finger.
+        -1 for the left finger, whose inner edge is on its right; 1 for the right finger.
 
     Returns
     -------
     across_px, tip_px : float
-        The edge across, and the tip along.
+        Coordinate of the edge across, and of the tip along the finger.
 
     Raises
     ------
     DataError
-        The finger does not reach to that line.
+        If the finger does not extend to the measuring height.
     """
     tip = _tip(shape, Direction.UP).along_px
     crossings = _crossings(shape, Direction.UP, tip + below_tip_px)

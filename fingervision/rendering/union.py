@@ -1,4 +1,4 @@
-"""Outline of the union of several solids: two touching fingers are one object."""
+"""Outline of the union of several solids; two touching fingers, for example, are one object."""
 
 from collections.abc import Iterable, Sequence
 from itertools import combinations, pairwise
@@ -15,17 +15,17 @@ from fingervision.rendering.plane import SAME_POINT_PX
 def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
     """Boundary of the region that lies inside at least one of the outlines.
 
-    Pieces are cut where outlines cross; a part is kept if it lies inside no other outline.
+    Pieces are divided where outlines cross; a part is kept if it does not lie inside another outline.
 
     Parameters
     ----------
     outlines : tuple of Outline
-        Solids without holes. Where edges coincide, one stays, or none if the solids lie on opposite sides of it.
+        Solids without holes. Where edges coincide, one of them is kept, or none if the solids lie on opposite sides.
 
     Returns
     -------
     tuple of Outline
-        Solids that do not overlap (and holes, where outlines enclose one). The input itself where nothing overlaps.
+        Solids that do not overlap (and holes, if outlines enclose one). The input itself if nothing overlaps.
     """
     if not any(_boxes_meet(a, b) for a, b in combinations(outlines, 2)):
         return outlines
@@ -46,7 +46,7 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
 
 
 def _shared(part: Piece, other: Outline) -> float | None:
-    """Whether a part lies on an edge of another outline: positive if both run in the same direction, else negative."""
+    """Whether a part lies on an edge of another outline: positive for the same direction, negative for the opposite."""
     x, y = part.points(np.array(0.5)).tolist()
     for edge in other.pieces:
         if not _may_cross(part, edge) or not _same_track(part, edge):
@@ -69,7 +69,7 @@ def _same_track(a: Piece, b: Piece) -> bool:
 
 
 def _parts(piece: Piece, others: Iterable[Outline]) -> list[Piece]:
-    """Cut a piece where other outlines cross it."""
+    """Divide a piece where other outlines cross it."""
     cuts = {0.0, 1.0}
     for other in others:
         for edge in other.pieces:
@@ -122,7 +122,7 @@ def _line_line(a: Line, b: Line) -> list[float]:
 
 
 def _on(t: float, piece: Piece) -> bool:
-    """Whether a fraction belongs to a piece, its ends included despite rounding, so that no crossing is lost."""
+    """Whether a fraction lies on a piece, its ends included despite rounding, so that no crossing is missed."""
     margin = SAME_POINT_PX / piece.length_px
     return -margin <= t <= 1.0 + margin
 
@@ -172,7 +172,7 @@ def _fraction(piece: Piece, point: tuple[float, float]) -> float | None:
 
 
 def _chained(pieces: list[Piece]) -> tuple[Outline, ...]:
-    """Join pieces in any order to closed curves: each is followed by the piece that starts nearest to its end."""
+    """Join pieces, given in any order, to closed curves: each is followed by the piece starting nearest to its end."""
     left = list(pieces)
     curves = []
     while left:

@@ -1,1 +1,1 @@
-"""Properties of a recorded stage position from any source: noise, encoder step, encoder lines, smoothed record."""
+"""Analysis of a recorded stage position from any source: noise, encoder step, encoder lines, smoothing."""

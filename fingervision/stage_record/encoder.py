@@ -9,54 +9,59 @@ from scipy.stats import norm
 from fingervision.domain.effect import Array
 
 RESOLVED_MM = 1e-7
-"""Differences of recorded inputs below this are the file's last digits."""
+"""Differences of recorded inputs below this value are rounding in the file's last digits."""
 ORDERS = (3, 4, 5, 6)
-"""Differences that are taken: the first in which a stroke at one speed vanishes with its acceleration, and above."""
+"""Orders of the differences: 3 is the lowest for which a stroke at one speed vanishes, including its acceleration."""
 MANY = 100
-"""Samples below which several estimates scatter so much that the smallest is too small."""
+"""Number of samples below which only one estimate is used: the smallest of several scattering ones would be too
+small."""
 NORMAL_MEDIAN = 0.6745
-"""Median of a standard normal variable's absolute value."""
+"""Median of the absolute value of a standard normal variable."""
 LINE = 9
-"""Samples of the lines about which a record on a grid scatters."""
+"""Number of samples in the straight lines about which the scatter of a record on a grid is computed."""
 ROUNDED = 1.5
-"""Times the scatter of rounding above which there is noise as well."""
+"""Ratio of the scatter to that of rounding above which the record contains noise as well."""
 HALTING = 0.5
-"""Changes of speed by a single step over samples that moved: a slow motion halts between an encoder's steps."""
+"""Ratio of the number of speed changes by a single step to the number of moving samples: a slow motion halts between an
+encoder's steps."""
 CLUSTERED = 0.5
-"""Length of the mean unit vector of all values on a circle of one encoder step, above which they lie on its lines: with
-normal jitter of sigma it is exp(-2 (pi sigma / step)^2), 0.5 at a jitter of 0.19 steps."""
+"""Length of the mean unit vector, with all values placed on a circle of one encoder step, above which the values
+cluster at the encoder's lines: for normal jitter of sigma it is exp(-2 (pi sigma / step)^2), 0.5 at a jitter of 0.19
+steps."""
 EXACT = 1.0 - 1e-6
-"""The same above which there is no jitter and nothing to be taken out."""
+"""Length of the mean unit vector above which there is no jitter to be removed."""
 ON_LINE, EXACT_SHARE = 1e-3, 0.2
-"""Share of a step within which a value lies exactly on a line, and share of such values that jitter does not give."""
+"""Distance, as a share of a step, within which a value lies exactly on a line, and share of such values above which the
+deviations are not jitter."""
 BETWEEN = 0.4
-"""Distance from the lines, in steps, that jitter seldom reaches and values on no lines have in a fifth of the cases."""
+"""Distance from the lines, in steps, that jitter seldom exceeds; of values unrelated to lines a fifth lies beyond
+it."""
 FEWEST_LINES = 8
-"""Lines that a record must cross for their distance to be told."""
+"""Least number of lines that a record must cross for their spacing to be determined."""
 BEYOND_CHANCE = 4.0
-"""Times the length that so many values would have by chance at any of the steps that are tried."""
+"""Ratio of the mean vector's length to that expected by chance at any of the tried steps."""
 PEAK_STEP = 0.2
-"""Step of the frequencies that are tried, over the inverse of the range: a peak is one wide."""
+"""Step of the tried frequencies, relative to the inverse of the range: a peak has a width of one."""
 MOST_LINES = 400
-"""Lines over the range at most: finer ones are no finer than the noise of other records."""
+"""Largest number of lines over the range: finer lines are no finer than the noise of other records."""
 MOST_EQUAL = 0.8
-"""Share of the changes that go equally many lines on, above which a steady motion looks like lines. Where it is an
-encoder after all, at a speed near a whole number of lines a row, only its jitter stays in the record."""
+"""Share of the changes that advance by the same number of lines, above which steady motion is mistaken for lines. If it
+is an encoder after all, moving by nearly a whole number of lines per row, only its jitter stays in the record."""
 FEWEST_SINGLE = 3
-"""Single steps that tell an encoder from set points in round numbers."""
+"""Least number of single steps that distinguish an encoder from set points in round numbers."""
 
 
 def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]:
-    """Estimate the standard uncertainty of one recorded input, and the encoder's step, from the record itself.
+    """Estimate the standard uncertainty of a recorded input, and the encoder's step, from the record itself.
 
-    High-order differences of a smooth motion vanish, so that what they leave is noise. For a straight motion a low
-    order is sufficient, for an oscillation a higher one is needed; the smallest estimate over the orders is used. Their
-    median is robust against reversals.
+    High-order differences of a smooth motion vanish, so that only noise is left. For motion at constant speed a low
+    order is sufficient, for an oscillation a higher order is needed; the smallest estimate over the orders is used. The
+    median of the absolute differences is robust against reversals.
 
     Returns
     -------
     sigma_mm, step_mm : float
-        The step is 0 where the values do not lie on a grid.
+        Standard uncertainty of one value, and the encoder's step; the step is 0 if the values do not lie on a grid.
     """
     orders = ORDERS if input_mm.size >= MANY else ORDERS[:1]
     sigma = min(_sigma_by_differences(input_mm, runs, order) for order in orders)
@@ -72,11 +77,11 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]
 
 
 def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
-    """Remove the jitter from an encoder's record: replace each value by the nearest line of the encoder's scale.
+    """Remove the jitter from an encoder's record: replace each value by the nearest line of the encoder.
 
-    The offset of the lines is free. Their spacing is where the characteristic function of the values has its largest
-    peak at the lowest frequency. A record whose values do not cluster about lines, or lie exactly on them, is returned
-    unchanged.
+    Offset and spacing of the lines are estimated: the spacing is the inverse of the lowest frequency at which the
+    characteristic function of the values has a significant peak. A record is returned unchanged if its values do not
+    cluster at lines, or lie exactly on them.
 
     Parameters
     ----------
@@ -118,9 +123,9 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
 
 
 def _equal_steps(input_mm: Array, snapped_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
-    """Whether the lines only reflect a motion at constant speed, which advances by equally many lines from row to row.
+    """Whether the lines only reflect motion at constant speed, by the same number of lines from row to row.
 
-    About an encoder's own lines, most changes of the value are jitter that stays on one line, or the number of lines
+    For the true lines of an encoder, most changes of the value are jitter about one line, or the number of lines
     crossed from row to row varies by one.
     """
     crossed = []
@@ -132,8 +137,18 @@ def _equal_steps(input_mm: Array, snapped_mm: Array, runs: tuple[slice, ...], st
 
 
 def _characteristic(values: Array, frequency: Array) -> NDArray[np.complex128]:
-    """Mean of exp(2 pi i f x); shape of `frequency`."""
-    return np.asarray(np.mean(np.exp(2j * np.pi * frequency[:, None] * values), axis=1))
+    """Mean of exp(2 pi i f x); shape of `frequency`, which must be evenly spaced.
+
+    With f = a + b, the sum over x of exp(2 pi i a x) exp(2 pi i b x) is a product of two matrices: for k frequencies
+    it takes 2 sqrt(k) exponentials of every value instead of k.
+    """
+    block = int(np.ceil(np.sqrt(frequency.size)))
+    if block < 2:
+        return np.asarray(np.mean(np.exp(2j * np.pi * frequency[:, None] * values), axis=1))
+    fine = np.arange(block) * (frequency[1] - frequency[0])
+    coarse = frequency[::block]
+    first, then = (np.exp(2j * np.pi * part[:, None] * values) for part in (coarse, fine))
+    return np.asarray((first @ then.T).ravel()[: frequency.size] / values.size)
 
 
 def _sigma_by_differences(input_mm: Array, runs: tuple[slice, ...], order: int) -> float:
@@ -143,7 +158,7 @@ def _sigma_by_differences(input_mm: Array, runs: tuple[slice, ...], order: int) 
 
 
 def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Median standard deviation about straight lines through `LINE` samples; 0 where no run has so many."""
+    """Median standard deviation about straight lines through `LINE` samples; 0 if no run has so many samples."""
     x = np.arange(LINE) - 0.5 * (LINE - 1)
     found = [np.zeros(0)]
     for run in runs:
@@ -156,7 +171,7 @@ def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:
 
 
 def _grid(input_mm: Array) -> float:
-    """Spacing of a grid on which all values lie; 0 where there is none."""
+    """Spacing of a grid on which all values lie; 0 if there is none."""
     steps = np.diff(np.unique(np.round(input_mm, 9)))
     # Where every sample is several lines on, the steps differ by single ones.
     lines = np.concatenate([steps, np.diff(np.unique(steps))])
@@ -166,9 +181,9 @@ def _grid(input_mm: Array) -> float:
 
 
 def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
-    """Whether a motion was rounded to a grid: it pauses on grid values, or its speed appears to vary by single steps.
+    """Whether a motion was rounded to a grid: it pauses on grid values, or its speed varies by single steps.
 
-    Set points in round numbers lie on a grid as well, but advance from one to the next in equal steps.
+    Set points in round numbers lie on a grid as well, but advance in equal steps.
     """
     if step_mm == 0.0:
         return False

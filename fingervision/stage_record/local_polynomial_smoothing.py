@@ -1,4 +1,4 @@
-"""Smoothing of the recorded input: local lines and parabolas, over windows as wide as the record allows."""
+"""Smooth the recorded input by local straight lines and parabolas, in windows as wide as the record allows."""
 
 import numpy as np
 
@@ -7,15 +7,18 @@ from fingervision.domain.loops import loop
 
 LINES = (241, 121, 61, 41, 27, 19, 13, 9, 7, 5)
 PARABOLAS = (121, 61, 41, 27, 19, 13, 9, 7)
-"""Samples of the windows that are tried; a stage that swings runs straight for too few of them."""
+"""Window lengths tried for parabolas, in samples; for an oscillating stage the motion is straight over too few
+samples."""
 PLACES = 5
-"""Places of a sample in its window, from one end to the other."""
+"""Number of positions of a sample within its window that are tried, from one end to the other."""
 CHI_SIGMAS, END_SIGMAS, TREND_SIGMAS = 2.5, 3.0, 1.0
-"""Limits on a window's rest: in all, at its ends, and along the next higher power, which would bend unseen."""
+"""Limits on a window's residuals in standard uncertainties: chi-square in all, residuals at the ends, and the trend of
+the next higher power, which would otherwise bias the fit unnoticed."""
 CHOSEN = 1.4
-"""By how much the parabola that looks best is worse than it looks: errors over claims of sines with noise."""
+"""Factor by which the error of the selected parabola exceeds its stated error, because the best-looking one is selected
+(from simulated sines with noise)."""
 CURVED_SIGMAS = 2.0
-"""Above which a parabola's curvature counts against a straight line."""
+"""Significance, in standard uncertainties, of a parabola's curvature above which a straight line is rejected."""
 
 _smooth = loop("local_polynomial_smoothing_run")
 
@@ -23,7 +26,7 @@ _smooth = loop("local_polynomial_smoothing_run")
 def smoothed(
     input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: float, step_mm: float
 ) -> tuple[Array, Array]:
-    """Smooth the record within its runs.
+    """Smooth the record separately within each run.
 
     Parameters
     ----------
@@ -32,12 +35,13 @@ def smoothed(
     runs : tuple of slice
         Samples of each run.
     sigma_mm, step_mm : float
-        As `input_noise.input_sigma` gives them.
+        Results of `encoder.input_sigma`.
 
     Returns
     -------
     input_mm, leverage : ndarray of float, shape (n,)
-        The remaining variance of each value is `leverage * sigma_mm**2`; 1 where nothing passed.
+        Smoothed values, and the remaining variance of each value divided by `sigma_mm**2`; the leverage is 1 for a
+        value that was not smoothed.
     """
     out, leverage = input_mm.copy(), np.ones_like(input_mm)
     for run in runs:

@@ -1,6 +1,7 @@
 """Image processing steps, one per file, in the order of Hricko & Havlik (2015); only ``pipeline`` knows the order.
 
-The fits that serve any picture, not only fingers, are public here; they need NumPy, SciPy and OpenCV only.
+The fits that can be used for any picture, not only for fingers, are exported here; they need NumPy, SciPy and OpenCV
+only.
 """
 
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle

@@ -1,9 +1,9 @@
-"""Fit the edges again after the shadow or glare beside them has been subtracted from each line.
+"""Fit the edges again after the shadow or glare beside them has been subtracted from each line of pixels.
 
-The mean profile of the flanks gives breadth, size and blur of the shadow or glare, which hold all around a finger at
-the same distance from its edge. On a slanted line the shadow or glare is stretched in the same ratio as the edge. After
-subtraction and a new fit of the step, every line is free of the disturbance, however much of it lay within the line's
-window.
+The mean profile across the flanks gives the breadth, strength and blur of the shadow or glare; these are assumed to be
+the same all around a finger. Along a slanted line of pixels, shadow or glare is stretched by the same factor as the
+edge. After the subtraction and a new fit of the step, no line's edge is displaced by the shadow or glare, however much
+of it was in the line's window.
 """
 
 from dataclasses import replace
@@ -39,15 +39,15 @@ def without_additions(
     Parameters
     ----------
     upright : ndarray, shape (rows, columns)
-        Grey levels, seen with the tips up.
+        Grey levels of the picture, turned so that the tips point up.
     edges : EdgePoints
-        At the places that the mean profiles give.
+        Edges at the positions given by the mean profiles.
     light : ndarray of float, shape (levels,)
-        Light of every grey level.
+        Light for every grey level (look-up table).
     kind : int
-        What it is: SHADOW, FADING or GLARE.
+        Kind of disturbance: SHADOW, FADING or GLARE.
     fits : list of ProfileFit
-        The mean profile of the left and of the right finger.
+        Fits to the mean profiles of the left and of the right finger.
     """
     blur = np.array([np.sqrt(max(fit.blur**2 - PIXEL_VARIANCE, 0.04)) for fit in fits])
     filters = edge_filters(reach_for(float(blur.max())))

@@ -1,6 +1,6 @@
-"""Step 3, thresholding: which pixels are dark. The binary image serves to find the fingers.
+"""Step 3, thresholding: which pixels are dark; the binary image only serves to find the fingers.
 
-Nothing is measured in it.
+Nothing is measured in the binary image.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ _flatten = loop("binarise_flatten")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Binary:
-    """The dark pixels of a picture.
+    """Dark and light pixels of a picture.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def binarise(denoised: GreyImage, top_level: int | None = None) -> Binary:
 
 
 def binarise_local(denoised: GreyImage) -> Binary:
-    """Split the picture by its difference from the local mean, for light too uneven for one threshold.
+    """Split the picture by its difference from the local mean, for illumination too uneven for one threshold.
 
     The local mean extends an eighth of the picture's longer side in each direction; the difference is split by Otsu's
     threshold.
@@ -76,7 +76,7 @@ def binarise_local(denoised: GreyImage) -> Binary:
 
 
 def split_at(denoised: GreyImage, otsu: Binary, threshold: int) -> Binary:
-    """Return the picture split at another threshold, where Otsu's put a third tone into the wrong class."""
+    """Return the picture split at another threshold, if Otsu's threshold put a third tone into the wrong class."""
     _, dark = cv2.threshold(denoised, threshold, 255, cv2.THRESH_BINARY_INV)
     return replace(otsu, dark=dark.astype(np.uint8, copy=False), threshold=threshold)
 

@@ -1,4 +1,4 @@
-"""Candidates for the two fingers: in the darker or lighter class of a picture, by one threshold or by local mean."""
+"""Candidate pairs of fingers in the dark or light class of a picture, split by one threshold or by the local mean."""
 
 from collections.abc import Iterator
 
@@ -33,7 +33,11 @@ REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 def candidates(
     denoised: GreyImage, binary: Binary, settings: Settings
 ) -> Iterator[tuple[Binary, CoarseFingers | NoGap, bool]]:
-    """Candidate pairs of fingers, the likeliest first: darker or lighter than the border, then by the local mean."""
+    """Candidate pairs of fingers, likeliest first.
+
+    Each of the two splits (one threshold, then the local mean) gives a pair in its dark and in its light class; the
+    class that differs from the picture's border comes first.
+    """
     directions = tuple(Direction) if settings.direction is None else (settings.direction,)
     clear = False
     for is_local in (False, True):
@@ -73,9 +77,9 @@ def candidates(
 def found(
     split: Binary, light_gap: bool, directions: tuple[Direction, ...], settings: Settings, *, has_parts: bool = True
 ) -> CoarseFingers | NoGap:
-    """Fingers found in one class of a binary picture, also with a part between them.
+    """Fingers found in one class (dark or light) of a binary picture, also with a part held between them.
 
-    In a picture split by its local mean, objects have hollows, which are no gap between fingers.
+    In a picture split by its local mean, objects appear hollow; such hollows are not gaps between fingers.
     """
     below = settings.below_tip_px
     reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
@@ -92,7 +96,7 @@ def found(
 
 
 def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
-    """Whether the grey level changes steeply where light and dark meet, as even the most blurred edge does."""
+    """Whether the grey level changes steeply at the border of light and dark, as even the most blurred edge does."""
     square = np.ones((2 * EDGE_REACH_PX + 1, 2 * EDGE_REACH_PX + 1), dtype=np.uint8)
     border = np.asarray(cv2.morphologyEx(split.dark, cv2.MORPH_GRADIENT, np.ones((3, 3), dtype=np.uint8))) > 0
     change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))[border]

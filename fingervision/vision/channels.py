@@ -1,8 +1,8 @@
-"""Find the background channel between two straight sides: the space between the fingers, where no part fills it.
+"""Find the background channel between two straight sides: the space between the fingers that no part fills.
 
-With the tips up, each row of a binary picture has runs of background pixels between runs of finger or part pixels. Runs
-of background in successive rows, whose ends differ by hardly a pixel, form a channel. A gripper that holds a part shows
-a channel above the part, a channel below it, or both, between the same two straight lines.
+With the tips up, each row of a binary picture has runs of background pixels between runs of finger or part pixels.
+Background runs in successive rows form a channel if their ends differ by hardly a pixel. A gripper that holds a part
+shows a channel above the part, a channel below it, or both, between the same two straight lines.
 """
 
 from dataclasses import dataclass
@@ -45,11 +45,11 @@ class Channel:
     Parameters
     ----------
     left_c, left_m, right_c, right_m : float
-        The two lines.
+        Coefficients c and m of the left and of the right line.
     first_row, last_row : int
-        Where the channel begins and ends along the fingers, parts that interrupt it included.
+        First and last row of the channel, including rows where a part interrupts it.
     rows : int
-        Rows in which it is open.
+        Number of rows in which the channel is open.
     """
 
     left_c: float
@@ -70,14 +70,14 @@ class Channel:
 
 
 def find_channel(upright: Mask, below_tip_px: float) -> Channel | None:
-    """Find the longest channel between two objects of similar width; None where there is none.
+    """Find the longest channel between two objects of similar width; return None if there is none.
 
     Parameters
     ----------
     upright : ndarray of uint8, shape (rows, columns)
-        Non-zero where the fingers may be, seen with the tips up.
+        Non-zero where the fingers may be; turned so that the tips point up.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     """
     shortest = int(max(LEAST_HEIGHTS * below_tip_px, LEAST_ROWS))
     chains = _chains(upright, shortest)
@@ -113,7 +113,7 @@ def _is_same(channel: Channel, other: Channel) -> bool:
 
 
 def _straight(chain: Ints) -> Channel | None:
-    """Straight lines through the two sides of a chain of runs; None where the sides are not straight."""
+    """Fit straight lines to the two sides of a chain of runs; return None if the sides are not straight."""
     row = chain[:, 0].astype(float)
     fitted = [_line(row, chain[:, side].astype(float)) for side in (1, 2)]
     if any(share < ON_LINE_SHARE or abs(m) > STEEPEST for _, m, share in fitted):

@@ -1,8 +1,8 @@
-"""A blurred disc in a picture: maximum-likelihood centre and diameter from all pixels about its outline.
+"""Fit a blurred disc: maximum-likelihood centre and diameter from all pixels near its outline.
 
 The light level is `plane + (A + plane) S(r0 - r)`, with `S` the integral over the pixel of a Gaussian-blurred step
-across the outline. Blur moves the half-level of a curved edge to the inside by `sigma^2 / 2R` (to second order in sigma
-/ R); the radius that is reported is that of the disc before the blur.
+across the outline. Blur moves the half-level of a curved edge towards the inside by `sigma^2 / (2 R)` (to second order
+in sigma / R); the reported radius is that of the disc before blurring.
 """
 
 from dataclasses import dataclass
@@ -33,26 +33,26 @@ LINEAR, PARAMETERS = 6, 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Circle:
-    """A disc that was fitted.
+    """A fitted disc.
 
     Parameters
     ----------
     x_px, y_px : float
         Centre, in the picture's pixels.
     radius_px : float
-        Radius of the disc before the blur.
+        Radius of the disc before blurring.
     covariance : ndarray of float, shape (3, 3)
-        Of x, y and radius.
+        Covariance of x, y and radius.
     contrast : float
-        Level inside less level outside.
+        Level inside minus level outside.
     blur_px : float
         Gaussian sigma of the optics.
     noise : float
         Standard deviation of the residuals.
     least_piece : float
-        Smallest contrast of a sixteenth of the outline, as a share of the whole's.
+        Smallest contrast among sixteenths of the outline, as a share of the mean contrast.
     unround_px : float
-        Root mean square of the sixteenths' own radii about the circle.
+        Root-mean-square deviation of the radii fitted to the sixteenths from the radius of the circle.
     """
 
     x_px: float
@@ -86,16 +86,16 @@ def fit_circle(
     origin_px : (int, int)
         Column and row of the part's first pixel.
     start : (float, float, float)
-        First guess of x, y and radius, to within about two of `blur_px`.
+        Initial estimate of x, y and radius, within about twice `blur_px`.
     blur_px : float
-        First guess of the blur.
+        Initial estimate of the blur.
     shared_pixels : float
-        So many pixels count as one, where a codec is known to share its errors.
+        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
 
     Raises
     ------
     NoCircleFitError
-        The outline leaves the part of the picture, or its pixels do not determine a circle.
+        If the outline leaves the part of the picture, or the pixels do not determine a circle.
     """
     x = np.arange(levels.shape[1], dtype=np.float64) + origin_px[0]
     y = np.arange(levels.shape[0], dtype=np.float64)[:, None] + origin_px[1]
@@ -134,7 +134,7 @@ def fit_circle(
 
 
 def _columns(x: Floats, y: Floats, p: Floats) -> tuple[Floats, Floats]:
-    """Linear columns of the fit, and derivatives of the unit step with respect to x, y, radius and blur."""
+    """Columns of the model that are linear in its coefficients, and derivatives by x, y, radius and blur."""
     dx, dy = x - p[0], y - p[1]
     r = np.maximum(np.hypot(dx, dy), 1e-9)
     cosine, sine = np.abs(dx) / r, np.abs(dy) / r

@@ -1,4 +1,4 @@
-"""The two fingers of a picture, located to one pixel."""
+"""The two fingers of a picture, located to the nearest pixel."""
 
 from dataclasses import dataclass, field
 
@@ -14,18 +14,18 @@ NOTHING_HIDDEN: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseFinger:
-    """A finger's outline to one pixel, ordered from its inner side over the tip to its outer side.
+    """A finger's outline to the nearest pixel, ordered from its inner side over the tip to its outer side.
 
     Parameters
     ----------
     outline : ndarray of int32, shape (n, 2)
-        (across, along), the last pixels of the finger itself.
+        Coordinates (across, along) of the outermost pixels that belong to the finger.
     inner_sign : int
         +1 where the gap lies at larger `across` (the left finger), -1 for the right finger.
     top : Top
-        Where it begins.
+        Local maximum of the outline that forms the finger's tip.
     hidden : ndarray of int64, shape (n,)
-        Coordinates along, in order, in which a part between the fingers hides the inner side.
+        Coordinates along the finger, in order, at which a part between the fingers hides the inner side.
     """
 
     outline: Outline
@@ -41,22 +41,22 @@ class CoarseFinger:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseFingers:
-    """The two fingers, located to one pixel.
+    """The two fingers, located to the nearest pixel.
 
     Parameters
     ----------
     left, right : CoarseFinger
-        Smaller and larger coordinate across.
+        Fingers with the smaller and the larger coordinate across.
     orientation : Orientation
-        The axes that they are given in.
+        Axes in which the coordinates are given.
     score : float
-        How much they look like two fingers; larger is better.
+        Degree to which the objects look like two fingers; larger is better.
     is_rooted : bool
-        Whether both go down as far as the picture does.
+        Whether both fingers extend to the border of the picture.
     are_cut : bool
-        Whether the picture's border cuts off the outer sides of both.
+        Whether the picture's border cuts off the outer sides of both fingers.
     held_along_px : float or None
-        Where along the fingers both hold a part.
+        Coordinate along the fingers at which they hold a part; None without a part.
     """
 
     left: CoarseFinger
@@ -69,7 +69,7 @@ class CoarseFingers:
 
     @property
     def is_joined(self) -> bool:
-        """Whether a common base of the two fingers is in view."""
+        """Whether the two fingers' common base is in view."""
         return self.left.top.outline is self.right.top.outline
 
 

@@ -1,10 +1,10 @@
-"""Displacement of a whole edge that a codec may have caused, estimated from its quantiser step.
+"""Possible displacement of a whole edge by a video codec, estimated from the codec's quantiser step.
 
-An edge along the codec's blocks gets one common error in all its rows, which the scatter of the rows about a line does
-not show. A block copied from an earlier picture is displaced as a whole, and nothing in the picture shows that either.
-The quantiser bounds this error: a coder corrects every difference larger than a fraction of its step. For an edge of
-contrast A the coefficients change by about A per pixel of displacement, so that the displacement is a fixed fraction of
-`step / A`.
+In an edge parallel to the codec's blocks all rows have a common error, which the scatter of the rows about a line does
+not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture either.
+The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For an edge
+of contrast A the coefficients change by about A per pixel of displacement, so that the displacement is a fixed fraction
+of `step / A`.
 """
 
 from dataclasses import replace
@@ -41,9 +41,9 @@ def displaced_px(step: float, contrast: float) -> float:
     Parameters
     ----------
     step : float
-        Of the quantiser, in grey levels of 8 bits.
+        Quantiser step, in grey levels of an 8-bit scale.
     contrast : float
-        Of the edge, likewise.
+        Contrast of the edge, in grey levels of an 8-bit scale.
     """
     return DISPLACED * step / max(abs(contrast), 1.0)
 
@@ -51,20 +51,20 @@ def displaced_px(step: float, contrast: float) -> float:
 def with_coding_error(
     found: GapMeasurement, quantiser: Quantiser, inside: tuple[float, float], light: Floats, top_level: int
 ) -> GapMeasurement:
-    """Return the measurement with its uncertainty increased by what the codec may have done to either edge.
+    """Return the measurement with its uncertainty increased by possible codec errors of the two edges.
 
     Parameters
     ----------
     found : GapMeasurement
-        In the picture's pixels.
+        Measurement in the picture's pixels.
     quantiser : Quantiser
-        Of the picture.
+        Quantiser of the picture.
     inside : (float, float)
-        Light of either finger beside its edge.
+        Light of the left and of the right finger beside its edge.
     light : ndarray of float, shape (levels,)
-        Light of every stored level.
+        Light for every stored level (look-up table).
     top_level : int
-        End of the scale.
+        Highest level of the scale.
     """
     displaced = []
     for edge, level in zip((found.left, found.right), inside, strict=True):
@@ -73,21 +73,30 @@ def with_coding_error(
         if not found.direction.is_vertical:
             across, along = along, across
         step = quantiser.near(edge.x_px, edge.y_px, across, along)
-        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level))
+        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level) * _by_slope(edge.slope))
     return _less_sure(found, displaced[0], displaced[1])
 
 
+def _by_slope(slope: float) -> float:
+    """Displacement of the measuring point across the finger per displacement of an outline along its normal.
+
+    A leaning edge moves across by more than along its normal. The tip is displaced as well, by itself, and takes the
+    measuring height with it, along the edge.
+    """
+    return hypot(hypot(1.0, slope), slope)
+
+
 def with_shared_shift(found: GapMeasurement, shared_px: float, coding: Coding) -> GapMeasurement:
-    """Return the measurement with its uncertainty increased, for a codec whose quantiser is not known.
+    """Return the measurement with its uncertainty increased, for a codec whose quantiser step is not known.
 
     Parameters
     ----------
     found : GapMeasurement
-        What was measured.
+        The measurement.
     shared_px : float
-        What the rows of a flank share (`shared_profile.shared_shift_px`).
+        Common displacement of a flank's rows (`shared_profile.shared_shift_px`).
     coding : Coding
-        How the picture is coded.
+        Coding of the picture.
     """
     return _less_sure(found, SHARED_SHIFTS[coding] * shared_px, SHARED_SHIFTS[coding] * shared_px)
 

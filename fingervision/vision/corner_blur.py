@@ -1,4 +1,4 @@
-"""The half-level contour of a blurred corner: its distance from the vertex."""
+"""Distance of a blurred corner's half-level contour from the corner's vertex."""
 
 from functools import lru_cache
 from math import cos, erf, exp, pi, sin, sqrt, tan
@@ -20,9 +20,9 @@ FALL = 0.4
 
 
 def corner_half_level(beside: Floats, radius: Floats, turn: float, blur: float) -> Floats:
-    """Distance of the half-level of a rounded, blurred corner from the vertex of its sides, along its bisector.
+    """Distance of a rounded, blurred corner's half-level contour from the vertex, at points beside the bisector.
 
-    The effects of fillet and blur are added in quadrature, which is right for a sharp corner and at the middle of a
+    The effects of fillet and blur are added in quadrature, which is exact for a sharp corner and at the middle of a
     fillet.
 
     Parameters
@@ -30,9 +30,9 @@ def corner_half_level(beside: Floats, radius: Floats, turn: float, blur: float) 
     beside : ndarray of float
         Distance from the bisector (pixels).
     radius : ndarray of float
-        Radius of the fillet (pixels), of a shape that goes with `beside`.
+        Radius of the fillet (pixels), of a shape that broadcasts with `beside`.
     turn : float
-        By how much the outline turns at the corner (radians).
+        Change of the outline's direction at the corner (radians).
     blur : float
         Gaussian sigma of the optics (pixels).
     """
@@ -53,7 +53,7 @@ def corner_retreat(turn: float) -> float:
     Parameters
     ----------
     turn : float
-        By how much the outline turns at the corner (radians): 0 where it goes straight on.
+        Change of the outline's direction at the corner (radians); 0 for a straight outline.
     """
     return _retreat(round(turn / STEP))
 
@@ -69,7 +69,7 @@ def _retreat(steps: int) -> float:
 
 
 def _share(depth: float, turn: float) -> float:
-    """Blurred coverage of a wedge at a point of equal depth inside both of its sides."""
+    """Blurred coverage of a wedge at a point that has the same depth inside both of its sides."""
     width = 0.5 * turn / MIDPOINTS
     owen = sum(exp(-0.5 * (depth / cos((k + 0.5) * width)) ** 2) for k in range(MIDPOINTS)) * width / (2.0 * pi)
     return 0.5 * (1.0 + erf(depth / sqrt(2.0))) - 2.0 * owen

@@ -1,7 +1,7 @@
-"""Detection of an object across the fingers, such as a cable, which hides their ends in the binary picture.
+"""Detection of an object, such as a cable, that crosses the fingers and hides their ends in the binary picture.
 
-The apparent tip is then the edge of the crossing object. Beyond a true tip there is background or some other object; a
-piece of the same width that continues along the same two lines is the finger itself.
+The apparent tip is then the edge of the crossing object. Beyond a true tip there is background or some other object; if
+a piece of the same width continues along the same two lines, it is the finger itself.
 """
 
 import numpy as np
@@ -35,9 +35,9 @@ def is_crossed(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: fl
     mask : ndarray of uint8, shape (height, width)
         Non-zero where the fingers may be.
     fingers : CoarseFingers
-        As they were found there.
+        The fingers as found in the mask.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     """
     upright = np.asarray(fingers.orientation.view(mask), dtype=np.uint8)
     return any(_goes_on(upright, finger, below_tip_px) for finger in (fingers.left, fingers.right))

@@ -1,6 +1,6 @@
-"""Step 2, denoising, which serves only to find the fingers.
+"""Step 2, denoising: used only to find the fingers.
 
-The measurement uses the grey image itself, whose noise is white.
+The measurement itself uses the grey image without denoising, because its noise is white.
 """
 
 import cv2
@@ -9,7 +9,7 @@ from fingervision.vision.grey import GreyImage
 
 
 def denoise(grey: GreyImage) -> GreyImage:
-    """Median of 3 by 3 pixels, which removes noise and single bright pixels and keeps edges in place.
+    """Median of 3 by 3 pixels, which removes noise and single bright pixels and leaves edges in place.
 
     A Gaussian filter takes about twice the time and rounds the tips; a median of 5 by 5 takes more than twice the time
     (`tests/benchmarks/steps.py` prints the times).

@@ -34,6 +34,9 @@ LARGEST_MOVE_PX, LARGEST_WIDENING_PX, LEAST_CONTRAST = 1.0, 0.3, 1e-3
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
 # Variance of a pixel's own width, which a slanted edge feels along the line.
 PIXEL_VARIANCE = 1.0 / 12.0
+# Optics as sharp as this leave nearly all light of an edge to one pixel, which tells the edge's place or the blur but
+# not both: sharp rectangles at all sub-pixel places are fitted with blurs from 0.2 to 0.42 px.
+LEAST_RESOLVED_BLUR_PX = 0.45
 
 _row = loop("edge_filters_row")
 _column = loop("edge_filters_column")
@@ -43,7 +46,7 @@ _mean_square = loop("edge_filters_mean_square")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeFilters:
-    """Filters for one length of window; arrays of shape (blurs, offsets, pixels) unless said otherwise.
+    """Filters for one length of window; arrays of shape (blurs, offsets, pixels) unless stated otherwise.
 
     Parameters
     ----------
@@ -52,13 +55,14 @@ class EdgeFilters:
     sigmas_px : ndarray of float, shape (blurs,)
         Gaussian sigma along the line.
     offsets_px : ndarray of float, shape (offsets,)
-        Where the edge lies, from the window's middle outwards.
+        Position of the edge, from the window's middle outwards.
     contrast, shift, blur : ndarray of float
-        Scalar product with the grey levels gives the contrast, contrast times shift, contrast times change of sigma.
+        Filters: the scalar product with the grey levels gives the contrast, the contrast times the shift of the edge,
+        and the contrast times the change of sigma.
     step : ndarray of float
-        The edge itself, from 0 inside to 1 outside, its mean removed.
+        Blurred step from 0 inside to 1 outside, with its mean subtracted.
     shift_gain : ndarray of float, shape (blurs, offsets)
-        Root of the Fisher information of the position for unit contrast and noise, the levels unknown.
+        Square root of the Fisher information of the position for unit contrast and unit noise, with unknown levels.
     """
 
     reach_px: int
@@ -71,18 +75,18 @@ class EdgeFilters:
     shift_gain: Floats
 
     def look(self, levels: Floats, lines: "Lines", blur_px: Floats, position_px: Floats) -> "Look":
-        """Take one Gauss-Newton step of every line's position and contrast, and of the blurs that they share.
+        """Take one Gauss-Newton step for the position and contrast of every line, and for the blurs of the lines.
 
         Parameters
         ----------
         levels : ndarray of float, shape (n, pixels)
             Grey levels along each line, from inside to outside.
         lines : Lines
-            What the lines share.
+            Properties of the lines.
         blur_px : ndarray of float, shape (blurs,)
             Gaussian sigma of the optics.
         position_px : ndarray of float, shape (n,)
-            Where each edge is thought to lie, from the window's middle outwards.
+            Present estimate of each edge's position, from the window's middle outwards.
         """
         n = len(levels)
         position, contrast, sigma, blur = np.empty(n), np.empty(n), np.empty(n), np.empty(blur_px.size)
@@ -92,11 +96,11 @@ class EdgeFilters:
         return Look(position, contrast, blur, sigma, row, column)
 
     def middle(self, sigma_px: float) -> tuple[int, int]:
-        """Row and column of the filters for an edge of this blur in the centre of the window."""
+        """Row and column in the table of filters for an edge of this blur in the centre of the window."""
         return _row(sigma_px, self.sigmas_px.size), _column(0.0)
 
     def mean_square(self, levels: Floats, look: "Look") -> tuple[Floats, Floats]:
-        """Mean squared residual of each line after a look-up, and the gain of the position; shape (n,) each."""
+        """Mean squared residual of each line after a look-up, and gain of the position filter; shape (n,) each."""
         mean_square, gain = np.empty((2, len(levels)))
         table = (self.step, self.offsets_px, self.shift_gain)
         _mean_square(levels, look.position, look.contrast, look.row, look.column, *table, mean_square, gain)
@@ -104,16 +108,16 @@ class EdgeFilters:
 
 
 class Lines(NamedTuple):
-    """Lines across an outline that share their blurs.
+    """Lines of pixels across an outline; several lines may have the same blur.
 
     Parameters
     ----------
     slope : ndarray of float, shape (n,)
-        Change of the edge from line to line: a slanted edge is wider along the line.
+        Change of the edge's position from line to line: a slanted edge is wider along the line.
     weight : ndarray of float, shape (n,)
-        0 for a line that has no say.
+        Weight of the line; 0 for a line that is not used.
     blur_of_line : ndarray of int, shape (n,)
-        Number of the blur of each line.
+        Index of the blur that each line has.
     """
 
     slope: Floats
@@ -123,20 +127,20 @@ class Lines(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """Result of one look-up of all edges; arrays of shape (n,) unless said otherwise.
+    """Result of one look-up of all edges; arrays of shape (n,) unless stated otherwise.
 
     Parameters
     ----------
     position : ndarray of float
-        From the window's middle outwards (pixels).
+        Position of each edge from the window's middle outwards (pixels).
     contrast : ndarray of float
         Outside level minus inside level.
     blur : ndarray of float, shape (blurs,)
         Gaussian sigma of the optics (pixels).
     sigma : ndarray of float
-        Blur along each line before the look.
+        Blur along each line before this look-up.
     row, column : ndarray of int
-        Blur and offset of the filters that were used.
+        Indices of the blur and of the offset of the filters used.
     """
 
     position: Floats
@@ -148,7 +152,7 @@ class Look:
 
 
 def reach_for(sigma_px: float) -> int:
-    """Half-length of the window that an edge of this blur needs."""
+    """Half-length of the window needed for an edge of this blur."""
     needed = REACH_SIGMAS * sigma_px + REACH_EXTRA_PX
     return next((reach for reach in REACHES_PX if reach >= needed), REACHES_PX[-1])
 
@@ -159,14 +163,14 @@ def blurred_step(borders: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats
     Parameters
     ----------
     borders : ndarray of float, shape (..., pixels + 1)
-        Borders of the pixels, counted from the edge.
+        Borders of the pixels, measured from the edge.
     sigma : ndarray of float, shape (..., 1)
         Standard deviation of the blur.
 
     Returns
     -------
     step, by_position, by_sigma : ndarray of float, shape (..., pixels)
-        Integral over each pixel, and how it changes as the edge moves outwards and as the blur grows.
+        Integral over each pixel, its change when the edge moves outwards, and its change when the blur grows.
     """
     q = borders / sigma
     cumulative = ndtr(q)
@@ -177,7 +181,7 @@ def blurred_step(borders: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats
 
 @cache
 def edge_filters(reach_px: int) -> EdgeFilters:
-    """Filters for a window of `2 reach_px + 1` pixels, for every blur that fits it."""
+    """Filters for a window of `2 reach_px + 1` pixels, for every blur that fits into the window."""
     largest = (reach_px - REACH_EXTRA_PX) / REACH_SIGMAS * np.sqrt(2.0) + 1.0  # a slanted edge is wider along the line
     count = int(np.ceil(np.log(largest / SMALLEST_SIGMA_PX) / np.log(SIGMA_RATIO))) + 1
     sigmas = np.asarray(SMALLEST_SIGMA_PX * SIGMA_RATIO ** np.arange(count), dtype=np.float64)

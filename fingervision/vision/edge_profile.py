@@ -1,8 +1,9 @@
 """Deviations of a finger's flank from a blurred step: a bright rim, or clipped levels.
 
-Either of them moves the fitted edge by the same amount in every row, and leaves a pattern in the residuals of the fit.
-The pattern tells how far the edge may have moved, which is added to the uncertainty. The edge itself is not corrected,
-because real optics leave patterns of their own, and a correction from them would not be steady from frame to frame.
+A rim or clipping moves the fitted edge by the same amount in every row, and leaves a pattern in the residuals of the
+fit. From the pattern it is estimated how far the edge may have moved, which is added to the uncertainty. The edge
+itself is not corrected, because real optics cause similar patterns, and a correction derived from them would vary from
+frame to frame.
 """
 
 from typing import NamedTuple
@@ -44,9 +45,9 @@ class EdgeMark(NamedTuple):
     Parameters
     ----------
     shift_px : float
-        How far it may have moved the fitted edge outwards.
+        Possible outward displacement of the fitted edge.
     beyond : float
-        How much of the flank surely lies beyond the end of the scale, as a share of the contrast.
+        Lower bound of the part of the flank that lies beyond the end of the scale, as a share of the contrast.
     """
 
     shift_px: float
@@ -65,23 +66,23 @@ def edge_mark(
     noise: float,
     top_level: float,
 ) -> EdgeMark:
-    """Estimate the deviation of one flank from a blurred step.
+    """Estimate the deviation of one flank from a blurred step, and the displacement of the edge that it may cause.
 
     Parameters
     ----------
     levels : ndarray of float, shape (rows, pixels)
         Grey levels from inside to outside.
     position : ndarray of float, shape (rows,)
-        Fitted edge, from the window's middle outwards (pixels).
+        Fitted position of the edge, from the window's middle outwards (pixels).
     sigma : ndarray of float, shape (rows,)
-        Fitted blur along the row, without the pixel.
+        Fitted blur along the row, without the pixel's width.
     contrast : ndarray of float, shape (rows,)
         Fitted contrast.
     mean_square : ndarray of float, shape (rows,)
-        What the fit leaves of each row (grey levels squared).
+        Mean squared residual of each row after the fit (grey levels squared).
     noise : float
         Standard deviation of the grey levels.
     top_level : float
-        End of the scale.
+        Highest level of the scale.
     """
     return EdgeMark(*_edge_mark(levels, position, sigma, contrast, mean_square, noise, top_level))

@@ -1,4 +1,4 @@
-"""Find candidate edges along a direction: lobes of the derivative of a zone's mean profile."""
+"""Find candidate edges along a direction: extrema of the derivative of a zone's mean profile."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -28,14 +28,14 @@ _steps = loop("edge_search_steps")
 
 @dataclass(frozen=True, slots=True)
 class StepCandidate:
-    """A candidate edge along the zone's direction.
+    """A candidate edge along the direction in which a zone is searched.
 
     Parameters
     ----------
     position_px : float
-        Along the direction, from the zone's middle, to about half a pixel.
+        Position along the direction from the zone's middle, accurate to about half a pixel.
     contrast : float
-        Level beyond less level before.
+        Level beyond the edge minus level before it.
     """
 
     position_px: float
@@ -85,18 +85,18 @@ def _summed(strip: NDArray[np.intp], share: Floats, values: Floats, size: int) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Profile:
-    """Mean level across a zone.
+    """Mean level across a zone, as a function of the position along the searched direction.
 
     Parameters
     ----------
     level : ndarray of float, shape (n,)
-        Mean of each pixel-wide strip; meaningless where `weight` is zero.
+        Mean of each pixel-wide strip; meaningless if `weight` is zero.
     weight : ndarray of float, shape (n,)
-        Pixels of each strip that lie in the picture, as a share of the strip.
+        Share of each strip's pixels that lie in the picture.
     variance : float
         Variance of the levels within the strips.
     half : int
-        Strips to either side of the middle one.
+        Number of strips on either side of the middle one.
     """
 
     level: Floats
@@ -115,22 +115,22 @@ def profile(
     length_px: float,
     half: int,
 ) -> Profile:
-    """Mean profile along a direction.
+    """Mean profile of a zone along a direction.
 
     Parameters
     ----------
     grey : ndarray, shape (height, width)
         The picture.
     light : ndarray of float, shape (levels,), or None
-        Light of every level; None where it is the level itself.
+        Light for every level (look-up table); None if the levels are proportional to light.
     at_px : (int, int)
         Column and row of the zone's middle.
     direction_rad, slope : float
-        Direction of the profile, and how much the edges lean (change of t with s).
+        Direction of the profile, and inclination of the edges (change of t with s).
     length_px : float
-        Across the direction.
+        Length of the zone across the direction.
     half : int
-        Strips to either side.
+        Number of strips on either side of the middle one.
     """
     bins = _bins(direction_rad, round(slope, 2), length_px, half)
     height, width = grey.shape

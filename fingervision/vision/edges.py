@@ -1,9 +1,9 @@
 """Step 5, the edges: sub-pixel position of the transition from finger to background in every row and column.
 
 Each row across a flank, and each column across a tip, contains one edge: a step between two levels, blurred by a
-Gaussian and integrated over the pixel. The position is the maximum-likelihood one under white noise, so its variance is
-the Cramer-Rao bound. All rows share one blur for the flanks and one for the tip of each finger, because motion blurs a
-flank more than a tip. Nothing is resampled.
+Gaussian and integrated over the pixel. The position is the maximum-likelihood estimate under white noise, whose
+variance is the Cramer-Rao bound. Each finger has one blur for the rows across its flanks and another for the columns
+across its tip, because motion blurs a flank more than a tip. The picture is not resampled.
 """
 
 from dataclasses import dataclass
@@ -51,40 +51,40 @@ _clipped = loop("edges_clipped")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgePoints:
-    """Sub-pixel points of two fingers' half-level outlines; arrays of shape (2, PLACES) unless said otherwise.
+    """Sub-pixel points of two fingers' half-level outlines; arrays of shape (2, PLACES) unless stated otherwise.
 
     Parameters
     ----------
     lines : ProfileLines
-        Where they were looked for.
+        Lines of pixels along which the edges were fitted.
     position : ndarray of float
         Coordinate along each line, in the picture's pixels.
     u_position : ndarray of float
-        Standard uncertainty of each from the noise of its own profile.
+        Standard uncertainty of each position, from the noise of its own line.
     contrast : ndarray of float
         Outside level minus inside level.
     blur_px : ndarray of float, shape (2, 2)
-        Gaussian sigma of each finger's edges across the fingers (as its flanks show it) and along them (as its tip
-        does), without the pixel; they differ where a finger moved during the exposure.
+        Gaussian sigma, without the pixel's width, of each finger's edges across the fingers (from the flanks) and along
+        them (from the tip); the two differ if a finger moved during the exposure.
     noise : float
-        Standard deviation of the grey levels about the model.
+        Standard deviation of the grey levels about the fitted model.
     curvature_gain : ndarray of float
-        How much more than the half-level a fit along this line feels the outline's curvature.
+        Ratio of the fitted position's sensitivity to the outline's curvature to that of the half-level.
     is_clipped : ndarray of bool
-        Whether the flank itself, not only the plateau, touches the end of the scale.
+        Whether the flank itself, not only the plateau, reaches the end of the scale.
     reach_px : int
         Half-length of the window along each line.
     marks : (EdgeMark, EdgeMark)
-        What each inner flank shows that a blurred step does not; nothing where the window holds both edges.
+        Deviation of each inner flank from a blurred step; zero if the window contains both fingers' edges.
     inside : (float, float)
-        Level of each finger beside its inner flank.
+        Level of each finger next to its inner flank.
     shared_lines : float
-        Neighbouring lines that share their noise.
+        Number of neighbouring lines with common noise.
     noise_flat : float
-        Standard deviation of the light in the flat parts beside the edges; 0 where none is in view.
+        Standard deviation of the light in the flat parts beside the edges; 0 if no flat part is in view.
     beside : str
-        What stands beside the edges or has moved them, where anything is seen: wall, shadow, glare, motion, sharpening;
-        or a strip of a third tone, which is not measured.
+        Disturbance found beside the edges: wall, shadow, glare, motion, sharpening, or a strip of a third tone (which
+        is not measured); empty if none was found.
     """
 
     lines: ProfileLines
@@ -109,18 +109,18 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     Parameters
     ----------
     upright : ndarray, shape (rows, columns)
-        Grey levels, seen with the tips up.
+        Grey levels of the picture, turned so that the tips point up.
     lines : ProfileLines
-        Where to look.
+        Lines of pixels on which to fit an edge.
     light : ndarray of float, shape (levels,)
-        Light of every grey level, on the levels' own scale.
+        Light for every grey level (look-up table), on the same scale as the levels.
     top_level : int
-        End of the scale.
+        Highest level of the scale.
 
     Returns
     -------
     EdgePoints
-        One point a line.
+        One point per line.
     """
     blur = first_blur(upright, lines, light)
     filters = edge_filters(reach_for(blur))
@@ -141,7 +141,7 @@ def _fit(
     filters: EdgeFilters,
     top_level: float,
 ) -> EdgePoints:
-    """Gauss-Newton over every line's two levels and position, and the blur of flanks and tips."""
+    """Gauss-Newton fit of the two levels and the position of every line, and of the blurs of flanks and tips."""
     pixels, real = levels.shape[-1], lines.weight.ravel() > 0
     shared = Lines(lines.slope.ravel(), lines.weight.ravel(), BLUR_OF_LINE)
     facing = facing_lines(lines, filters.reach_px)
@@ -198,8 +198,9 @@ def _fit(
 def _along_axes(blur: Floats, lines: ProfileLines) -> Floats:
     """Blur across the fingers and along them, from the fitted blurs of the flanks' rows and the tips' columns.
 
-    A line that crosses an edge of slope m also sees a share m^2 / (1 + m^2) of the other axis' blur. If the fingers
-    moved sideways during the exposure, a round tip would otherwise appear blurred along the fingers.
+    The squared blur on a line that crosses an edge of slope m contains a share m^2 / (1 + m^2) of the other axis'
+    squared blur. Without this correction, sideways motion during the exposure would make a round tip appear blurred
+    along the fingers.
     """
     out = blur.copy()
     for k in range(2):

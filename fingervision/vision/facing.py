@@ -1,4 +1,4 @@
-"""Pairs of edges so close together that one search window contains both."""
+"""Pairs of the two fingers' edges so close together that one search window contains both."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ Facing = tuple[NDArray[np.int_], NDArray[np.int_]]
 
 
 def facing_lines(lines: ProfileLines, reach: int) -> Facing | None:
-    """Inner lines of the left and of the right finger in the same rows, where one window holds both edges."""
+    """Indices of the left and the right finger's inner lines in common rows, where one window contains both edges."""
     filled = [int(n) for n in lines.weight[:, :INNER].sum(axis=1)]
     if min(filled) == 0 or lines.coarse[1, : filled[1]].min() - lines.coarse[0, : filled[0]].max() >= 2 * reach:
         return None
@@ -24,9 +24,9 @@ def facing_lines(lines: ProfileLines, reach: int) -> Facing | None:
 def without_the_other(
     values: Floats, lines: ProfileLines, facing: Facing, position: Floats, contrast: Floats, sigma: Floats
 ) -> Floats:
-    """Subtract the other finger's edge from lines whose window contains both.
+    """Subtract the other finger's edge from lines whose window contains the edges of both fingers.
 
-    The background between is then a stripe.
+    There the background between the fingers appears as a narrow stripe.
     """
     levels, reach = values.copy(), values.shape[-1] // 2
     edge = lines.coarse + lines.outward * position

@@ -1,12 +1,12 @@
-"""Step 6, the finger's end: its outline fitted by three straight sides and two round corners.
+"""Step 6, the finger's end: fit of three straight sides and two round corners to its outline.
 
 A printed or cut finger ends in an inner flank, a top and an outer flank, each straight, with a fillet of any radius
-(from sharp to fully round) between them. One fit of this shape to all edge points of a finger needs no window, and
-gives the tip and the inner edge together with their joint covariance.
+(from sharp to fully round) between them. This shape is fitted to all edge points of a finger, not only to those in a
+window, and gives the tip and the inner edge with their joint covariance.
 
-Blur moves the half-level of a curved edge towards the inside of the curve by sigma^2 kappa / 2 (kappa the curvature);
-near the end of a fillet only part of the curvature counts. The points are compared with the outline displaced in this
-way, so that the result is the outline before the blur.
+Blur moves the half-level of a curved edge towards the inside of the curve by sigma^2 kappa / 2 (kappa the curvature),
+and by less near the end of a fillet. The points are compared with the model's outline displaced in this way, so that
+the fitted outline is that before blurring.
 """
 
 from dataclasses import dataclass
@@ -50,15 +50,15 @@ class FingerEnd:
     parameters : ndarray of float, shape (8,)
         Offsets, slopes and fillet radii of the inner and outer flank, offset and slope of the top.
     covariance : ndarray of float, shape (8, 8)
-        From the points' own uncertainties.
+        Covariance of the parameters, from the points' own uncertainties.
     origin : ndarray of float, shape (2,)
-        x0 of the top line and y0 of the flanks.
+        Reference coordinates: x0 of the top line and y0 of the flanks.
     misfit : float
-        Robust ratio of the residuals' spread to the points' uncertainties; 1 for a perfect shape.
+        Robust ratio of the residuals' spread to the points' uncertainties; 1 for an exact shape.
     residual : ndarray of float, shape (n,)
         Normal distance of every point in units of its uncertainty.
     robust : ndarray of float, shape (n,)
-        Weight of every point, between 0 and 1.
+        Robust weight of every point, between 0 and 1.
     """
 
     parameters: Floats
@@ -70,18 +70,18 @@ class FingerEnd:
 
 
 def fit_finger_end(points: OutlinePoints, start: Floats, origin: Floats, u_prior: Floats) -> FingerEnd:
-    """Least squares with Tukey's biweight over the points of a finger.
+    """Fit the finger's end to the points by least squares with Tukey's biweight.
 
     Parameters
     ----------
     points : OutlinePoints
-        Sub-pixel outline.
+        Sub-pixel outline of the finger.
     start : ndarray of float, shape (8,)
-        First guess.
+        Initial estimate of the parameters.
     origin : ndarray of float, shape (2,)
-        x0 and y0 of the lines.
+        Reference coordinates x0 and y0 of the lines.
     u_prior : ndarray of float, shape (8,)
-        Weak knowledge that keeps a parameter in place where no point speaks of it.
+        Standard uncertainties of weak priors, which fix parameters that no point determines.
     """
     p, covariance = np.empty(PARAMETERS), np.empty((PARAMETERS, PARAMETERS))
     residual, robust = np.empty(points.x.size), np.empty(points.x.size)
@@ -91,7 +91,9 @@ def fit_finger_end(points: OutlinePoints, start: Floats, origin: Floats, u_prior
 
 
 def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_prior: Floats) -> FingerEnd:
-    """Repeat the fit from other radii where it rejects points, because a wrong fillet makes its corner look like dust.
+    """Repeat the fit from other corner radii if it rejects points.
+
+    With a wrong fillet radius, the points of the corner look like outliers (dust).
 
     The initial estimate of a radius assumes a right-angled corner, which a tapered finger does not have.
     """

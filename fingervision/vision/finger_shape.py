@@ -1,4 +1,4 @@
-"""Shape of a finger's end, three straight sides joined by two round corners, and the position of a point on it."""
+"""Shape of a finger's end (three straight sides, two round corners): distances of points from it, and its read-offs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,16 +31,17 @@ _inner_edge = loop("finger_shape_inner_edge")
 def compared(
     p: Floats, origin: Floats, x: Floats, y: Floats, u: Floats, is_row: Flags, is_outer: Flags, blur: Floats
 ) -> tuple[Floats, Floats, Flags]:
-    """Compare the points of a half-level outline with a shape.
+    """Compare points of a half-level outline with the shape of a finger's end.
 
     Returns
     -------
     distance : ndarray of float, shape (n,)
-        From the shape's own half-level along its normal, in units of its uncertainty.
+        Distance of each point from the shape's own half-level contour along the normal, in units of the point's
+        uncertainty.
     jacobian : ndarray of float, shape (n, 8)
-        Change of the distance with every parameter.
+        Derivatives of the distance by the parameters.
     counts : ndarray of bool, shape (n,)
-        False where a blurred-out corner leaves a point no say.
+        False for a point near a corner so blurred that the point carries no information.
     """
     distance, jacobian = np.empty(x.size), np.empty((x.size, PARAMETERS))
     counts = np.empty(x.size, dtype=np.bool_)
@@ -56,7 +57,7 @@ def on_flanks(p: Floats, origin: Floats, x: Floats, y: Floats) -> Flags:
 
 
 def corner_tops(p: Floats, origin: Floats) -> tuple[float, float, float, float]:
-    """Outermost points of the inner and the outer fillet along the axis, as x, y, x, y."""
+    """Outermost points (along the axis) of the inner and the outer fillet, as x, y, x, y."""
     inner_x, inner_y, outer_x, outer_y = _corner_tops(p, origin)
     return inner_x, inner_y, outer_x, outer_y
 

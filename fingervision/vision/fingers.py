@@ -1,9 +1,9 @@
-"""Step 4, finding the fingers: which two objects in view are the fingers, and where they point.
+"""Step 4, finding the fingers: which two objects in view are the fingers, and in which direction they point.
 
-A tip is a local maximum of an outline towards the tips' side of the picture, whose depth (topographic prominence) is
-large enough. Two touching fingers are one object with two local maxima and a notch between them, and are found in the
-same way. An object that begins at the picture's border has its tip out of view. Only background lies between the two
-fingers, and no third object stands beside them like a finger.
+A tip is a local maximum of an outline in the direction in which the tips point, with a sufficient topographic
+prominence. Two touching fingers are one object with two local maxima and a notch between them, and are found in the
+same way. If an outline's local maximum is at the picture's border, the tip is out of view. Only background may lie
+between the two fingers, and no third object beside them may look like a finger.
 """
 
 from collections.abc import Sequence
@@ -60,16 +60,16 @@ def find_fingers(
     mask : ndarray of uint8, shape (height, width)
         Non-zero where the fingers may be.
     directions : sequence of Direction
-        Where the tips may point.
+        Directions in which the tips may point.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     reach_px : float
-        How far below the tips the outline is wanted.
+        Distance below the tips down to which the outline is needed.
 
     Returns
     -------
     CoarseFingers or NoGap
-        The best pair in any of the directions, or why there is none.
+        The best pair in any of the directions, or the reason why there is none.
     """
     outlines = find_outlines(mask)
     best: CoarseFingers | None = None
@@ -164,7 +164,7 @@ def _best_pair(
 
 
 def _has_company(own: Outline, outlines: Outlines) -> bool:
-    """Whether other objects of a similar size are in view, as with letters of a text."""
+    """Whether other objects of similar size are in view, as the letters of a text are."""
     return bool(np.count_nonzero(outlines.lengths > COMPANY_SHARE * len(own)) > 2)
 
 
@@ -190,7 +190,7 @@ def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
 
 
 def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether a second pair of objects of another width, coming in from the border, looks as much like two fingers."""
+    """Whether a second pair of objects, of another width and from the border too, looks as much like two fingers."""
     lower = min(top.prominence_px for top in two)
     others = [
         top
@@ -212,7 +212,7 @@ def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFinge
 
 
 def _standing(tops: list[Top], below_tip_px: float) -> list[Top]:
-    """Objects that come in from the border like a finger."""
+    """Objects that reach the picture's border like a finger."""
     return [
         top
         for top in tops
@@ -236,20 +236,20 @@ def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
 
 
 def _end_alike(first: Top, second: Top, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are at about the same height."""
+    """Whether two tips are at about the same height along the fingers."""
     left, right = (first, second) if first.across_px <= second.across_px else (second, first)
     step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
     return end_alike(step_px, apart_px, below_tip_px, builds)
 
 
 def _stand_side_by_side(left: Top, right: Top, below_tip_px: float) -> bool:
-    """Whether each finger extends to the other's measuring height; objects one above the other are no fingers."""
+    """Whether each finger extends to the other's measuring height; objects one above the other are not fingers."""
     deepest = max(left.along_px, right.along_px) + below_tip_px
     return deepest <= min(left.along_px + left.prominence_px, right.along_px + right.prominence_px)
 
 
 def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> CoarseFinger | None:
-    """Outline from the inner side over the tip to the outer side, down to `reach_px` or as far as it goes."""
+    """Outline from the inner side over the tip to the outer side, down to `reach_px` below the tip or to its end."""
     start, stop = (follow_down(top.outline, top.index, step, top.along_px + reach_px) for step in (-1, 1))
     piece = top.outline[start : stop + 1]
     if inner_sign * (piece[0, 0] - piece[-1, 0]) < 0:
@@ -267,10 +267,10 @@ def _is_open(
     below_tip_px: float,
     builds: tuple[Build, Build],
 ) -> bool:
-    """Whether next to nothing lies on the straight path between the two measuring points.
+    """Whether the straight path between the two measuring points is almost free of other objects.
 
-    If the camera is turned, a corner of one finger may lie on that path; then the path is taken level, at the lower of
-    the two measuring heights.
+    If the camera is turned, a corner of one finger may lie on that path; then a horizontal path at the lower of the two
+    measuring heights is tested.
     """
     heights = [finger.top_along_px + below_tip_px for finger in (left, right)]
     if is_free(mask, *_inner_places(left, right, orientation, heights)):
@@ -283,7 +283,7 @@ def _is_open(
 def _inner_places(
     left: CoarseFinger, right: CoarseFinger, orientation: Orientation, heights: list[float]
 ) -> tuple[Place, Place]:
-    """Positions in the picture where the two inner sides have the given heights, to one pixel."""
+    """Picture coordinates at which the two inner sides have the given heights, to the nearest pixel."""
     first, second = (
         orientation.to_pixels(*inner_crossing(finger.outline, height))
         for finger, height in zip((left, right), heights, strict=True)

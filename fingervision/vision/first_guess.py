@@ -1,4 +1,4 @@
-"""Initial estimate of a finger's end from its points: a line through each side, and the corners' radii."""
+"""Initial estimate of a finger's end from its points: a line through each side, and the radii of the corners."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +38,14 @@ def first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Flo
     Parameters
     ----------
     points : OutlinePoints
-        Sub-pixel outline.
+        Sub-pixel outline of the finger.
     below_tip_px : float
-        Height of measuring below the tip.
+        Distance of the measuring point below the tip.
 
     Returns
     -------
     start, origin, u_prior : ndarray of float, shape (8,), (2,), (8,)
-        As `fit_finger_end` takes them.
+        Arguments for `fit_finger_end`.
     """
     start, origin, u_prior = np.empty(PARAMETERS), np.empty(2), np.empty(PARAMETERS)
     _guess(points.x, points.y, points.side, points.blur[0], below_tip_px, start, origin, u_prior)

@@ -1,4 +1,4 @@
-"""Flanks of an object to one pixel: whether they are straight over a sufficient length, as a finger's are."""
+"""Flanks of an object to the nearest pixel: whether they are straight over a sufficient length, as a finger's are."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +25,16 @@ _has_straight_stretch = loop("flanks_has_straight_stretch")
 def has_straight_flanks(top: Top, below_tip_px: float, steepest: float = STEEPEST) -> bool:
     """Whether the object below a local maximum has straight flanks.
 
-    A side that ends in a notch before the required length counts neither for nor against it.
+    A side that ends in a notch before the required length is ignored.
 
     Parameters
     ----------
     top : Top
-        Where the thing begins.
+        Local maximum of the object's outline.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     steepest : float
-        Pixels across per pixel along by which a flank may lean.
+        Largest inclination of a flank, in pixels across per pixel along the finger.
     """
     sides = [across_by_row(top.outline, top.index, step) for step in (-1, 1)]
     wanted = int(max(LEAST_HEIGHTS * below_tip_px, LEAST_SHARE * max(side.size for side in sides)))
@@ -43,13 +43,13 @@ def has_straight_flanks(top: Top, below_tip_px: float, steepest: float = STEEPES
 
 
 def follow_down(outline: Outline, top: int, step: int, limit: float) -> int:
-    """Index at which the outline, followed from its tip, reaches `limit`, or its lowest point before it rises again."""
+    """Index at which the outline, followed down from its tip, reaches `limit`, or its lowest point if that is first."""
     end, _ = _follow_down(outline, top, step, limit)
     return int(end)
 
 
 def across_by_row(outline: Outline, top: int, step: int) -> NDArray[np.float64]:
-    """Position across the finger at each row, where the outline followed down from its tip last crosses that row."""
+    """Position across the finger at each row, where the outline, followed down from the tip, last crosses that row."""
     end, deep = _follow_down(outline, top, step, np.inf)
     across = np.empty(deep + 1)
     _across_by_row(outline, top, step, end, across)

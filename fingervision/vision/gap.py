@@ -73,22 +73,22 @@ def measure_gap(
     Parameters
     ----------
     fingers : CoarseFingers
-        Where they were found.
+        The fingers to the nearest pixel.
     edges : EdgePoints
-        Their sub-pixel outlines.
+        Sub-pixel outlines of the fingers.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     full_scale : int
         Largest grey level.
     light_gap : bool
-        Whether the fingers are dark.
+        Whether the fingers are darker than the gap.
     coding : Coding
-        How far errors are shared.
+        Coding of the picture, which determines how many neighbouring points have a common error.
 
     Returns
     -------
     GapMeasurement or NoGap
-        The number, or why there is none.
+        The measured gap, or the reason why there is none.
     """
     refusal = _refuse(edges, full_scale, light_gap)
     if refusal is not None:
@@ -172,16 +172,16 @@ def measure_gap(
 
 
 def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> list[MeasuringPoint]:
-    """Both measuring points by straight sides with corners; None where either finger has no such shape.
+    """Measuring points of both fingers from straight sides with corners; empty if either lacks such a shape.
 
-    Both fingers use the same method, so that its systematic errors are equal.
+    Both fingers are measured by the same method, so that their systematic errors are equal.
     """
     found = [polygonal_measuring_point(p, below_tip_px, shared) for p in points]
     return [own for own in found if own is not None] if None not in found else []
 
 
 def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
-    """Return the status `gripping` where a part hides an inner edge at the measuring height."""
+    """Return the status `gripping` if a part hides an inner edge at the measuring height."""
     sides = [
         name
         for name, finger in (("left", fingers.left), ("right", fingers.right))
@@ -194,7 +194,7 @@ def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
 
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
-    """Return the reason why the edges give no number, if any."""
+    """Return the reason why no gap can be measured from the edges; None if there is no such reason."""
     real = edges.lines.weight > 0
     inner = real & IS_INNER
     if np.count_nonzero(inner) < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
@@ -222,7 +222,7 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
 
 
 def _way_px(edges: EdgePoints) -> float:
-    """Displacement of the faster finger during the exposure (pixels): such motion blurs only the flanks."""
+    """Displacement of the faster finger during the exposure (pixels), from the extra blur of its flanks."""
     flanks, tips = (edges.blur_px[:, part] ** 2 for part in (0, 1))
     return sqrt(12.0 * max(0.0, float((flanks - tips).max())))
 
@@ -234,7 +234,7 @@ def _no_fingers(
     holds: list[bool],
     below_tip_px: float,
 ) -> NoGap | None:
-    """Return the status `no_fingers` where the measured objects are round all over: a finger has straight flanks."""
+    """Return the status `no_fingers` or `one_finger` if an object has no straight flanks, as fingers have."""
     pair = (fingers.left, fingers.right)
     turn = common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
     are_fingers = [
@@ -263,7 +263,7 @@ def _assemble(
     light_gap: bool,
     largest_variance: float,
 ) -> GapMeasurement | NoGap:
-    """Transform from the fingers' axes back to the picture, and refuse a result of larger variance than allowed."""
+    """Transform the result from the fingers' axes to the picture; refuse one with a larger variance than allowed."""
     orientation = fingers.orientation
     across, along, found = [], [], []
     for k, (finger, m) in enumerate(zip((fingers.left, fingers.right), measured, strict=True)):

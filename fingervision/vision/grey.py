@@ -1,4 +1,4 @@
-"""Step 1, grey scale: one number per pixel, as close to the sensor as the source allows, and its full scale."""
+"""Step 1, grey scale: one number per pixel, as close to the sensor's data as the source allows, and the full scale."""
 
 import cv2
 import numpy as np
@@ -41,15 +41,15 @@ def full_scale(grey: GreyImage) -> int:
 def top_level(grey: GreyImage, bits: int | None = None) -> int:
     """Level at which the sensor saturates.
 
-    Cameras store 10, 12 or 14 bits in 16-bit words, in their lower or in their upper bits. The bits that are set in any
-    pixel show which: none above the depth, or none below it.
+    Cameras store 10, 12 or 14 bits in 16-bit words, in their lower or in their upper bits. Which bits are used follows
+    from the bits that are set in any pixel: none above the depth, or none in the lowest bits.
 
     Parameters
     ----------
     grey : ndarray, shape (height, width)
         Grey levels.
     bits : int or None
-        Depth that the user states; the picture itself overrules one that is too small.
+        Bit depth stated by the user; it is ignored if the picture itself uses more bits.
     """
     if grey.dtype == np.uint8:
         return 255

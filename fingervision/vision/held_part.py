@@ -1,4 +1,4 @@
-"""Rows that a held part leaves visible, and the width of the part."""
+"""Rows in which the fingers' edges are visible beside a held part, and the width of the part."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ U_ALONG_PX = 1.0
 
 
 def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
-    """Rows in which a finger's own edge is visible; all rows of one side move together."""
+    """Lines on which a finger's own edge is visible; lines hidden by a held part are removed."""
     pair = (fingers.left, fingers.right)
     if not any(finger.hidden.size for finger in pair):
         return lines
@@ -41,7 +41,7 @@ def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
 
 
 def _inner_across(finger: CoarseFinger) -> int:
-    """The innermost pixel of the finger's tip."""
+    """Coordinate across the picture of the innermost pixel of the finger's tip."""
     near = finger.outline[finger.outline[:, 1] <= finger.top_along_px + 2 * BESIDE_TIP_PX, 0]
     return int(near.max() if finger.inner_sign > 0 else near.min())
 
@@ -49,23 +49,24 @@ def _inner_across(finger: CoarseFinger) -> int:
 def held_part(
     fingers: CoarseFingers, ends: tuple[FingerEnd, FingerEnd], spread: tuple[float, float], light_gap: bool
 ) -> HeldPart | None:
-    """Width of a held part: distance between the two inner flanks where they touch it.
+    """Width of a held part: distance between the two inner flanks where they touch the part.
 
     Parameters
     ----------
     fingers : CoarseFingers
-        To a pixel, with where the part is held.
+        The fingers to the nearest pixel, with the position of the held part.
     ends : (FingerEnd, FingerEnd)
-        The shapes of both.
+        Fitted end shapes of the left and of the right finger.
     spread : (float, float)
-        Variance of each finger's residuals, shared ones counted once, in units of their stated one.
+        Ratio of the residuals' variance to the stated variance for each finger, multiplied by the number of
+        neighbouring points with a common error.
     light_gap : bool
-        Whether the fingers are dark.
+        Whether the fingers are darker than the gap.
 
     Returns
     -------
     HeldPart or None
-        None where nothing is held, or its width is not known.
+        None if nothing is held, or the width is too uncertain.
     """
     if fingers.held_along_px is None:
         return None
@@ -86,7 +87,7 @@ def held_part(
 
 
 def _flank(end: FingerEnd, height: float) -> tuple[float, float]:
-    """Position and variance of the straight inner flank at a height, extrapolated where a fillet begins above it."""
+    """Position of the straight inner flank at a height, and its variance; extrapolated if a fillet begins below."""
     arm = height - float(end.origin[1])
     edge = end.parameters[INNER_C] + end.parameters[INNER_M] * arm
     c = end.covariance

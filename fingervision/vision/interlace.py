@@ -1,8 +1,9 @@
-"""Interlaced pictures: even and odd rows were exposed at two times, so that a moving finger shows as a comb.
+"""Interlaced pictures: even and odd rows are exposed at two times, so that a moving finger's edge looks like a comb.
 
-The displacement between the two fields is measured on the flanks: each row against the line between its neighbours of
-the other field, over all rows. Every row is then moved half-way towards the other field, so that both represent the
-mean time. Colour sensors leave similar, smaller combs, which are not due to motion and are removed in the same way.
+The displacement between the two fields (even and odd rows) is measured on the flanks: the edge in each row is compared
+with the line through its neighbours in the other field, over all rows. The edges in every row are then moved half-way
+towards those of the other field, so that both fields represent the mean time. Colour sensors cause similar, smaller
+combs, which are not due to motion and are removed in the same way.
 """
 
 from dataclasses import replace
@@ -31,9 +32,9 @@ _apart = loop("interlace_apart")
 
 
 def at_half_way(edges: EdgePoints) -> tuple[EdgePoints, float]:
-    """Return the edges half-way between the two fields, and the faster finger's displacement between them (pixels).
+    """Return the edges half-way between the two fields, and the faster finger's displacement from field to field (px).
 
-    The picture's rows must be rows of `edges`, which they are where the tips point up or down.
+    The picture's rows must be rows of `edges`, which holds if the tips point up or down.
     """
     lines = edges.lines
     apart = np.array([_apart(lines.fixed[k], edges.position[k], lines.weight[k]) for k in range(2)])

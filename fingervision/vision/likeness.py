@@ -1,7 +1,7 @@
-"""Test whether two objects can be the fingers of one gripper: similar height and width, parallel.
+"""Test whether two objects can be the fingers of one gripper: similar height and width, and parallel.
 
-A camera that is turned against the gripper shows its tips at different heights, and both fingers tilted by the same
-angle; a wire, a housing or the edge of a table beside a finger has another width.
+A camera that is turned relative to the gripper shows the two tips at different heights and both fingers tilted by the
+same angle; a wire, a housing or the edge of a table beside a finger has another width.
 """
 
 from collections.abc import Sequence
@@ -42,11 +42,11 @@ class Build:
     Parameters
     ----------
     width_px : float
-        Median breadth of what is seen, below the tip; 0 where too little is seen.
+        Median width of the visible part below the tip; 0 if too little is visible.
     lean : float
-        Change across per pixel towards the root.
+        Tilt: displacement across per pixel towards the root.
     is_cut : bool
-        Whether the picture's border cuts its outer side off.
+        Whether the picture's border cuts off the outer side.
     """
 
     width_px: float
@@ -57,7 +57,7 @@ class Build:
 def build(top: Top, inner_sign: int, across_size: int) -> Build:
     """Width and tilt of the object below a tip, down to where both its sides end.
 
-    Its inner side lies towards the sign.
+    The sign of `inner_sign` is the direction across in which the inner side lies.
     """
     first, second = (across_by_row(top.outline, top.index, step) for step in (-1, 1))
     inner, outer = (second, first) if inner_sign * (second[-1] - first[-1]) > 0 else (first, second)
@@ -66,7 +66,7 @@ def build(top: Top, inner_sign: int, across_size: int) -> Build:
 
 
 def are_alike(first: Build, second: Build) -> bool:
-    """Whether two objects have about the same width, as far as the picture shows them."""
+    """Whether two objects have about the same width, as far as they are in view."""
     narrow, wide = sorted((first, second), key=lambda one: one.width_px)
     if narrow.width_px <= 0.0 or (narrow.is_cut and wide.is_cut):
         return True
@@ -75,18 +75,18 @@ def are_alike(first: Build, second: Build) -> bool:
 
 
 def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are at about the same height, as those of one gripper are, allowing for a turned camera.
+    """Whether two tips are at about the same height, as those of one gripper are, also for a turned camera.
 
     Parameters
     ----------
     step_px : float
         Height of the right tip minus that of the left one, along the axis towards the roots.
     apart_px : float
-        Distance across of the two, positive.
+        Distance between the tips across the fingers, positive.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     builds : (Build, Build), optional
-        Of the left and the right thing; without them every turn is allowed.
+        Width and tilt of the left and of the right object; without them every camera angle is allowed.
     """
     heights, turned = STEP_HEIGHTS, MOST_TURNED
     if builds is None:
@@ -102,6 +102,6 @@ def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tupl
 
 
 def common_turn(leans: Sequence[float]) -> float:
-    """Slope by which both fingers tilt; 0 where their tilts differ or are negligible."""
+    """Common tilt of both fingers, as a slope; 0 if their tilts differ or are negligible."""
     turn = 0.5 * sum(leans)
     return turn if abs(leans[0] - leans[1]) <= LEANS_ALIKE and abs(turn) > LEAST_TURN else 0.0

@@ -1,4 +1,4 @@
-"""Light along every line across an outline, and an initial estimate of the edges there."""
+"""Light along every line of pixels across an outline, and an initial estimate of the edges on these lines."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ def line_levels(upright: GreyImage, lines: ProfileLines, light: Floats, reach: i
 
 
 def first_blur(upright: GreyImage, lines: ProfileLines, light: Floats) -> float:
-    """Robust initial blur of the edges, from the steepest slope in some of the flanks' rows."""
+    """Robust initial estimate of the edges' blur, from the steepest slope in some of the flanks' rows."""
     some = slice(0, INNER, FIRST_LOOK)
     levels = np.empty((len(lines.fixed), len(IS_ROW[some]), 2 * FIRST_REACH_PX + 1))
     flanks = (np.ascontiguousarray(a[:, :INNER]) for a in (lines.fixed, lines.coarse, lines.outward))
@@ -46,7 +46,7 @@ def first_blur(upright: GreyImage, lines: ProfileLines, light: Floats) -> float:
 
 
 def first_position(levels: Floats) -> Floats:
-    """Position of a step between the window's two end levels that has the window's mean level."""
+    """Position of a step between the window's two end levels for which the window's mean level is that observed."""
     position = np.empty(levels.shape[:2])
     _first_position(levels, position)
     return position

@@ -1,9 +1,10 @@
-"""Step 6 for any other shape: the outline near one point as a polynomial about its tangent.
+"""Step 6 for any other shape: the outline near one point as a polynomial in the distance along its tangent.
 
 Drops, ellipses and worn tips do not consist of three straight sides. Near the tip and near the measuring point any
-smooth outline is a polynomial of low degree; it is fitted as far as the residuals allow (Lepski's principle: the
-longest window whose scatter is still that of the shortest). Weights fall off smoothly (Cleveland, JASA 74, 1979), so
-that a shift by a fraction of a pixel never causes a jump.
+smooth outline is approximated by a polynomial of low degree; the window of the fit is as long as the residuals allow
+(Lepski's principle: the longest window with the same scatter as the shortest). Weights fall off smoothly towards the
+window's ends (Cleveland, JASA 74, 1979), so that the result does not jump when the outline shifts by a fraction of a
+pixel.
 """
 
 from dataclasses import dataclass
@@ -42,14 +43,14 @@ _fit = loop("local_outline_polynomial")
 
 @dataclass(frozen=True, slots=True)
 class LocalOutline:
-    """The outline near a point.
+    """The outline near one point.
 
     Parameters
     ----------
     x, y : float
-        The point of the outline before blur that was asked for.
+        Point of the outline before blurring.
     u_normal : float
-        Standard uncertainty across the outline.
+        Standard uncertainty along the normal.
     nx, ny : float
         Outward normal.
     """
@@ -64,12 +65,12 @@ class LocalOutline:
 def outline_near(
     points: OutlinePoints, centre: tuple[float, float], normal: tuple[float, float], blur_px: float
 ) -> tuple[list[float], float] | None:
-    """Polynomial (normal over tangent distance) near a point, corrected for blur, and its uncertainty at the point.
+    """Fit a polynomial (normal over tangential distance) to the outline near a point, corrected for blur.
 
     Returns
     -------
     (coefficients, u_normal) or None
-        None where there are too few points.
+        Coefficients and the standard uncertainty along the normal at the point; None if there are too few points.
     """
     best: tuple[list[float], float] | None = None
     first_spread = 0.0
@@ -94,7 +95,7 @@ def outline_near(
 
 
 def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> LocalOutline | None:
-    """The outermost point of a smooth outline, from an initial estimate."""
+    """The outermost point of a smooth outline, searched from an initial estimate."""
     for _step in range(3):
         fit = outline_near(points, (x, y), (0.0, -1.0), blur_px)
         if fit is None:
@@ -115,7 +116,7 @@ def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> Loca
 def local_edge(
     points: OutlinePoints, x: float, y: float, slope: float, blur_px: float
 ) -> tuple[LocalOutline, float] | None:
-    """Position and slope of a smooth inner edge at the height `y`, from an initial estimate."""
+    """Position and slope of a smooth inner edge at the height `y`, searched from an initial estimate."""
     for _step in range(3):
         length = hypot(1.0, slope)
         nx, ny = 1.0 / length, -slope / length
@@ -136,7 +137,7 @@ def local_edge(
 
 
 def _value_and_slope(c: list[float], s: float) -> tuple[float, float]:
-    """A polynomial and its derivative (Horner)."""
+    """Value of a polynomial and of its derivative (Horner's scheme)."""
     value, slope = c[-1], 0.0
     for coefficient in c[-2::-1]:
         slope = value + slope * s
@@ -145,16 +146,16 @@ def _value_and_slope(c: list[float], s: float) -> tuple[float, float]:
 
 
 def local_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:
-    """Tip and edge of a finger of any smooth shape; None where the outline is not smooth.
+    """Tip and inner edge of a finger of any smooth shape; None if the outline is not smooth.
 
     Parameters
     ----------
     points : OutlinePoints
-        Sub-pixel outline.
+        Sub-pixel outline of the finger.
     below_tip_px : float
-        Height of measuring below the tip.
+        Distance of the measuring point below the tip.
     shared : float
-        Neighbouring points that share their errors.
+        Number of neighbouring points with a common error.
     """
     blur = float(np.median(points.blur))
     top = int(np.argmin(points.y))

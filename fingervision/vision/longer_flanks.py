@@ -1,8 +1,9 @@
-"""Measure rough flanks over a longer stretch, so that long-wave roughness averages out.
+"""Measure rough flanks over a longer stretch, so that long-wavelength roughness averages out.
 
 A finger's flank is straight near its tip; farther down it may bend or end. The longer flank is therefore used only if
-it agrees with the near part and is more certain (Hausman, Econometrica 46, 1978, 1251: the difference of a more and a
-less certain estimate has the difference of their variances).
+its result agrees with that of the part near the tip and has a smaller uncertainty (Hausman test, Econometrica 46, 1978,
+1251: the variance of the difference between an efficient and a less efficient estimate is the difference of their
+variances).
 """
 
 from dataclasses import replace
@@ -21,7 +22,7 @@ AGREES = 2.5
 
 
 def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFingers:
-    """Return the fingers with their outlines extended downwards; a finger that holds a part stays as it is."""
+    """Return the fingers with their outlines extended downwards; a finger that holds a part is not changed."""
     left, right = (
         finger if finger.hidden.size else _longer(finger, below_tip_px + LONG_PX)
         for finger in (fingers.left, fingers.right)
@@ -30,7 +31,7 @@ def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFin
 
 
 def is_surer(longer: GapMeasurement | NoGap, near: GapMeasurement) -> bool:
-    """Whether longer flanks agree with the near ones and have a smaller uncertainty."""
+    """Whether the result from longer flanks agrees with that from the near part and has a smaller uncertainty."""
     if not isinstance(longer, GapMeasurement) or longer.u_gap_px >= near.u_gap_px:
         return False
     return abs(longer.gap_px - near.gap_px) <= AGREES * sqrt(near.u_gap_px**2 - longer.u_gap_px**2)

@@ -1,4 +1,4 @@
-"""Mean light across a straight or evenly curved flank, of all its rows together, in bins finer than a pixel."""
+"""Mean light across a straight or evenly curved flank: all rows together, in bins narrower than a pixel."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeanProfile:
-    """Mean light across a flank: distances outwards from the fitted step, light, and numbers of pixels."""
+    """Mean light across a flank: distances outwards from the fitted step, light, and number of pixels, for each bin."""
 
     t: Floats
     light: Floats
@@ -42,7 +42,7 @@ def mean_profile(
     room: int,
     curves: tuple[int, ...] = STRAIGHT_ONLY,
 ) -> MeanProfile | None:
-    """Mean profile of the half of a flank farther from the tip; None where it is short or not smooth."""
+    """Mean profile across the half of a flank that is farther from the tip; None if it is short or not smooth."""
     real = np.flatnonzero(edges.lines.weight[k, part] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS or room < REACH_PX // 2:
@@ -79,9 +79,9 @@ def mean_profile(
 
 
 def _rows_between(looked_at: Ints) -> Ints:
-    """Every row between the first and the last searched one, also where lines were thinned out.
+    """Every row between the first and the last fitted one, including rows left out to save time.
 
-    Where many successive rows were left out, a part hides the edge there.
+    Long gaps between fitted rows are not filled, because a part hides the edge there.
     """
     looked_at = np.sort(looked_at)
     rows, steps = np.arange(looked_at[0], looked_at[-1] + 1), np.diff(looked_at).astype(np.float64)

@@ -1,4 +1,7 @@
-"""Step 7, the measuring point: the tip and the inner edge below it, from the fitted end of a finger."""
+"""Step 7: locate the measuring point on the fitted finger end.
+
+Its height is measured from the tip, its lateral position is that of the inner edge below the tip.
+"""
 
 from dataclasses import dataclass
 
@@ -37,11 +40,11 @@ class MeasuringPoint:
     Parameters
     ----------
     tip, apex : float
-        Height of the tip, and where across it lies.
+        Height of the tip (coordinate along the finger), and position of the tip across the finger.
     edge, slope : float
-        Inner edge at the measuring height, and its change per pixel to the root.
+        Position of the inner edge at the measuring height, and its change per pixel towards the root.
     covariance : ndarray of float, shape (2, 2)
-        Of (tip, edge).
+        Covariance of (tip, edge).
     """
 
     tip: float
@@ -55,8 +58,8 @@ def squared(end: FingerEnd) -> FingerEnd:
     """Return the fitted end with its top made perpendicular to its flanks, unless the points contradict it.
 
     The top of a finger that is cut straight is perpendicular to its flanks, which are long and determine the tilt far
-    better than the short top. Where top and flanks agree within their uncertainty they are combined (a Kalman update);
-    a slanted top stays slanted.
+    more precisely than the short top. If the directions of top and flanks agree within their uncertainty, they are
+    combined (a Kalman update); a slanted top is not changed.
     """
     parameters, covariance = np.empty_like(end.parameters), np.empty_like(end.covariance)
     _squared(end.parameters, end.covariance, end.misfit, parameters, covariance)
@@ -64,10 +67,11 @@ def squared(end: FingerEnd) -> FingerEnd:
 
 
 def measuring_point(end: FingerEnd, below_tip_px: float, blur_px: float) -> MeasuringPoint:
-    """Tip and inner edge of a fitted shape, with their covariance from that of the parameters.
+    """Tip and inner edge of a fitted finger end, with their covariance from that of the fit's parameters.
 
-    The tip is the higher of the two corners of the top. If noise alone decided which corner is the higher, the tip
-    would be too high on average: a top that is level within twice its uncertainty counts as level.
+    The tip is the higher of the two corners of the top. For a level top, noise would decide which corner is higher, and
+    the tip would be too high on average; therefore a top that is level within twice its uncertainty is treated as
+    exactly level.
     """
     covariance = np.empty((2, 2))
     shape = (end.parameters, end.covariance, end.misfit, end.origin)

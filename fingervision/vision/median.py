@@ -9,13 +9,13 @@ _middle, _median = loop("median_middle"), loop("median_median")
 
 
 def middle(values: NDArray[np.float64]) -> float:
-    """The upper median: for an even number of values the upper of the two central ones; 0 for none."""
+    """The upper median: for an even number of values the upper of the two central ones; 0 for no values."""
     return float(_middle(np.ascontiguousarray(values)))
 
 
 def median(values: NDArray[np.float64]) -> float:
-    """The median: for an even number of values the mean of the two central ones; 0 for none.
+    """The median: for an even number of values the mean of the two central ones; 0 for no values.
 
-    Twenty times as fast as NumPy's.
+    It is twenty times as fast as `numpy.median`.
     """
     return float(_median(np.ascontiguousarray(values)))

@@ -1,9 +1,9 @@
-"""Correlation of the noise of neighbouring pixels, from the flat parts of the picture beside the edges.
+"""Correlation of the noise of neighbouring pixels, estimated in the flat parts of the picture beside the edges.
 
-A digital zoom, a colour sensor's demosaicing, denoising and compression spread noise over neighbours. Points of an
-outline then share their errors, so that the mean of many has a larger variance than independent points would give. The
-autocovariance of the noise gives the factor: the variance of a mean over many lines, each weighted by the edge's
-filter, divided by its value for independent lines.
+Digital zoom, demosaicing of a colour sensor, denoising and compression spread noise over neighbouring pixels.
+Neighbouring points of an outline then have correlated errors, so that the variance of their mean is larger than for
+independent points. The factor of this increase follows from the autocovariance of the noise: the variance of the mean
+edge position over many lines, each weighted by the edge's filter, divided by its value for independent lines.
 """
 
 import numpy as np
@@ -42,27 +42,27 @@ def flat_noise(
     row: int,
     column: int,
 ) -> tuple[float, float]:
-    """Number of neighbouring lines that share their noise (1 for independent lines), and that noise.
+    """Number of neighbouring lines with common noise (1 for independent lines), and standard deviation of the noise.
 
     Parameters
     ----------
     upright : ndarray, shape (rows, columns)
-        Grey levels, seen with the tips up.
+        Grey levels of the picture, turned so that the tips point up.
     light : ndarray of float, shape (levels,)
-        Light of every grey level.
+        Light for every grey level (look-up table).
     lines : ProfileLines
-        Where the edges are.
+        Lines of pixels across the edges.
     filters : EdgeFilters
-        For the window that is used.
+        Filters for the length of window used.
     row, column : int
-        Which filter of the table an edge of this blur, in the middle of its window, uses.
+        Indices of the filter for an edge of this blur in the middle of its window.
 
     Returns
     -------
     shared : float
-        So many lines count as one.
+        Number of neighbouring lines that count as one.
     noise : float
-        Standard deviation of the light in the flat parts; 0 where none is in view.
+        Standard deviation of the light in the flat parts; 0 if no flat part is in view.
     """
     corners = np.empty((4 * MOST_ALONG, 3), dtype=np.int64)
     corners = corners[: _squares(lines.fixed, lines.coarse, lines.weight, filters.reach_px, *upright.shape, corners)]
@@ -88,7 +88,7 @@ def flat_noise(
 
 
 def _is_any(covariance: Floats, limit: float) -> bool:
-    """Whether a pixel's covariance with any of its neighbours exceeds `limit`."""
+    """Whether the covariance of a pixel with any of its neighbours exceeds `limit`."""
     beside = ((LAGS + 1, LAGS), (LAGS, LAGS + 1), (LAGS + 1, LAGS + 1), (LAGS - 1, LAGS + 1))
     return any(abs(covariance[place]) > limit for place in beside)
 
@@ -96,10 +96,10 @@ def _is_any(covariance: Floats, limit: float) -> bool:
 def _autocovariance(
     upright: GreyImage, light: Floats, corners: NDArray[np.int64], side: int, farthest: int
 ) -> tuple[Floats, float]:
-    """Sum of the autocovariances of one side's squares, each without its plane of light, and their number of pixels.
+    """Sum of the autocovariances of one side's squares, each detrended by a plane, and their number of pixels.
 
-    Only lags up to `farthest` are computed; the others stay zero. The first index is the lag along a row plus `LAGS`,
-    the second is the lag in rows.
+    Only lags up to `farthest` are computed; entries for larger lags stay zero. The first index is the lag along a row
+    plus `LAGS`, the second is the lag in rows.
     """
     covariance = np.empty((2 * LAGS + 1, 2 * LAGS + 1))
     return covariance, _sum_of_lags(upright, light, corners, side, farthest, covariance)

@@ -1,11 +1,11 @@
-"""Sides of a body whose edges have another blur than its other sides: a shadow, or glare, lies along them.
+"""Find sides of a body whose edges are blurred differently from its other sides, because of a shadow or glare.
 
-A narrow shadow along an edge is a second step in the same profile. With a fraction q of the contrast, at a distance w
-beyond the edge, it displaces the single fitted step by q w, and adds q (1 - q) w^2 to the square of its blur (mean and
-variance of a mixture of two steps). Optics and defocus blur all sides equally; motion blurs opposite sides equally, and
-displaces neither. A remaining difference D of one side's squared blur means that its edges may be displaced by sqrt(|D|
-q / (1 - q)): sqrt(|D|) if the shadow is half as dark as the body, twice that at four fifths. The offset of this side
-therefore has the standard uncertainty sqrt(|D|).
+A narrow shadow along an edge is a second step in the same profile. A shadow with a fraction q of the contrast and a
+width w beyond the edge displaces the single fitted step by q w, and adds q (1 - q) w^2 to the squared blur of the step
+(mean and variance of a mixture of two steps). Optics and defocus blur all sides equally; motion blurs opposite sides
+equally, and displaces neither of them. If one side's squared blur still differs by D, its edges may be displaced by
+sqrt(|D| q / (1 - q)): by sqrt(|D|) if the shadow is half as dark as the body (q = 1/2), by twice that for q = 4/5. The
+offset of this side therefore has the standard uncertainty sqrt(|D|).
 """
 
 import numpy as np
@@ -14,24 +14,26 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SAME_LINE_PX = 0.5
-"""Chunks of one stretch lie on one line: what a pose's own rounding leaves is far less."""
+"""Distance from a line within which chunks belong to one straight stretch; the rounding of a pose causes far less."""
 OPPOSITE = -0.94
-"""Cosine between the normals of opposite sides: 20 degrees apart at most, where motion blurs both alike to a tenth.
-Sides whose normals are farther from being parallel than that lie across each other."""
+"""Cosine between the normals of two sides below which they count as opposite: at most 20 degrees from antiparallel,
+where motion blurs both alike to a tenth. Sides that are farther from parallel count as lying across each other."""
 SURE = 3.0
-"""Standard uncertainties. A side in four hundred differs by chance, and is then only less sure in that picture; a side
-of one chunk (noise 4 of contrast 150, blur 1.6 px) shows a shadow of 1 px and a fifth of the contrast."""
+"""Difference in standard uncertainties above which a side counts as doubtful. One side in four hundred exceeds it by
+chance, and then only has a larger uncertainty in that picture; for a side of one chunk (noise 4 for a contrast of 150,
+blur 1.6 px) a shadow of 1 px and a fifth of the contrast is detected."""
 OPTICS = 0.05
-"""Share of a blur's square by which optics and defocus let sides of one body differ: a fortieth of the blur itself."""
+"""Share of the squared blur by which optics and defocus may let the sides of one body differ; this is a fortieth of the
+blur itself."""
 
 
 def sides_of(middles: Array, normals: Array) -> NDArray[np.intp]:
-    """Number of the straight stretch to which each chunk belongs, shape (m,); chunks are in order along the outline.
+    """Index of the straight stretch to which each chunk belongs, shape (m,); chunks are in order along the outline.
 
     Parameters
     ----------
     middles, normals : ndarray of float, shape (2, m)
-        Of the chunks, in pixels.
+        Middles and unit normals of the chunks, in pixels.
     """
     side = np.zeros(middles.shape[1], dtype=np.intp)
     for k in range(1, side.size):
@@ -42,19 +44,22 @@ def sides_of(middles: Array, normals: Array) -> NDArray[np.intp]:
 
 
 def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: Array) -> Array:
-    """Uncertainty of the edges' positions from each side's blur: one standard uncertainty per column, shape (m, k).
+    """Uncertainty of the edge positions that is suggested by differences in blur between the sides of a body.
+
+    Each column is one standard uncertainty, common to the chunks of one side.
 
     Parameters
     ----------
     middles, normals : ndarray of float, shape (2, m)
-        Of the chunks that were fitted, in their order along the outline.
+        Middles and unit normals of the fitted chunks, in their order along the outline.
     blur_px, u_blur_px : ndarray of float, shape (m,)
-        Gaussian sigma of each one's edge, and its standard uncertainty.
+        Gaussian sigma of each chunk's edge, and its standard uncertainty.
 
     Returns
     -------
     ndarray of float, shape (m, k)
-        For each of k doubtful sides, its u for the chunks that are its own, 0 for all others.
+        For each of k doubtful sides a column with the standard uncertainty of its chunks' positions (px), and 0 for all
+        other chunks.
     """
     side = sides_of(middles, normals)
     numbers = np.unique(side)
@@ -76,14 +81,14 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
 
 
 def _excess(mean: Array, variance: Array, normal: Array) -> Array:
-    """Excess of each side's squared blur that a shadow would explain; 0 where nothing suggests one, (k,).
+    """Excess of each side's squared blur that a shadow would explain, shape (k,); 0 where nothing suggests one.
 
     Parameters
     ----------
     mean, variance : ndarray of float, shape (k,)
-        Square of the blur of each side, and the variance of that.
+        Mean squared blur of each side, and the variance of this mean.
     normal : ndarray of float, shape (2, k)
-        Out of the body.
+        Outward normal of each side.
     """
     cosine = normal.T @ normal
     apart = mean[:, None] - mean

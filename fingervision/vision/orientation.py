@@ -1,7 +1,7 @@
-"""The fingers' axes: every position is expressed as if the tips pointed up.
+"""The fingers' axes: every position is expressed as if the tips pointed up in the picture.
 
 `across` grows to the image's right for tips up or down, and downwards for tips left or right. `along` grows from the
-tips towards the roots. A picture is turned by a view of its memory, never by copying or resampling, so that a turned or
+tips towards the roots. A picture is turned by an array view, never by copying or resampling, so that a turned or
 mirrored recording gives the same numbers.
 """
 
@@ -22,7 +22,7 @@ class Orientation:
     Parameters
     ----------
     direction : Direction
-        Where the tips point.
+        Direction in which the tips point.
     height_px, width_px : int
         Size of the picture.
     """
@@ -43,18 +43,18 @@ class Orientation:
 
     @property
     def is_flipped(self) -> bool:
-        """Whether the fingers' axis runs against the picture's axis."""
+        """Whether the axis along the fingers runs opposite to the picture's axis."""
         return self.direction in (Direction.DOWN, Direction.RIGHT)
 
     def view(self, image: GreyImage) -> GreyImage:
-        """The picture as if the tips pointed up: rows run along the fingers, columns across them."""
+        """View of the picture as if the tips pointed up: the row index counts along the fingers, from the tips."""
         upright = image if self.direction.is_vertical else image.T
         return upright[::-1] if self.is_flipped else upright
 
     def upright(self, mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a mask as if the tips pointed up, contiguous in memory.
 
-        Faster than NumPy's copy of a transposed view.
+        This is faster than NumPy's copy of a transposed view.
         """
         turned = mask if self.direction.is_vertical else cv2.transpose(mask)
         return np.ascontiguousarray(cv2.flip(turned, 0) if self.is_flipped else turned, dtype=np.uint8)

@@ -7,7 +7,7 @@ Floats = NDArray[np.float64]
 
 
 def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
-    """Position error, per unit of curvature bias, of a fit with two free levels across a slanted curved edge.
+    """Bias of an edge fitted along a slanted line on a curved outline, relative to the bias of the half-level.
 
     Along a line that meets a curved edge at a slant of slope m, the distance to the edge is t + kappa m^2 t^2 / (2 (1 +
     m^2)^(1/2)). Projected on the parameters of the fit over a window of w standard deviations, this moves the position

@@ -1,8 +1,8 @@
-"""Edge in every stretch of a body's outline: its measured offset from the drawing, its blur, and its uncertainty.
+"""Fit of the edge in every stretch of a body's outline: offset from the drawing, blur, and uncertainties.
 
 The straight stretches of an outline are divided into chunks about a millimetre long. In each chunk one blurred step is
 fitted to all pixels near the edge, I = a + b Phi(-(s - d) / sigma_e), with s the pixel's distance along the outward
-normal. Nothing is resampled, so that the sub-pixel phase causes no bias.
+normal and d the offset of the edge. The picture is not resampled, so that the sub-pixel phase causes no bias.
 """
 
 from dataclasses import dataclass, replace
@@ -16,33 +16,36 @@ from scipy.special import ndtr
 Array = NDArray[np.float64]
 
 REACH_PX = 6.0
-"""Pixels on either side of an edge: three blurs of 1.5 px, and room for the search."""
+"""Half width of the window across an edge, in pixels: three times a blur of 1.5 px, and room for the search."""
 LEAST_CONTRAST = 5.0
-"""Standard deviations of a pixel's noise below which a step is no edge."""
+"""Least contrast of an edge, in standard deviations of a pixel's noise."""
 FARTHEST_PX = 3.5
-"""How far from where it is expected an edge may be found: beyond, the window does not hold it."""
+"""Largest distance of an edge from its expected position; farther away the window does not contain all of it."""
 BLURS_PX = (0.4, 3.5)
-"""Of a blur: sharper optics than 0.4 px are not told from 0.4 within a pixel, wider edges than 3.5 leave the window."""
+"""Range of the blur: within a pixel a blur below 0.4 px cannot be distinguished from 0.4 px, and edges wider than 3.5
+px do not fit into the window."""
 OTHER_LEVEL, OTHER_CONTRAST, OTHER_BLUR, OTHER_BLUR_PX, OTHER_NOISE = 0.3, (0.4, 2.5), 1.25, 0.2, 4.0
-"""What a chunk may differ in from its body's others: level of the body in contrasts, contrast (medians), blur (a factor
-and pixels), noise (a factor; quartiles). Beyond, its edge is that of a shadow, or two edges are fitted as one: a cast
-shadow's edge has another level inside, and one of 3 px twice the blur. Texture of a sixth of the contrast stays."""
+"""Limits of the difference between a chunk and the other chunks of its body: level of the body (in contrasts), contrast
+(relative to the median), blur (a factor, and pixels added), noise (a factor; relative to the lower quartile). An edge
+beyond these limits is that of a shadow, or two edges fitted as one: the edge of a cast shadow has another level inside,
+and one with a shadow of 3 px twice the blur. Texture of a sixth of the contrast is within the limits."""
 LEAST_WINDOW = 0.7
-"""Of a chunk's window that must lie in the picture: an edge in its middle then has ground and body on its sides."""
+"""Least share of a chunk's window that must lie in the picture: an edge in the middle of the window then has background
+and body on its two sides."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chunks:
-    """Stretches of a body's outline.
+    """Short stretches of a body's outline.
 
     Parameters
     ----------
     middles : ndarray of float, shape (2, m)
-        Their middles.
+        Middles of the stretches.
     normals : ndarray of float, shape (2, m)
-        Unit vectors out of the body.
+        Outward unit normals.
     half_length : float
-        Half their length.
+        Half the length of a stretch.
     """
 
     middles: Array
@@ -50,7 +53,7 @@ class Chunks:
     half_length: float
 
     def moved(self, shift: Array, angle: float, about: Array) -> "Chunks":
-        """Move the chunks rigidly: turned about a point, then shifted."""
+        """Move the chunks rigidly: rotation about a point, then a shift."""
         c, s = np.cos(angle), np.sin(angle)
         turn = np.array([[c, -s], [s, c]])
         middles = turn @ (self.middles - about[:, None]) + (about + shift)[:, None]
@@ -58,7 +61,7 @@ class Chunks:
 
 
 class FlatMap(Protocol):
-    """Map from the picture to the object plane without perspective and distortion, in pixels, and back."""
+    """Map, in both directions, between the picture and the object plane without perspective and distortion (px)."""
 
     def to_flat(self, points: Array) -> Array:
         """Remove lens distortion and perspective from points, shape (2, n)."""
@@ -76,16 +79,18 @@ class EdgeView:
     Parameters
     ----------
     flat : FlatMap or None
-        Lens and perspective; chunks and motions are then those of the flat plane. None where the picture is flat.
+        Map that removes lens distortion and perspective; chunks and motions are then given in the undistorted plane.
+        None for a picture without distortion and perspective.
     outward_px : float
-        How far outside of its body an edge is seen (edge bias), in pixels of the picture.
+        Edge bias: distance by which an edge appears outside its body, in pixels of the picture.
     shared_pixels : float
-        So many pixels count as one: a codec shares its errors among them.
+        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
     body_level, contrast : float or None
-        Level of the bodies, and how much lighter or darker the ground is; None where they are not known.
+        Level of the bodies, and difference of the background from it; None if not known.
     u_outward_px, u_size : float
-        Standard uncertainties of `outward_px` and, relative, of the bodies' sizes that whoever asks accounts for by
-        `RigidFit.by_outward` and `by_scale`: what they scatter the edges by is then none of the covariance's.
+        Standard uncertainties of `outward_px` and (relative) of the bodies' sizes. The caller propagates them by
+        `RigidFit.by_outward` and `by_scale`; the scatter that they cause among the edges is therefore not counted again
+        in the covariance.
     """
 
     flat: FlatMap | None = None
@@ -100,21 +105,22 @@ class EdgeView:
 PLAIN = EdgeView()
 _GAUSS = np.array([-(0.6**0.5), 0.0, 0.6**0.5])
 _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
-"""Gauss and Legendre's three points: the mean over a chunk of a curve of fifth order."""
+"""Weights of three-point Gauss-Legendre quadrature: exact for the mean over a chunk of a polynomial of degree five."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChunkEdges:
-    """Edges found in m chunks, each an array of shape (m,).
+    """Edges fitted in m chunks; each attribute is an array of shape (m,).
 
     Parameters
     ----------
     offset, variance : ndarray of float, shape (m,)
-        How far outside of where it is drawn, px of the flat plane, and its variance by the pixels' noise.
+        Distance of the edge outside its expected position in px of the undistorted plane, and its variance due to the
+        pixels' noise.
     blur, u_blur : ndarray of float, shape (m,)
         Gaussian sigma of the optics (px), and its standard uncertainty.
     used, in_view : ndarray of bool, shape (m,)
-        Whether there is an edge of the body, and whether the chunk lies in the picture.
+        Whether the chunk shows an edge of the body, and whether the chunk lies in the picture.
     """
 
     offset: Array
@@ -127,7 +133,7 @@ class ChunkEdges:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _InPicture:
-    """Chunks in picture coordinates, and how much longer a distance across them is in the flat plane."""
+    """Chunks in picture coordinates, and the ratio of distances across them in the undistorted plane to the picture."""
 
     middles: Array
     normals: Array
@@ -136,7 +142,7 @@ class _InPicture:
 
 
 def _in_picture(chunks: Chunks, flat: FlatMap | None) -> _InPicture:
-    """Map chunks into the picture by their mean position and their chord."""
+    """Map chunks into the picture by their mean positions and chords."""
     count, half = chunks.middles.shape[1], chunks.half_length
     if flat is None or not count:
         return _InPicture(chunks.middles, chunks.normals, np.full(count, half), np.ones(count))
@@ -156,20 +162,20 @@ def _in_picture(chunks: Chunks, flat: FlatMap | None) -> _InPicture:
 def chunk_edges(
     grey: NDArray[np.float64], flat_chunks: Chunks, body_is_dark: bool, blur: float, view: EdgeView
 ) -> ChunkEdges:
-    """Fit a blurred step to the pixels about every chunk.
+    """Fit a blurred step to the pixels around every chunk.
 
     Parameters
     ----------
     grey : ndarray of float, shape (height, width)
         Levels proportional to light.
     flat_chunks : Chunks
-        Where they are expected, on the flat plane.
+        Expected positions of the chunks, in the undistorted plane.
     body_is_dark : bool
-        Whether the body is darker than its ground.
+        Whether the body is darker than the background.
     blur : float
-        First guess of the blur (px).
+        Initial estimate of the blur (px).
     view : EdgeView
-        How edges show.
+        How edges appear in the picture.
     """
     chunks = _in_picture(flat_chunks, view.flat)
     count = chunks.middles.shape[1]
@@ -214,7 +220,7 @@ def chunk_edges(
 def _like_the_others(
     blurs: Array, level: Array, contrast: Array, noise: Array, used: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether a chunk shows the body's own edge, compared with the median of all chunks that show an edge."""
+    """Whether each chunk shows the body's own edge, judged by comparison with the other chunks that show an edge."""
     usual = float(np.median(contrast[used]))
     # A shadow falls on up to half of a body's sides: the better half tells what an edge of its own looks like.
     sharp, quiet = float(np.quantile(blurs[used], 0.25)), float(np.quantile(noise[used], 0.25))
@@ -233,10 +239,10 @@ def _step(
 ) -> tuple[float, float, float, float, float, float, float] | None:
     """Fit a blurred step by Gauss-Newton iteration; None where there is no step.
 
-    Returned are offset, its variance, blur of the optics and its standard uncertainty, level of the body, its
-    difference from the background, and standard deviation of the noise.
+    Return the offset, its variance, the blur of the optics and its standard uncertainty, the level of the body, the
+    contrast to the background, and the standard deviation of the noise.
 
-    Pixels are squares: their own width adds 1/12 to the square of the blur (measuring.md).
+    The width of a square pixel adds 1/12 px^2 to the squared blur (measuring.md).
     """
     d, sigma = 0.0, float(np.hypot(blur, 12**-0.5))
     for _ in range(4):

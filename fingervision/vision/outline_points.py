@@ -23,18 +23,19 @@ _seen_from = loop("outline_points_seen_from")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OutlinePoints:
-    """Points of one finger's half-level outline, with its inner side at larger `x`; arrays of shape (n,).
+    """Points of one finger's half-level outline, with the inner side at larger `x`; arrays of shape (n,).
 
     Parameters
     ----------
     x, y : ndarray of float
-        Across (inwards positive) and along (to the root positive), relative to the finger's own origin.
+        Coordinates across (positive inwards) and along the finger (positive towards the root), relative to the finger's
+        own origin.
     u : ndarray of float
-        Standard uncertainty along the line on which the point was found.
+        Standard uncertainty along the line of pixels on which the point was found.
     side : ndarray of int
-        Which side of the coarse outline that line belongs to: 0 inner flank, 1 tip, 2 outer flank.
+        Side of the coarse outline to which that line belongs: 0 inner flank, 1 tip, 2 outer flank.
     blur : ndarray of float
-        Gaussian sigma of the optics at the point, the pixel included.
+        Gaussian sigma of the optics at the point, the pixel's width included.
     """
 
     x: Floats

@@ -1,4 +1,4 @@
-"""Outlines of all objects in a binary picture, to one pixel, in the fingers' axes."""
+"""Outlines of all objects in a binary picture, to the nearest pixel, in the fingers' axes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,9 +27,9 @@ class Outlines:
     Parameters
     ----------
     points : ndarray of int32, shape (n, 2)
-        (x, y) of all of them.
+        Coordinates (x, y) of the points of all outlines.
     starts : ndarray of int64, shape (m + 1,)
-        Where each begins in `points`; the last is their number.
+        Index in `points` at which each outline starts; the last entry is the number of points.
     """
 
     points: Outline
@@ -48,7 +48,7 @@ class Outlines:
 
 
 def find_outlines(mask: NDArray[np.uint8]) -> Outlines:
-    """Outlines (x, y) of all objects in a mask, holes included, specks excluded."""
+    """Outlines (x, y) of all objects in a mask, including holes, without specks."""
     found, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     long = [outline for outline in found if len(outline) > SHORTEST_OUTLINE_PX]
     points = np.concatenate(long)[:, 0] if long else np.empty((0, 2))
@@ -58,14 +58,14 @@ def find_outlines(mask: NDArray[np.uint8]) -> Outlines:
 
 
 def longest_first(outlines: Outlines, directions: Sequence[Direction]) -> list[tuple[Direction, int]]:
-    """Directions with the extent of the longest outline along each (pixels), the largest first."""
+    """The directions, each with the extent of the longest outline along it (pixels), largest first."""
     widest, tallest = _largest_extents(outlines.points, outlines.starts)
     sizes = [(direction, tallest if direction.is_vertical else widest) for direction in directions]
     return sorted(sizes, key=lambda size: -size[1])
 
 
 def in_axes(pixels: Outline, orientation: Orientation) -> Outline:
-    """A closed outline (x, y) in the fingers' axes, starting at its lowest point."""
+    """Convert a closed outline (x, y) to the fingers' axes; it then starts at its lowest point."""
     pixels = np.ascontiguousarray(pixels, dtype=np.int32)
     outline = np.empty_like(pixels)
     is_vertical, size = orientation.direction.is_vertical, orientation.along_size

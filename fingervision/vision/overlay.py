@@ -1,4 +1,4 @@
-"""Draw the measurement into a frame."""
+"""Draw the result of a measurement into a video frame."""
 
 import cv2
 import numpy as np
@@ -34,21 +34,21 @@ Canvas = NDArray[np.uint8]
 
 
 def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> Canvas:
-    """Draw edges, tips, measuring points, their distance, a held part's width, and a line of text.
+    """Draw edges, tips, measuring points, the distance between these, the width of a held part, and a line of text.
 
     Parameters
     ----------
     frame : Frame
         The picture that was measured.
     outcome : GapMeasurement or NoGap
-        What came out.
+        Result of the measurement.
     words : str
-        The value, or why there is none.
+        Text with the value, or with the reason why there is none.
 
     Returns
     -------
     ndarray of uint8, shape (height, width, 3)
-        Red, green and blue.
+        The picture with the drawing, in red, green and blue.
     """
     canvas = _as_colour(frame)
     size = max(0.4, min(frame.height_px, frame.width_px) / USUAL_HEIGHT_PX)
@@ -67,7 +67,7 @@ def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> C
 
 
 def draw_boundary(frame: Frame, fingers: CoarseFingers | None) -> Canvas:
-    """Draw the outlines of the two fingers as the binary picture gives them; nothing where none were found."""
+    """Draw the outlines of the two fingers from the binary picture; draw nothing if no fingers were found."""
     canvas = _as_colour(frame)
     if fingers is None:
         return canvas
@@ -77,7 +77,7 @@ def draw_boundary(frame: Frame, fingers: CoarseFingers | None) -> Canvas:
 
 
 def draw_edge_points(frame: Frame, fingers: CoarseFingers | None, edges: EdgePoints | None) -> Canvas:
-    """Draw every sub-pixel edge point as a dot; nothing where no edges were measured."""
+    """Draw every sub-pixel edge point as a dot; draw nothing if no edges were measured."""
     canvas = _as_colour(frame)
     if fingers is None or edges is None:
         return canvas
@@ -103,7 +103,7 @@ def _polyline(canvas: Canvas, outline: NDArray[np.float64], orientation: Orienta
 
 
 def _as_colour(frame: Frame) -> Canvas:
-    """Copy a frame as an eight-bit colour picture."""
+    """Copy a video frame as an eight-bit colour picture."""
     pixels = frame.pixels
     levels = in_eight_bits(pixels)
     if levels.ndim == 3:

@@ -1,8 +1,8 @@
-"""Remove a held part from the binary picture, and record which stretches of the fingers it hides.
+"""Remove a held part from the binary picture, and record in which rows it hides the fingers' edges.
 
-In the space between the fingers, bounded by two straight lines, any other object is a part: held by both fingers, stuck
-to one of them, or free. With the part removed the two fingers are found as usual; the rows in which it touches an inner
-edge are left out of the measurement.
+Any object in the space between the fingers, which is bounded by two straight lines, is a part: held by both fingers,
+stuck to one of them, or free. After the removal of the part, the two fingers are found as usual; the rows in which the
+part touches an inner edge are left out of the measurement.
 """
 
 from dataclasses import replace
@@ -47,18 +47,18 @@ _clear = loop("part_removal_clear")
 def without_part(
     mask: Mask, directions: tuple[Direction, ...], below_tip_px: float, reach_px: float
 ) -> CoarseFingers | None:
-    """Find the two fingers of a gripper with a part between them; None where there is no part.
+    """Find the two fingers of a gripper with a part between them; None if there is no part.
 
     Parameters
     ----------
     mask : ndarray of uint8, shape (height, width)
         Non-zero where the fingers may be.
     directions : tuple of Direction
-        Where the tips may point.
+        Directions in which the tips may point.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     reach_px : float
-        How far below the tips the outline is wanted.
+        Distance below the tips down to which the outline is needed.
     """
     best: CoarseFingers | None = None
     for direction in directions:
@@ -74,16 +74,16 @@ def without_part(
 
 
 def looks_parted(fingers: CoarseFingers, below_tip_px: float, reach_px: float) -> bool:
-    """Whether the two inner sides show a part: a floor between them, or a step out of one side.
+    """Whether the outlines of the inner sides suggest a part: a floor between the fingers, or a step in one side.
 
     Parameters
     ----------
     fingers : CoarseFingers
-        As they were found.
+        The fingers as found.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring point below the tip.
     reach_px : float
-        How far below the tips the outline was followed.
+        Distance below the tips down to which the outline was followed.
     """
     left, right = fingers.left.outline, fingers.right.outline
     lowest = min(left[0, 1] - fingers.left.top_along_px, right[0, 1] - fingers.right.top_along_px)
@@ -99,7 +99,7 @@ def looks_parted(fingers: CoarseFingers, below_tip_px: float, reach_px: float) -
 
 
 def is_likelier(parted: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether a part was found, rather than a feature of both fingers' shape such as a nose at either tip."""
+    """Whether the object found is a part, rather than a feature of both fingers' shape such as a nose at each tip."""
     hides = [is_hidden(finger, finger.top_along_px + below_tip_px) for finger in (parted.left, parted.right)]
     return parted.held_along_px is not None or not all(hides)
 
@@ -138,7 +138,7 @@ def _found_without(
 
 
 def _is_on_side(finger: CoarseFinger, across: float, reach_px: float) -> bool:
-    """Whether the finger that was found is the one that bounds the channel on this side."""
+    """Whether the finger found is the one that bounds the channel on this side."""
     found, along = inner_crossing(finger.outline, finger.top_along_px + reach_px)
     return abs(found - across) <= ON_SIDE_PX + abs(along - finger.top_along_px - reach_px)
 

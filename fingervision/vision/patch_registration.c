@@ -24,14 +24,16 @@ static void sampled_row(const float *c, int64_t width, int64_t n, float *x, floa
 }
 
 /* Register one patch: coefficients of the picture's part, levels and jacobian of the reference (3 by its pixels), inverse of
-   its Gram matrix, pixels to either side across and down, first guess of x, y and turn. Gives x, y, turn, gain,
-   correlation, sum of squared residuals, whether it settled inside the part. */
-LOOP(patch_registration_settled, "SSSFiiddd", "ddddddb") {
+   its Gram matrix, pixels to either side across and down, first guess of x, y and turn; written are the gradients' products
+   with the residuals by blocks of the patch. Gives x, y, turn, gain, correlation, sum of squared residuals, whether it
+   settled inside the part. */
+LOOP(patch_registration_settled, "SSSFiidddf", "ddddddb") {
     const float *c = (const float *)in[0].data, *own = (const float *)in[1].data, *jacobian = (const float *)in[2].data;
     const double *inverse = FLOATS(3);
     int64_t height = in[0].shape[0], width = in[0].shape[1], a = in[4].i, b = in[5].i, n = 2 * a + 1, m = 2 * b + 1;
     int64_t pixels = n * m;
     double x = in[6].d, y = in[7].d, turn = in[8].d, gain = 1.0, correlation = 0.0, squares = 0.0, own_power = 0.0;
+    double *scores = FLOATS(9);
     double rim = (double)larger_int(a, b);
     /* Sums of squares of the places, for the plane that is taken off. */
     double of_x = (double)m * (double)(a * (a + 1) * n) / 3.0, of_y = (double)n * (double)(b * (b + 1) * m) / 3.0;
@@ -75,13 +77,20 @@ LOOP(patch_registration_settled, "SSSFiiddd", "ddddddb") {
         gain = common / larger(power, 1e-12);
         correlation = common / sqrt(larger(power * own_power, 1e-12));
         squares = 0.0;
-        for (int64_t i = 0; i < pixels; i++) {
-            double left = gain * seen[i] - own[i];
-            squares += left * left;
-            score[0] += jacobian[i] * left;
-            score[1] += jacobian[pixels + i] * left;
-            score[2] += jacobian[2 * pixels + i] * left;
-        }
+        for (int64_t k = 0; k < 3 * BLOCKS * BLOCKS; k++) scores[k] = 0.0;
+        for (int64_t block = 0; block < BLOCKS; block++)
+            for (int64_t j = block * m / BLOCKS; j < (block + 1) * m / BLOCKS; j++)
+                for (int64_t beside = 0; beside < BLOCKS; beside++) {
+                    double *of = scores + 3 * (block * BLOCKS + beside), part[3] = {0.0};
+                    for (int64_t i = j * n + beside * n / BLOCKS; i < j * n + (beside + 1) * n / BLOCKS; i++) {
+                        double left = gain * seen[i] - own[i];
+                        squares += left * left;
+                        part[0] += jacobian[i] * left;
+                        part[1] += jacobian[pixels + i] * left;
+                        part[2] += jacobian[2 * pixels + i] * left;
+                    }
+                    for (int k = 0; k < 3; k++) of[k] += part[k], score[k] += part[k];
+                }
         for (int k = 0; k < 3; k++) step[k] = inverse[3 * k] * score[0] + inverse[3 * k + 1] * score[1] + inverse[3 * k + 2] * score[2];
         double size = larger(hypot(step[0], step[1]), rim * fabs(step[2]));
         double limit = smaller(1.0, 1.0 / larger(size, 1e-12));

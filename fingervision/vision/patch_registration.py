@@ -1,9 +1,9 @@
-"""Translation and rotation of a textured surface: registration of patches against a reference picture.
+"""Translation and rotation of a textured surface, by registration of patches against a reference picture.
 
-Inverse-compositional Gauss-Newton of the zero-normalised sum of squared differences over translation and rotation
-(Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan, Li & Tong,
-Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A linear gradient of light and a gain are removed
-from both pictures. Both pictures are smoothed in the same way and interpolated by cubic B-splines
+The zero-normalised sum of squared differences is minimised over translation and rotation by the inverse-compositional
+Gauss-Newton method (Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan,
+Li & Tong, Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A linear gradient of light and a gain are
+removed from both pictures. Both pictures are smoothed in the same way and interpolated by cubic B-splines
 (`spline_interpolation`). Many patches of one size are registered together.
 """
 
@@ -47,6 +47,14 @@ LEAST_INFORMATION = 0.02
 NOISE_MARGIN = 1.4
 # Variance of rounding to whole grey levels: no noise is smaller.
 ROUNDING = 1.0 / 12.0
+# The patch is divided into so many blocks across and down: each then holds several correlation lengths of smoothed
+# noise (2.5 px), and sixteen of them tell a variance to a third.
+BLOCKS = 4
+# What blocks scatter by over what white noise makes them scatter by: exceeded by one in a hundred of chi-square with
+# 13 degrees of freedom over 13. Beyond, the residuals are no noise but texture that moves otherwise than the rest
+# (aliased, or of a surface that deforms), and the blocks tell the covariance (White, Econometrica 48, 1980,
+# doi:10.2307/1912934).
+MOST_SCATTER = 2.13
 
 _settled = loop("patch_registration_settled")
 
@@ -58,21 +66,23 @@ class PatchReference:
     Parameters
     ----------
     x_px, y_px : float
-        Its middle, on a pixel.
+        Middle of the patch, on a pixel.
     half_width_px, half_height_px : int
-        Pixels to either side of the middle.
+        Number of pixels on either side of the middle.
     levels : ndarray, shape (n,)
-        Light, with plane and mean taken off; norm `contrast`.
+        Light, smoothed, with the fitted plane (mean included) subtracted.
     jacobian : ndarray, shape (3, n)
-        Change of `levels` with x, y and angle (radians), what plane and gain explain taken off.
+        Derivatives of `levels` by x, y and angle (radians), without the components that a plane of light or a gain
+        explains.
     hessian : ndarray, shape (3, 3)
         Gram matrix of the jacobian.
     score : ndarray, shape (3, 3)
         That of the jacobian smoothed once more: covariance of what smoothed noise of unit variance projects on it.
-    fine : float
-        Share of the gradients' power that the smoothing takes off, 0 to 1: most of texture too fine for the pixels.
+    fine : (float, float)
+        Share of the gradients' power along x and along y that the smoothing takes off, 0 to 1: most of texture too fine
+        for the pixels.
     template : ndarray, shape (height, width)
-        Light as it was seen, for coarse search.
+        Light without smoothing, for the coarse search.
     """
 
     x_px: float
@@ -83,27 +93,27 @@ class PatchReference:
     jacobian: Floats
     hessian: Doubles
     score: Doubles
-    fine: float
+    fine: tuple[float, float]
     template: Floats
 
     @property
     def size(self) -> tuple[int, int]:
-        """Columns and rows."""
+        """Number of columns and rows."""
         return 2 * self.half_width_px + 1, 2 * self.half_height_px + 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registered:
-    """Positions and rotations of patches in another picture; arrays over the k patches.
+    """Positions and rotations of k patches in another picture.
 
     Parameters
     ----------
     x_px, y_px, turn_rad : ndarray of float, shape (k,)
-        Middle, and rotation clockwise on the screen, since the reference.
+        Middle of each patch, and rotation clockwise on the screen relative to the reference picture.
     covariance : ndarray of float, shape (k, 3, 3)
-        Of the three, from the noise of both pictures.
+        Covariance of x, y and rotation, from the noise of both pictures.
     correlation : ndarray of float, shape (k,)
-        Zero-normalised correlation of the patch with what was found, planes taken off.
+        Zero-normalised correlation of the patch with the registered part of the picture, with planes subtracted.
     noise : ndarray of float, shape (k,)
         Standard deviation of the noise of one picture.
     settled : ndarray of bool, shape (k,)
@@ -119,9 +129,16 @@ class Registered:
     settled: NDArray[np.bool_]
 
 
+def _taken_off(smoothed: Floats, sharp: Floats) -> float:
+    """Share of a gradient's power that the smoothing takes off."""
+    return 1.0 - float(np.sum(smoothed.astype(np.float64) ** 2)) / max(
+        float(np.sum(sharp.astype(np.float64) ** 2)), 1e-30
+    )
+
+
 @cache
 def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
-    """Columns and rows counted from the centre, and an orthonormal basis of planes, shape (3, n)."""
+    """Columns and rows counted from the patch's centre, and an orthonormal basis of planes of light, shape (3, n)."""
     y, x = np.mgrid[-half_height : half_height + 1, -half_width : half_width + 1]
     dx, dy = x.ravel().astype(np.float64), y.ravel().astype(np.float64)
     basis = np.stack((np.ones_like(dx), dx, dy))
@@ -142,16 +159,16 @@ def patch_reference(levels: Floats, column: int, row: int, half_width: int, half
     Parameters
     ----------
     levels : ndarray, shape (height, width)
-        Light of the picture, or of a part of it; at least `MARGIN_PX` to every side of the patch.
+        Light of the picture, or of a part of it that extends at least `MARGIN_PX` beyond the patch on every side.
     column, row : int
         The patch's middle pixel.
     half_width, half_height : int
-        Pixels to either side.
+        Number of pixels on either side of the middle pixel.
 
     Returns
     -------
     PatchReference
-        Its place is in pixels of `levels`.
+        The prepared patch; its position is in pixels of `levels`.
     """
     dx, dy, basis = _grid(half_width, half_height)
     rows = slice(row - half_height - MARGIN_PX, row + half_height + MARGIN_PX + 1)
@@ -171,8 +188,7 @@ def patch_reference(levels: Floats, column: int, row: int, half_width: int, half
     for axis in (1, 2):
         images = correlate1d(images, gaussian(SMOOTHING_PX), axis=axis, mode="constant")
     smoothed = images.reshape(3, -1)
-    sharp = float(np.sum(sharp_x.astype(np.float64) ** 2 + sharp_y.astype(np.float64) ** 2))
-    fine = 1.0 - float(np.sum(by_x.astype(np.float64) ** 2 + by_y.astype(np.float64) ** 2)) / max(sharp, 1e-30)
+    fine = (_taken_off(by_x, sharp_x), _taken_off(by_y, sharp_y))
     return PatchReference(
         float(column), float(row), half_width, half_height, own.astype(np.float32), jacobian.astype(np.float32),
         jacobian @ jacobian.T, smoothed @ smoothed.T, fine, part[inner, inner].copy(),
@@ -186,37 +202,38 @@ def register(
     start: Doubles,
     shared_pixels: float = 1.0,
 ) -> Registered:
-    """Register patches of one size, each in a part of another picture.
+    """Register patches of one size, each in its own part of another picture.
 
     Parameters
     ----------
     references : list of PatchReference
         The patches, all of one size.
     parts : list of ndarray, shape (height, width)
-        Light of the part of the picture in which each is looked for, all of one size.
+        Light of the part of the picture in which each patch is searched, all of one size.
     origins_px : ndarray of float, shape (k, 2)
         Column and row of each part's first pixel.
     start : ndarray of float, shape (k, 3)
-        First guess of x, y and turn, to about half a period of the finest texture.
+        Initial estimate of x, y and rotation, accurate to about half a period of the finest texture.
     shared_pixels : float
-        So many pixels count as one, where a codec is known to share its errors.
+        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
 
     Returns
     -------
     Registered
-        In the order of the references.
+        Results in the order of the references.
     """
     first = references[0]
     hessian = np.stack([reference.hessian for reference in references])
     hessian += 1e-6 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-12 * np.eye(3)
-    inverse = np.linalg.inv(hessian)
+    inverse = np.asarray(np.linalg.inv(hessian), dtype=np.float64)
+    scores = np.zeros((len(references), BLOCKS**2, 3))
     found = [
         _settled(
             coefficients(part, SMOOTHING_PX), reference.levels, reference.jacobian, own,
-            first.half_width_px, first.half_height_px, x - left, y - top, turn,
+            first.half_width_px, first.half_height_px, x - left, y - top, turn, by_block,
         )
-        for reference, part, own, (left, top), (x, y, turn) in zip(
-            references, parts, inverse, origins_px.tolist(), start.tolist(), strict=True
+        for reference, part, own, (left, top), (x, y, turn), by_block in zip(
+            references, parts, inverse, origins_px.tolist(), start.tolist(), scores, strict=True
         )
     ]  # fmt: skip
     x, y, turn, gain, correlation, squares = np.array([of[:6] for of in found]).T
@@ -224,6 +241,7 @@ def register(
     score = np.stack([reference.score for reference in references])
     size = (first.half_width_px, first.half_height_px)
     covariance, noise = _covariance(hessian, score, squares, gain, x, y, size, shared_pixels)
+    covariance = _as_blocks_scatter(covariance, inverse, scores)
     return Registered(x + origins_px[:, 0], y + origins_px[:, 1], turn, covariance, correlation, noise, settled)
 
 
@@ -237,13 +255,14 @@ def _covariance(
     half_size: tuple[int, int],
     shared_pixels: float,
 ) -> tuple[Doubles, Doubles]:
-    """Covariance of x, y and rotation from the residuals, and the noise of one picture.
+    """Covariance of x, y and rotation from the residuals, and standard deviation of the noise of one picture.
 
     Both pictures have noise. Smoothed and interpolated levels have less noise than pixels, so that the residuals have
-    the variance `sigma^2 (k_0 + g^2 k)`, where `k` depends on the sub-pixel phase. The estimate is affected by the
-    pixels' noise after smoothing only, because the texture is coarser than the pixels: `2 sigma^2` times the Gram
-    matrix of the gradients smoothed once more. The noise in the gradients of the reference increases their Gram matrix
-    and is subtracted from it (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
+    the variance `sigma^2 (k_0 + g^2 k)`, where g is the gain and `k` depends on the sub-pixel phase. The estimate is
+    affected by the pixels' noise after smoothing only, because the texture is coarser than the pixels: the covariance
+    of the gradient projections is `2 sigma^2` times the Gram matrix of the gradients smoothed once more. The noise in
+    the gradients of the reference increases their Gram matrix and is subtracted from it (errors in variables):
+    covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
     count, (n, turned) = squares.size, _extent(*half_size)
     table = phase_power(SMOOTHING_PX)
@@ -257,8 +276,28 @@ def _covariance(
     return _propagated(hessian, score, noisy, spread), np.sqrt(one)
 
 
+def _as_blocks_scatter(covariance: Doubles, inverse: Doubles, scores: Doubles) -> Doubles:
+    """Widen covariances to the scatter of the patch's blocks where it is more than the noise's.
+
+    Parameters
+    ----------
+    covariance : ndarray of float, shape (k, 3, 3)
+        By the noise.
+    inverse : ndarray of float, shape (k, 3, 3)
+        Of the Gram matrices.
+    scores : ndarray of float, shape (k, blocks, 3)
+        Products of gradients and residuals by block; their sum is zero where the registration settled.
+    """
+    blocks = scores.shape[1]
+    away = (scores - scores.mean(axis=1, keepdims=True)) @ inverse
+    seen = np.einsum("kbi,kbi->ki", away, away) * (blocks / (blocks - 3.0))
+    ratio = seen / np.einsum("kii->ki", covariance)
+    wider = np.sqrt(np.where(ratio > MOST_SCATTER, ratio, 1.0))
+    return np.asarray(covariance * wider[:, :, None] * wider[:, None, :])
+
+
 def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:
-    """Covariances of k patches, shape (k, 3, 3); infinite for gradients of noise only, or of one direction only."""
+    """Covariances of k patches, shape (k, 3, 3); infinite if the gradients are noise, or all in one direction."""
     true = hessian - noisy
     size = np.sqrt(np.maximum(np.einsum("kii->ki", hessian), 1e-30))
     surely = hessian - NOISE_MARGIN * noisy
@@ -272,7 +311,7 @@ def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Double
 def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
     """Predicted covariance of x, y and rotation for a registration of this patch, shape (3, 3).
 
-    Infinite where the gradients do not exceed those of the noise, or have one direction only.
+    The covariance is infinite if the gradients do not exceed those of noise, or all have one direction.
 
     Parameters
     ----------

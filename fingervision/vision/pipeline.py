@@ -1,4 +1,7 @@
-"""The order of the steps: grey, denoise, binarise, fingers, edges, tip, gap. Only this file knows it."""
+"""Run the image processing steps on one video frame: grey, denoise, binarise, fingers, edges, tip, gap.
+
+Only this module knows the order of the steps.
+"""
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -52,22 +55,22 @@ UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it diff
 
 
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
-    """Measure one frame, without any memory of earlier ones.
+    """Measure one video frame, without any memory of earlier frames.
 
-    From then on OpenCV uses one thread in this process: its other threads would wait busily between frames, which costs
-    two thirds of a core at no gain, and the decoder needs that core.
+    The first call limits OpenCV to one thread in this process: its other threads would wait busily between frames,
+    which takes two thirds of a processor core that the decoder needs.
 
     Parameters
     ----------
     frame : Frame
         The picture.
     settings : Settings
-        What the user chose.
+        Settings of the user.
 
     Returns
     -------
     GapMeasurement or NoGap
-        The number with its uncertainty, or why there is none.
+        The gap with its uncertainty, or the reason why there is none.
     """
     if cv2.getNumThreads() != 1:
         cv2.setNumThreads(1)
@@ -78,42 +81,42 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
 def look_closely(
     frame: Frame, settings: Settings
 ) -> tuple[GapMeasurement | NoGap, CoarseFingers | None, EdgePoints | None]:
-    """Measure one frame and keep the intermediate results, for reports on what limits the measurement.
+    """Measure one video frame and return the intermediate results, for reports on what limits the measurement.
 
     Parameters
     ----------
     frame : Frame
         The picture.
     settings : Settings
-        What the user chose.
+        Settings of the user.
 
     Returns
     -------
     outcome : GapMeasurement or NoGap
-        As of `measure_frame`, in pixels of the full frame.
+        Same result as `measure_frame`, in pixels of the full frame.
     fingers : CoarseFingers or None
-        Where they were found, in pixels of the region; None where they were not.
+        The fingers to the nearest pixel, in pixels of the measured region; None if none were found.
     edges : EdgePoints or None
-        Their sub-pixel outlines, likewise.
+        Sub-pixel outlines of the fingers, in pixels of the measured region; None if not measured.
     """
     attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, _coded(frame, settings))
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
 def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
-    """Pictures of every step of one frame, in order, each as large as the region that is measured.
+    """Pictures of every step for one video frame, in order, each with the size of the measured region.
 
     Parameters
     ----------
     frame : Frame
         The picture.
     settings : Settings
-        What the user chose.
+        Settings of the user.
 
     Returns
     -------
     list of (str, ndarray of uint8)
-        Name and picture: grey, denoised, binary, boundary, edges, and the measured gap.
+        Name and picture of each step: grey, denoised, binary, boundary, edges, and the measured gap.
     """
     grey = _part(to_grey(frame.pixels), settings.region)
     denoised = denoise(grey)
@@ -140,7 +143,7 @@ def _part(grey: GreyImage, region: Region | None) -> GreyImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Coded:
-    """What a codec did to the measured region of the picture."""
+    """Effects of a codec on the measured region of the picture."""
 
     coding: Coding
     quantiser: Quantiser | None
@@ -156,7 +159,7 @@ def _coded(frame: Frame, settings: Settings) -> _Coded:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Attempt:
-    """How far the analysis of a frame got: the binary picture, the fingers in it, their edges, and the result."""
+    """Intermediate results of a frame's analysis: the binary picture, the fingers, their edges, and the result."""
 
     outcome: GapMeasurement | NoGap
     binary: Binary | None = None
@@ -200,7 +203,7 @@ def _measured(
     coded: _Coded,
     scale: int,
 ) -> _Attempt:
-    """Measure two fingers that were found; rough fingers over longer flanks where that is more certain."""
+    """Measure a pair of fingers; if they are rough, also over longer flanks, and keep the more certain result."""
     upright = fingers.orientation.view(grey)
     how = (settings, scale, light_gap, coded)
     edges, outcome = _edges_and_gap(upright, fingers, *how)
@@ -218,7 +221,7 @@ def _measured(
 def _edges_and_gap(
     upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coded: _Coded
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
-    """Fit the edges of the fingers that were found, and derive the result."""
+    """Fit the edges of a pair of fingers, and derive the result."""
     light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
     edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
@@ -252,7 +255,7 @@ def _with_two_tones(
     coded: _Coded,
     scale: int,
 ) -> _Attempt:
-    """Return the attempt, or one with another threshold where a shadow or pad was put into the wrong class."""
+    """Return the attempt, or a new one with another threshold if a shadow or pad was put into the wrong class."""
     if not isinstance(attempt.outcome, GapMeasurement) or attempt.fingers is None or attempt.edges is None:
         return attempt
     upright = attempt.fingers.orientation.view(grey)
@@ -273,7 +276,7 @@ def _with_two_tones(
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:
-    """Full scale of the light; a measured response states its own."""
+    """Full scale of the light; a measured camera response has its own."""
     known = settings.response.top_level
     bits = settings.bits if known is None or grey.dtype == np.uint8 else known.bit_length()
     found = top_level(grey, bits)

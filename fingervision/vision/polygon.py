@@ -1,4 +1,4 @@
-"""A finger's end as a convex chain of straight sides with rounded corners: position of its tip and inner edge."""
+"""A finger's end as a convex chain of straight sides with rounded corners: positions of its tip and inner edge."""
 
 from math import cos, pi, sin, sqrt, tan
 from typing import NamedTuple
@@ -10,9 +10,10 @@ OVERLAP_PX = 0.5
 
 
 class Side(NamedTuple):
-    """A straight side: a point on it, and the direction in which the chain follows it (radians, x towards y).
+    """A straight side: a point on it, and the direction in which the chain passes it (radians, from x to y).
 
-    x runs inwards across the finger, y towards its root; the chain runs up the outer flank and down the inner one.
+    x runs inwards across the finger, y towards the finger's root; the chain runs up the outer flank and down the inner
+    flank.
     """
 
     x: float
@@ -24,12 +25,12 @@ class Side(NamedTuple):
         return Side(self.x + px * sin(self.angle), self.y - px * cos(self.angle), self.angle)
 
     def turned(self, radians: float) -> "Side":
-        """Return the side rotated about its point."""
+        """Return the side rotated about the point by which it is given."""
         return Side(self.x, self.y, self.angle + radians)
 
 
 class ReadOff(NamedTuple):
-    """Tip and inner edge, the change of the edge per pixel towards the root, and the sides that determine them."""
+    """Tip, inner edge, change of the edge per pixel towards the root, and the sides that determine tip and edge."""
 
     tip: float
     apex: float
@@ -39,7 +40,7 @@ class ReadOff(NamedTuple):
 
 
 class Corner(NamedTuple):
-    """Vertex of two sides, the direction from it into the finger, and the angle between the sides (radians)."""
+    """Corner of two sides: its vertex, the direction from the vertex into the finger, and the change of direction."""
 
     vertex: tuple[float, float]
     inwards: tuple[float, float]
@@ -47,14 +48,14 @@ class Corner(NamedTuple):
 
 
 class Polygon(NamedTuple):
-    """Sides from the outer to the inner flank, the radius of the corner after each, and which side is a level top."""
+    """Sides from the outer to the inner flank, radius of the corner after each side, and index of a level top side."""
 
     sides: list[Side]
     radii: list[float]
     level: int | None
 
     def corners(self) -> list[Corner] | None:
-        """Corners between the sides; None where the chain is not convex."""
+        """Corners between the sides; None if the chain is not convex."""
         found = []
         for one, two in zip(self.sides, self.sides[1:], strict=False):
             turn = (two.angle - one.angle + pi) % (2.0 * pi) - pi
@@ -68,7 +69,7 @@ class Polygon(NamedTuple):
         return found
 
     def read_off(self, below_tip_px: float) -> ReadOff | None:
-        """Tip, and inner edge at the measuring height below it; None where the chain has none."""
+        """Tip, and inner edge at the measuring height below the tip; None if the chain does not determine them."""
         corners = self.corners()
         if corners is None:
             return None
@@ -83,7 +84,7 @@ class Polygon(NamedTuple):
         return None if edge is None else ReadOff(height, apex, edge[0], edge[1], frozenset((*top, *edge[2])))
 
     def _tip(self, ends: "_Ends") -> tuple[float, float, tuple[int, ...], int] | None:
-        """Height, position across, the sides that form the tip, and the side from which the inner edge is searched."""
+        """Height of the tip, its position across, the sides that form it, the side to search the inner edge from."""
         if self.level is not None:
             (x0, y0), (x1, y1) = ends.first[self.level], ends.last[self.level]
             return 0.5 * (y0 + y1), 0.5 * (x0 + x1), (self.level,), self.level
@@ -110,7 +111,7 @@ class Polygon(NamedTuple):
 
 
 class _Ends(NamedTuple):
-    """Ends of every side between the fillets of its corners, and the fillets' centres."""
+    """Ends of every side between the fillets of its corners, and the centres of the fillets."""
 
     first: list[tuple[float, float]]
     last: list[tuple[float, float]]
@@ -118,7 +119,7 @@ class _Ends(NamedTuple):
 
     @classmethod
     def of(cls, sides: list[Side], corners: list[Corner], radii: list[float]) -> "_Ends | None":
-        """Make a polygon from sides, corners and radii; None where two fillets overlap."""
+        """Compute the ends from sides, corners and radii; None if two fillets overlap."""
         first, last, centres = [], [], []
         for k, side in enumerate(sides):
             c, s = cos(side.angle), sin(side.angle)

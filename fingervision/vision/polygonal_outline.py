@@ -1,8 +1,8 @@
 """Step 6 for fingers with chamfered corners: the end of a finger as a chain of straight sides and corners.
 
-The outline's points are divided into straight runs. Blur rounds the half-level at a corner: points near it determine
-only its radius, and a side is fitted to points farther away. Tip and inner edge are those of the polygon of these
-sides, with corners rounded as their half-level shows.
+The outline's points are divided into straight runs. Blur rounds the half-level contour at a corner: points near a
+corner determine only its radius, and sides are fitted to points farther away. Tip and inner edge are those of the
+polygon of these sides, with its corners rounded by the fitted radii.
 """
 
 from math import atan2, cos, hypot, pi, sin, sqrt, tan
@@ -59,7 +59,7 @@ FLATTEST = 3.0
 
 
 class _Fitted(NamedTuple):
-    """A side with its standard uncertainties (pixels across it, radians), and its mean squared residual."""
+    """A fitted side, its standard uncertainties (pixels across it, radians), and its mean squared residual."""
 
     side: Side
     u_offset: float
@@ -68,16 +68,16 @@ class _Fitted(NamedTuple):
 
 
 def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:
-    """Tip and edge of a finger with straight sides and (nearly) sharp corners; None for another shape.
+    """Tip and inner edge of a finger with straight sides and (nearly) sharp corners; None for another shape.
 
     Parameters
     ----------
     points : OutlinePoints
-        Sub-pixel outline.
+        Sub-pixel outline of the finger.
     below_tip_px : float
-        Height of measuring below the tip.
+        Distance of the measuring point below the tip.
     shared : float
-        Neighbouring points that share their errors.
+        Number of neighbouring points with a common error.
     """
     if not _has_straight_top(points):
         return None
@@ -116,7 +116,7 @@ def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared
 
 
 def _has_straight_top(points: OutlinePoints) -> bool:
-    """Whether the middle of what is highest is straight, at a glance: drops are not looked at further."""
+    """Whether the middle of the highest part is straight, by a quick test that excludes drop-shaped ends."""
     is_top = ~points.is_row & (points.y < points.y.min() + TOP_PX)
     x, y, u = points.x[is_top], points.y[is_top], points.u[is_top]
     if x.size < 2 * FEWEST_POINTS:
@@ -138,7 +138,7 @@ def _chain(points: OutlinePoints, lowest: float) -> Ints:
 
 
 def _line(x: Floats, y: Floats, u: Floats) -> _Fitted:
-    """Weighted total least squares; `u` is positive along x, negative along y."""
+    """Weighted total least-squares line; `u` is positive for uncertainties along x, negative for those along y."""
     start = np.full(x.size, atan2(float(y[-1] - y[0]), float(x[-1] - x[0])))
     for _look in range(2):
         across = np.where(u > 0, np.abs(np.sin(start)), np.abs(np.cos(start)))
@@ -160,7 +160,7 @@ def _line(x: Floats, y: Floats, u: Floats) -> _Fitted:
 def _fitted(
     x: Floats, y: Floats, u: Floats, runs: list[Ints], blur: float
 ) -> tuple[list[_Fitted], list[float], list[float]] | None:
-    """Sides, the radii of their corners, and the radii's uncertainties; None where the sides are not convex."""
+    """Fitted sides, radii of their corners and the radii's uncertainties; None if the sides are not convex."""
     fits = [_line(x[run], y[run], u[run]) for run in runs]
     radii = u_radii = [0.0] * (len(runs) - 1)
     for _pass in range(PASSES):
@@ -187,7 +187,7 @@ def _fitted(
 
 
 def _radius(x: Floats, y: Floats, u: Floats, corner: Corner, blur: float) -> tuple[float, float]:
-    """Most probable radius of a corner from the points of its half-level, and its standard uncertainty."""
+    """Most probable radius of a corner from the points of its half-level contour, and its standard uncertainty."""
     (vx, vy), (nx, ny), turn = corner
     dx, dy = x - vx, y - vy
     near = np.hypot(dx, dy) < FARTHEST_PX
@@ -207,12 +207,15 @@ def _radius(x: Floats, y: Floats, u: Floats, corner: Corner, blur: float) -> tup
 
 
 def _bent_in_blurs(turn: float) -> float:
-    """Length along its sides over which a corner's blur matters, in units of sigma."""
+    """Length along a corner's sides over which the blur matters, in units of sigma."""
     return BENT_IN_BLURS - LESS_IN_BLURS * max(0.0, 1.0 - 2.0 * turn / pi) / 0.75
 
 
 def _level(fits: list[_Fitted]) -> int | None:
-    """Index of a level top side, if there is one: otherwise noise would choose the higher of its ends."""
+    """Index of a top side that is level within its uncertainty, or None.
+
+    For a level side, noise would decide which of its ends is the higher.
+    """
     for k in range(1, len(fits) - 1):
         u_angle = fits[k].u_angle * sqrt(max(fits[k].square, 1.0))  # infinite: a top too short to lean
         corners = Polygon([fit.side for fit in fits[k - 1 : k + 2]], [0.0, 0.0], None).corners()

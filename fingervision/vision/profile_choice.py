@@ -1,9 +1,10 @@
-"""Select the model of the mean profile across a flank, which gives the position of the finger's edge.
+"""Select the model of the mean profile across a flank, from which the position of the finger's edge follows.
 
-A shadow, a side wall and a line of glare each leave a characteristic mean profile. Some of these are indistinguishable
-on one flank alone: a wall half as light as the background looks like motion blur, and glare like a wall on the other
-side of the edge. A wall is visible on the inner flank only, because the camera looks into the gap from its middle;
-motion blurs both flanks and no tip; glare and shadow surround the finger.
+A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these are
+indistinguishable on one flank alone: a wall half as light as the background looks like motion blur, and glare looks
+like a wall on the other side of the edge. They are distinguished by where they occur: a wall is visible on the inner
+flank only, because the camera looks into the gap from its middle; motion blurs both flanks but not the tip; glare and
+shadow surround the finger.
 """
 
 from dataclasses import replace
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.beside_edge import without_additions
-from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage
@@ -28,6 +29,7 @@ from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
 from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 from fingervision.vision.symmetric_spread import symmetric_squares
+from fingervision.vision.wall_width import WIDER, wall_limits_px
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -50,8 +52,6 @@ DISC_BREADTH = 1.12
 SHARES = (0.05, 0.85)
 # Levels within so many standard deviations of the end of the scale are cut off now and then.
 CUT_OFF_SIGMAS = 2.0
-# The inner flank is wider than the outer one, or than the tip, where its variance is larger by this share.
-WIDER = 0.15
 # Motion and focus widen both flanks of a finger, a wall the inner flanks of both fingers: one inner flank alone, wider
 # than the finger's outer one by this share (of variance) and by so many pixels, has a strip of a third tone beside it,
 # as a shadow makes. One of breadth w spreads a step by w / 2 at most: this one is broader than two pixels, and its own
@@ -74,31 +74,32 @@ U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 def with_profile(
     upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
 ) -> EdgePoints:
-    """Return the points moved to the finger's own edge where a structure beside it has displaced the fitted step.
+    """Return the points moved to the finger's own edge, if a structure beside the edge has displaced the fitted step.
 
     Parameters
     ----------
     upright : ndarray, shape (rows, columns)
-        Grey levels, seen with the tips up.
+        Grey levels of the picture, turned so that the tips point up.
     edges : EdgePoints
-        Steps that were fitted to every line.
+        Steps fitted to every line of pixels.
     light : ndarray of float, shape (levels,)
-        Light of every grey level.
+        Light for every grey level (look-up table).
     top_level : int
-        End of the scale.
+        Highest level of the scale.
     is_outline : bool
-        Whether a thick part's edge is that of its whole outline, side walls included, and not that of its front face.
+        Whether the edge of a thick part is that of its whole outline, side walls included, rather than that of its
+        front face.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
-        return edges
+        return _unsure_of_width(edges)
     room = _room(edges)
     # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        return edges
+        return _unsure_of_width(edges)
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
@@ -148,7 +149,9 @@ def with_profile(
             ]
             is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and _are_of_size(wall, -1.0)
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
-        return _unsure(edges, [abs(fit.position) for fit in chosen], "wall") if is_wall else edges
+        # A wall is there: the edge lies as far off as the fit says, give or take its own doubt.
+        farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
+        return _unsure(edges, farthest, "wall") if is_wall else _unsure_of_width(edges)
     if is_lopsided and left[SHADOW] < enough:
         # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
         beyond = np.array(
@@ -181,7 +184,8 @@ def with_profile(
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
             chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
             return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
-    flanks, tips = (edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
+    resolved = np.maximum(edges.blur_px, LEAST_RESOLVED_BLUR_PX)
+    flanks, tips = (resolved[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
     if any(widened):
         return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
@@ -202,10 +206,11 @@ def with_profile(
 def _without_shadow(
     upright: GreyImage, edges: EdgePoints, light: Floats, ramps: list[ProfileFit], fading: list[ProfileFit], bins: int
 ) -> EdgePoints:
-    """Edges corrected for a soft shadow, whose light recovers between linearly and exponentially.
+    """Edges corrected for a soft shadow, whose light recovers with distance linearly or exponentially.
 
-    The edge lies between the positions of these two models, weighted by the squares that each leaves beyond chance. Its
-    displacement towards the model that leaves more is taken as its own standard uncertainty.
+    The edge is placed between the positions of the linear and the exponential model, the nearer to the one with the
+    smaller sum of squared residuals beyond noise. The distance between this position and that of the better model is
+    taken as a standard uncertainty.
     """
     squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
     if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
@@ -224,7 +229,7 @@ def _without_shadow(
 
 
 def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
-    """Return the points corrected for sharpening of the stored levels; None where there is no sharpening."""
+    """Return the points corrected for sharpening of the stored levels; None if there was no sharpening."""
     stored = np.arange(float(light.size))
     left, right = (mean_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
     if left is None or right is None:
@@ -242,7 +247,7 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
 
 
 def _is_symmetric(flanks: list[tuple[MeanProfile, float, float]], steps: list[ProfileFit]) -> bool:
-    """Whether the profiles of both flanks could come from optics that spread light symmetrically."""
+    """Whether the profiles of both flanks could be caused by optics that spread light symmetrically."""
     squares = left = 0.0
     for (profile, weight, blur), step in zip(flanks, steps, strict=True):
         contrast = float(np.ptp(profile.light))
@@ -254,12 +259,12 @@ def _is_symmetric(flanks: list[tuple[MeanProfile, float, float]], steps: list[Pr
 
 
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
-    """Whether the structure beside a dark finger's edge has a plausible sign and size."""
+    """Whether the fitted structure beside a dark finger's edge has a plausible sign and size."""
     return all(SHARES[0] < sign * fit.share < SHARES[1] for fit in fits)
 
 
 def _room(edges: EdgePoints) -> int:
-    """How far a window may extend before it meets the other finger (pixels)."""
+    """Largest length of a window that does not reach the other finger (pixels)."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
     if not (real[0].size and real[1].size):
         return 0
@@ -274,7 +279,7 @@ def _best(
     is_blur_known: bool = False,
     too_many: float = np.inf,
 ) -> ProfileFit:
-    """The best fit of a model among all starting values."""
+    """The best fit of a model from all starting values."""
     weights = profile.count * weight
     blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
     return min(
@@ -288,18 +293,18 @@ def _best(
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement across the picture: a wall repeats the outline beside itself."""
+    """Movement along every line per pixel of movement of the inner edge across the picture, for a side wall."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
 
 def _beyond_wall(fit: ProfileFit) -> ProfileFit:
-    """The far edge of a wall, where the fit found the near one."""
+    """Move the position of a fitted wall from its near to its far edge."""
     return fit._replace(position=fit.position + fit.breadth)
 
 
 def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats, beside: str) -> EdgePoints:
-    """Move the edges to the positions that a model gives, and state the remaining uncertainty."""
+    """Move the edges to the positions given by a model, and state the remaining uncertainty."""
     moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
     u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
     position = edges.position + edges.lines.outward * moves
@@ -307,7 +312,7 @@ def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixe
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Give the inner flanks the blur of the outer ones: a wall is not blur."""
+    """Set the blur of the inner flanks to the given one, because a wall beside an edge is not blur."""
     blur_px = edges.blur_px.copy()
     blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
     blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])
@@ -315,12 +320,18 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
 
 
 def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Leave the edges in place, with an uncertainty of up to the limit because the cause is undecided."""
+    """Leave the edges in place, with an uncertainty up to the limit, because the cause is not decided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
+def _unsure_of_width(edges: EdgePoints) -> EdgePoints:
+    """State how far a wall may have moved the edges where nothing but their width says that there is one."""
+    limits = wall_limits_px(edges)
+    return edges if limits is None else _unsure(edges, limits, "wall")
+
+
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Marks with the given uncertainties; both edges have the same error."""
+    """Marks with the given uncertainties, one for each finger."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right

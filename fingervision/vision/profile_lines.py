@@ -1,7 +1,7 @@
-"""Search lines for edges: a row across a flank, a column across a tip, for every pixel of the coarse outline.
+"""Search lines for edges: for every pixel of the coarse outline, a row across a flank or a column across a tip.
 
-Each finger has the same number of places for lines, so that the lines of several fingers fit into one array: rows
-across the inner flank, rows across the outer flank, columns across the tip. An unused place has weight zero.
+Each finger has the same number of array entries for lines, so that the lines of several fingers fit into one array:
+rows across the inner flank, rows across the outer flank, columns across the tip. An unused entry has weight zero.
 """
 
 from collections.abc import Sequence
@@ -37,22 +37,22 @@ _fill = loop("profile_lines_fill")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProfileLines:
-    """Lines of pixels across the outlines of fingers; arrays of shape (fingers, PLACES) unless said otherwise.
+    """Lines of pixels across the outlines of fingers; arrays of shape (fingers, PLACES) unless stated otherwise.
 
-    Coordinates are the fingers' axes (across, along).
+    Coordinates are given in the fingers' axes (across, along).
 
     Parameters
     ----------
     fixed : ndarray of int
-        The row (of a flank) or column (of a tip).
+        Row number of a line across a flank, or column number of a line across a tip.
     coarse : ndarray of int
         The finger's last pixel on that line.
     slope : ndarray of float
-        Change of the edge per row or column.
+        Change of the edge's position per row or column.
     weight : ndarray of float
-        1 for a line, 0 for a place that nothing fills.
+        1 for a line, 0 for an unused entry.
     outward : ndarray of int
-        +1 or -1: the sense in which the line leaves the finger.
+        Direction (+1 or -1) in which the line leaves the finger.
     """
 
     fixed: Ints

@@ -1,8 +1,8 @@
 """Models of the mean profile across a flank, each fitted by least squares.
 
-A finger's edge is a step of light that the optics spread. Beside it there may be a second step (the side wall of a
-thick part, between the finger's face and the ground), a ramp (a soft shadow on the ground) or a bright line (glare
-along the edge, on the finger). Each of these displaces a fitted single step towards itself.
+A finger's edge is a step of light, blurred by the optics. Beside it there may be a second step (the side wall of a
+thick part, between the finger's face and the background), a ramp (a soft shadow on the background) or a bright line
+(glare along the edge, on the finger). Each of these structures displaces a fitted single step towards itself.
 """
 
 from typing import NamedTuple
@@ -40,22 +40,22 @@ _fit_profile = loop("profile_models_fit_profile")
 
 
 class ProfileFit(NamedTuple):
-    """One model of a profile, fitted.
+    """Fit of one model to a mean profile.
 
     Parameters
     ----------
     squares : float
         Weighted sum of the squared residuals.
     position : float
-        The finger's edge, outwards from where the single step lies (pixels).
+        Position of the finger's edge, measured outwards from the fitted single step (pixels).
     u_position : float
-        Its standard uncertainty for unit variance of the weighted residuals.
+        Standard uncertainty of the position, if the weighted residuals have unit variance.
     breadth : float
-        Of the wall or shadow, or how far inside the glare lies (pixels).
+        Breadth of the wall or shadow, or distance of the glare inside the edge (pixels).
     share : float
-        Size of the addition, as a share of the contrast of finger and ground.
+        Strength of the added structure, as a share of the contrast between finger and background.
     blur : float
-        Standard deviation of the optics' spread, the pixel included (pixels).
+        Standard deviation of the blur, the pixel's width included (pixels).
     """
 
     squares: float
@@ -67,7 +67,7 @@ class ProfileFit(NamedTuple):
 
 
 def addition(kind: int, t: float, blur: float, breadth: float) -> float:
-    """The structure beside the step, blurred, as a function of the distance outwards from the edge."""
+    """Blurred structure beside the step, as a function of the distance outwards from the edge."""
     return float(_addition(kind, t, blur, breadth))
 
 
@@ -88,20 +88,20 @@ def fit_profile(
     kind : int
         STEP, WALL, SHADOW, GLARE or FADING.
     t : ndarray of float, shape (n,)
-        Places, outwards from the single step's edge (pixels).
+        Positions, outwards from the fitted single step (pixels).
     value, weight : ndarray of float, shape (n,)
-        Light there, and the inverse of its variance.
+        Light at these positions, and the inverse of its variance.
     blur, start : float
-        First guess of the blur and of the breadth (pixels).
+        Initial estimates of the blur and of the breadth (pixels).
     is_blur_known : bool
-        Whether the blur is that of the guess.
+        Whether the blur is fixed to the given value.
     too_many : float
-        Squares beyond which nobody asks how few they might become.
+        Sum of squares above which the fit is stopped early, because the model will not be chosen.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        If the parts of the model cannot be told apart at these places.
+        If the parts of the model are indistinguishable at these positions.
     """
     limits = LIMITS_PX[kind]
     is_fitted, *fit = _fit_profile(kind, t, value, weight, blur, start, bool(is_blur_known), *limits, too_many)

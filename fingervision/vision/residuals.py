@@ -1,4 +1,4 @@
-"""Residuals of the fitted shape of a finger's end: the uncertainty they give, and whether the shape is rejected."""
+"""Residuals of a finger end's fitted shape: the uncertainty that they imply, and whether the shape is rejected."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ _distance_in_spacings = loop("residuals_distance_in_spacings")
 
 
 def spread(end: FingerEnd) -> float:
-    """Ratio of the residuals' variance to the points' own variances."""
+    """Ratio of the residuals' variance to the variances stated for the points."""
     free = max(float(end.robust.sum()) - PARAMETERS, 1.0)
     return max(float(end.robust @ end.residual**2) / free / BIWEIGHT_SPREAD, 0.5)
 
@@ -57,10 +57,10 @@ def spread(end: FingerEnd) -> float:
 def shared_points(
     points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd], coding: Coding
 ) -> float:
-    """Number of neighbouring points that share their errors, the same for both fingers.
+    """Number of neighbouring points with a common error, the same for both fingers.
 
-    The fit takes a codec's error of a whole block for shape: the residuals do not show it, so that the block's size is
-    used.
+    The error that a codec causes in a whole block is absorbed by the fitted shape and does not appear in the residuals;
+    therefore the block's size is used for coded pictures.
     """
     seen: list[float] = [_shared(end.residual, end.robust, p.side) for p, end in zip(points, ends, strict=True)]
     return max(0.5 * sum(seen), SHARED_POINTS[coding])
@@ -74,11 +74,12 @@ def shape_holds(
     Parameters
     ----------
     points, end, found : OutlinePoints, FingerEnd, MeasuringPoint
-        One finger.
+        Outline points, fitted end and measuring point of one finger.
     below_tip_px : float
-        Height of measuring below the tip.
+        Distance of the measuring point below the tip.
     stray : float
-        So many neighbouring points of a rough edge stray together, which is no matter of shape.
+        Number of neighbouring points of a rough edge that deviate together; such deviations are not attributed to the
+        shape.
     """
     if np.count_nonzero(end.robust) < PARAMETERS or not is_on_outline(points, found.edge, found.tip + below_tip_px):
         return False
@@ -92,26 +93,26 @@ def shape_holds(
 
 
 def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, height: float) -> float:
-    """Variance of the edge from points beside the measuring point that the fit rejected as dust (pixels squared).
+    """Variance of the edge due to points near the measuring point that the fit rejected as dust (pixels squared).
 
-    The edge lies anywhere between the shape and the farthest of these points, a rectangular distribution. Both fingers
-    have the same error, so that twice the variance of either covers the variance of the sum (JCGM 100:2008, 4.3.7 and
-    5.2.2).
+    The edge may lie anywhere between the fitted shape and the farthest of these points (a rectangular distribution).
+    The errors of the two fingers may be equal, so that each finger's variance is doubled to cover the variance of the
+    sum (JCGM 100:2008, 4.3.7 and 5.2.2).
     """
     return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
 
 
 def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:
-    """Whether enough of the fitted outline belongs to flanks nearly parallel to the axis.
+    """Whether enough of the fitted outline belongs to flanks that are nearly parallel to the finger's axis.
 
     Parameters
     ----------
     points : OutlinePoints
-        Sub-pixel outline.
+        Sub-pixel outline of the finger.
     end : FingerEnd
-        The shape that was fitted to it.
+        Shape fitted to the outline.
     turn : float
-        How both fingers of a turned camera lean, in this finger's own axes.
+        Common tilt of both fingers, due to a turned camera, in this finger's own axes.
     """
     if max(abs(end.parameters[INNER_M] - turn), abs(end.parameters[OUTER_M] - turn)) > STEEPEST:
         return False
@@ -121,5 +122,5 @@ def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool
 
 
 def is_on_outline(points: OutlinePoints, edge: float, height: float) -> bool:
-    """Whether a measuring point has outline points beside it, because nothing is extrapolated."""
+    """Whether there are outline points next to the measuring point, so that it is not extrapolated."""
     return float(_distance_in_spacings(points.x, points.y, edge, height)) < FARTHEST_POINT_PX

@@ -1,4 +1,4 @@
-"""Shift of a fitted edge under another camera response: the uncertainty of an assumed response."""
+"""Shift of a fitted edge under another camera response: the uncertainty due to an assumed response."""
 
 from functools import lru_cache
 from math import hypot
@@ -26,14 +26,14 @@ STEPS = 4096
 def edge_shift_px(
     assumed: CameraResponse, other: CameraResponse, inside: float, outside: float, blur_px: float
 ) -> float:
-    """Error of an edge fitted under an assumed response if another one is true, outwards from the finger (pixels).
+    """Error of an edge fitted under an assumed camera response if another response is true (pixels, outwards).
 
     Parameters
     ----------
     assumed, other : CameraResponse
-        What the levels were taken for, and what they may be.
+        The assumed response, and the possible true response.
     inside, outside : float
-        Light of the two plateaus under the assumed response, shares of full scale.
+        Light of the two plateaus under the assumed response, as shares of full scale.
     blur_px : float
         Gaussian sigma of the edge (pixels).
     """
@@ -45,10 +45,10 @@ def edge_shift_px(
 def gap_shift_px(
     measured: GapMeasurement, edges: EdgePoints, assumed: CameraResponse, other: CameraResponse, top_level: int
 ) -> float:
-    """How much larger a measured gap is than it would be if the other response were the true one (pixels).
+    """Measured gap minus the gap under another camera response, if that is the true one (pixels).
 
-    A finger's whole outline moves, including the tip; where the edge is slanted, the measuring height moves with the
-    tip.
+    A finger's whole outline shifts, including the tip, and the measuring height shifts with the tip, which matters if
+    the edge is slanted.
     """
     total = 0.0
     for k, (finger, slope) in enumerate(
@@ -62,7 +62,7 @@ def gap_shift_px(
 
 @lru_cache(maxsize=4096)
 def _shift(assumed: str, other: str, inside: int, outside: int, blur: int) -> float:
-    """Fit a step of light that has one standard response, read through another standard response."""
+    """Fit a step of light encoded by one standard response and decoded by another."""
     sigma = BLUR_RATIO**blur
     shares = np.linspace(0.0, 1.0, STEPS)
     assumed_light, other_light = (

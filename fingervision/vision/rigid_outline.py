@@ -1,9 +1,9 @@
 """Rigid motion of one body in a picture, from all visible stretches of its outline.
 
-Weighted least squares over the offsets of all chunks of the outline (`outline_chunks`) gives one rigid motion; Tukey's
+The motion is fitted by weighted least squares to the offsets of all chunks of the outline (`outline_chunks`); Tukey's
 weights suppress chunks whose edge is covered. Scatter of the chunks beyond their own noise widens the covariance. Edge
-bias, size, and the offset of every side that may have a shadow (`one_sided_blur`) are fitted with the motion, each with
-its standard uncertainty as prior.
+bias, size error, and the offset of every side that may have a shadow (`one_sided_blur`) are fitted together with the
+motion, each with its standard uncertainty as prior.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,14 @@ Array = NDArray[np.float64]
 STEPS = 5
 SETTLED_PX = 0.01
 TUKEY = 4.685
-"""Of Tukey's biweight: 95 % efficient for normal errors (Huber (1981), Robust Statistics, DOI 10.1002/0471725250)."""
+"""Tuning constant of Tukey's biweight: 95 % efficient for normal errors (Huber (1981), Robust Statistics, DOI
+10.1002/0471725250)."""
 SINGULAR = 1e8
-"""Condition beyond which edges leave a motion free: half the digits of a double."""
+"""Condition number above which the edges do not determine the motion: half the digits of a double are lost."""
 FEWEST = 6
-"""Chunks: twice the unknowns of a rigid motion, so that their scatter is known too."""
+"""Least number of chunks: twice the unknowns of a rigid motion, so that the scatter can be estimated too."""
 LEAST_SHARE = 0.4
-"""Of the chunks in view that must be seen: less is a body that something covers."""
+"""Least share of the chunks in view whose edge must be found; with fewer, the body is covered by something."""
 LEAST_IN_VIEW = 0.4
 
 
@@ -39,21 +40,21 @@ class RigidFit:
     shift_px : ndarray of float, shape (2,)
         Motion of the reference point.
     angle_rad : float
-        Rotation, from x to y of the picture.
+        Rotation, from x towards y of the picture.
     covariance : ndarray of float, shape (3, 3)
-        Of x and y in px and the angle in rad.
+        Covariance of x and y in px and of the angle in rad.
     seen, in_view, all : int
-        Chunks that were fitted, that lie in the picture, and that there are.
+        Number of chunks that were fitted, of chunks that lie in the picture, and of all chunks.
     blur_px : float
         Standard deviation of the edges' blur.
     by_outward, by_scale : ndarray of float, shape (3,)
-        What x, y and the angle are off where every edge is seen 1 px farther out, and where the body is larger than
-        drawn by its own size: errors that all frames share, which the covariance does not hold.
+        Change of x, y and the angle per 1 px of outward shift of all edges, and per unit of relative error of the
+        body's size. These errors are common to all frames and not included in the covariance.
     by_shadows : ndarray of float, shape (3, 3)
-        Covariance of x, y and the angle by what may lie along the edges of some sides: shared by all frames too.
+        Covariance of x, y and the angle due to possible shadows along some sides; common to all frames too.
     size_error, u_size_error : float
-        How much larger the body is seen than drawn, relative, whatever widens or narrows all of its edges alike taken
-        off; and its standard uncertainty, infinite where its edges do not tell.
+        Relative excess of the body's size in the picture over the drawing, after a common shift of all edges was
+        fitted; and its standard uncertainty, infinite if the edges do not determine it.
     """
 
     shift_px: Array
@@ -78,22 +79,22 @@ def fit_rigid(
     start: tuple[Array, float],
     view: EdgeView = PLAIN,
 ) -> RigidFit | None:
-    """Fit a body's motion from a near starting value; None where too little of its outline is visible.
+    """Fit a body's motion from a close initial estimate; None if too little of its outline is visible.
 
     Parameters
     ----------
     grey : ndarray of float, shape (height, width)
         Levels proportional to light.
     chunks : Chunks
-        Of the body where it is drawn, in pixels.
+        Chunks of the body at its drawn position, in pixels.
     about : ndarray of float, shape (2,)
-        Reference point where it is drawn, in pixels.
+        Drawn position of the reference point, in pixels.
     body_is_dark : bool
-        Whether the body is darker than its ground.
+        Whether the body is darker than the background.
     start : (ndarray of float, float)
-        Shift in pixels and angle in rad from which to look; the edges lie within some 3 px of there.
+        Initial estimate: shift in pixels and angle in rad; the edges must lie within about 3 px of it.
     view : EdgeView
-        How edges show in this picture.
+        How edges appear in this picture.
     """
     shift, angle = np.array(start[0], dtype=float), float(start[1])
     blur, found = 1.2, None
@@ -125,16 +126,16 @@ def capture_rigid(
     start: tuple[Array, float],
     view: EdgeView = PLAIN,
 ) -> RigidFit | None:
-    """Fit from a farther starting value: in successively halved pictures, the coarsest first.
+    """Fit a body's motion from a more distant initial estimate: in successively halved pictures, the coarsest first.
 
     Parameters
     ----------
     grey : ndarray of float, shape (height, width)
         The picture.
     pyramid : sequence of ndarray of float
-        It halved once, twice and so on (`halved`).
+        The picture halved once, twice and so on (from `halved`).
     chunks, about, body_is_dark, start, view
-        As `fit_rigid`.
+        As for `fit_rigid`.
     """
     shift, angle = start
     for level in range(len(pyramid), 0, -1):
@@ -163,7 +164,7 @@ def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
 
 @dataclass(frozen=True, slots=True)
 class _Halved:
-    """The map for a picture that was halved."""
+    """The map to the undistorted plane, for a picture that was halved."""
 
     whole: FlatMap
     scale: float
@@ -179,10 +180,11 @@ class _Halved:
 def _rigid(
     chunks: Chunks, edges: ChunkEdges, about: Array, view: EdgeView
 ) -> tuple[Array, Array, Array, Array, tuple[float, float]] | None:
-    """Small rigid motion from the chunks' offsets, its covariance, the effect of shared errors, and the size's error.
+    """Small rigid motion from the chunks' offsets, with its covariance, effects of common errors, and the size error.
 
-    None where the offsets do not determine the motion. Columns for the common errors of edge position and body size,
-    shape (3, 2), and the covariance from shadows, shape (3, 3).
+    Return the motion; its covariance; the sensitivities of the three pose parameters to a common edge shift and to a
+    relative size error, shape (3, 2); the covariance due to possible shadows at the edges, shape (3, 3); and the size
+    error with its standard uncertainty. Return None if the offsets do not determine the motion.
     """
     used = edges.used
     arm = chunks.middles[:, used] - about[:, None]
@@ -226,7 +228,7 @@ def _rigid(
 
 
 def _size_error(columns: Array, offset: Array, sd: Array) -> tuple[float, float]:
-    """Relative error of the body's size, and its standard uncertainty, fitted beside motion and edge offset."""
+    """Relative error of the body's size and its standard uncertainty, fitted together with motion and edge offset."""
     whitened, wanted = columns / sd[:, None], offset / sd
     scale = np.linalg.norm(whitened, axis=0)
     if offset.size < FEWEST + columns.shape[1] or scale.min() <= 0.0:

@@ -1,11 +1,13 @@
-"""Roughness and printed texture: deviation of an edge from its mean line, and its correlation length.
+"""Roughness and printed texture: deviation of an edge from its mean line, with its correlation along the edge.
 
-Neighbouring points of a rough edge have correlated errors, so that the mean of many has a larger variance than
-independent points would give. Both are estimated from the flanks. About a parabola of its own, each flank is white
-noise of the points plus a stationary process (Matern, smoothness 5/2: its tails are a little longer than a Gaussian's,
-so rather too wide than too narrow). Its standard deviation and length have the restricted likelihood of Patterson and
-Thompson (Biometrika 58, 1971, 545), which accounts for what the parabola removes of a long wave. The covariance is the
-mean over that likelihood, not its value at the maximum, because a few waves do not determine their length.
+Neighbouring points of a rough edge have correlated errors, so that the variance of their mean is larger than for
+independent points. Deviation and correlation length are estimated from the flanks. Each flank is modelled as a
+parabola, plus white noise of the points, plus a stationary process with a Matern covariance of smoothness 5/2 (whose
+tails are a little longer than a Gaussian's, so that the uncertainty is rather too large than too small). The standard
+deviation and the correlation length of this process have the restricted likelihood of Patterson and Thompson
+(Biometrika 58, 1971, 545), which accounts for the part of a long wave that the parabola absorbs. The covariance is
+averaged over that likelihood, not taken at its maximum, because a few waves do not determine the correlation length
+well.
 """
 
 from dataclasses import dataclass
@@ -40,19 +42,20 @@ _errors = loop("roughness_errors")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roughness:
-    """Deviation of an edge from its mean line.
+    """Roughness of an edge: covariance of its deviations from the mean line.
 
     Parameters
     ----------
     covariance : ndarray of float, shape (FARTHEST_PX + 1,)
-        Of the normal distances of two points of the edge that are so many pixels apart (pixels squared).
+        Covariance of the normal deviations of two points of the edge, by their distance in whole pixels (pixels
+        squared).
     """
 
     covariance: Floats
 
     @property
     def deviation_px(self) -> float:
-        """Standard deviation about the mean line."""
+        """Standard deviation of the edge about its mean line."""
         return float(np.sqrt(self.covariance[0]))
 
     @property
@@ -62,14 +65,14 @@ class Roughness:
 
 
 def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd]) -> Roughness | None:
-    """Estimate the roughness from the flanks of both fingers; None where they show none.
+    """Estimate the roughness from the flanks of both fingers; None if they show none.
 
     Parameters
     ----------
     points : (OutlinePoints, OutlinePoints)
         Sub-pixel outlines of the left and of the right finger.
     ends : (FingerEnd, FingerEnd)
-        The shapes that were fitted to them.
+        Shapes fitted to the outlines.
     """
     if max(end.misfit for end in ends) < SUSPECT:
         return None
@@ -103,7 +106,7 @@ def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd
 
 
 def with_roughness(points: OutlinePoints, found: Roughness) -> OutlinePoints:
-    """Return the points with their variances increased by the edge's deviation from its mean line."""
+    """Return the points with their variances increased by the variance of the edge about its mean line."""
     u = np.hypot(points.u, found.deviation_px)
     return OutlinePoints(points.x, points.y, u, points.side, points.blur)
 
@@ -111,18 +114,18 @@ def with_roughness(points: OutlinePoints, found: Roughness) -> OutlinePoints:
 def shared_along(
     points: OutlinePoints, end: FingerEnd, u_prior: Floats, bare: OutlinePoints, found: Roughness
 ) -> FingerEnd:
-    """The fitted end, with the covariance of points whose deviations are correlated along the edge.
+    """The fitted end, with the covariance that follows from points with deviations correlated along the edge.
 
     Parameters
     ----------
     points, end : OutlinePoints, FingerEnd
-        Points with their roughness, and the shape that was fitted to them.
+        Points whose uncertainties include roughness, and the shape fitted to them.
     u_prior : ndarray of float, shape (8,)
-        The weak knowledge that it was fitted with.
+        Standard uncertainties of the weak priors of that fit.
     bare : OutlinePoints
-        The same points with their own noise alone.
+        The same points with the uncertainty of their own noise only.
     found : Roughness
-        What they share.
+        Roughness of the edge.
     """
     _, jacobian, _ = compared(
         end.parameters, end.origin, points.x, points.y, points.u, points.is_row, points.side == OUTER_SIDE, points.blur

@@ -12,26 +12,26 @@ LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the user chose for the measurement.
+    """Settings of a measurement that the image processing needs.
 
     Parameters
     ----------
     below_tip_px : float
-        Height of measuring below each finger's tip; positive.
+        Distance of the measuring point below each finger's tip; positive.
     direction : Direction or None
-        Where the tips point; None finds out in every frame.
+        Direction in which the tips point; None determines it in every frame.
     region : Region or None
-        The part of the frame that is looked at; None is all of it.
+        The part of the frame that is measured; None for the whole frame.
     response : CameraResponse
-        Which light a grey level is taken for.
+        Assumed camera response, which converts grey levels to light.
     other_response : CameraResponse or None
-        What the response may be as well (one of the standards); None where it is known.
+        Another possible camera response (one of the standards); None if the response is known.
     bits : int or None
-        Depth of levels that are stored in 16 bits; None finds it in the picture.
+        Bit depth of levels stored in 16 bits; None determines it from the picture.
     fingers_are_dark : bool or None
-        Whether the fingers are darker than the ground; None finds out in every frame.
+        Whether the fingers are darker than the background; None determines it in every frame.
     is_outline : bool
-        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
+        Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
     """
 
     below_tip_px: float

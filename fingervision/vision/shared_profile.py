@@ -1,10 +1,10 @@
-"""Mean residual over all rows of a flank: how far something may have displaced the flank as a whole.
+"""Mean residual over all rows of a flank: possible displacement of the flank as a whole.
 
-Where a codec, an interpolation or a filter affects all rows in the same way, their mean residual does not average out.
-Across the edge, one component of the mean residual is absorbed by the fit as a displacement and cannot be seen; the
-other components are visible, and the first is assumed to be about as large as they are. A displacement leaves a profile
-that is even about the edge. Optics that spread light equally to both sides leave an odd profile only, whatever their
-shape.
+If a codec, an interpolation or a filter affects all rows in the same way, the residuals do not average out over the
+rows. One component of this mean profile is absorbed by the fit as a displacement and cannot be seen; it is assumed to
+be about as large as the other components, which are visible. A displacement adds a profile that is symmetric (even)
+about the edge. Optics that spread light equally to both sides, whatever the shape of the blur, add an antisymmetric
+(odd) profile only.
 """
 
 from typing import NamedTuple
@@ -38,20 +38,21 @@ _mean = loop("shared_profile_mean")
 
 
 class Flank(NamedTuple):
-    """Mean residual of one flank's rows.
+    """Mean residual profile over the rows of one flank.
 
     Parameters
     ----------
     mean : ndarray of float, shape (pixels,)
-        From inside to outside.
+        Mean residual of each pixel over the rows, from inside to outside.
     chance : float
-        Variance that each pixel's mean would have if every row erred by itself.
+        Variance that each pixel's mean over the rows would have if the rows had independent errors.
     offset_px : float
-        Of the edge from the window's middle, on average.
+        Mean distance of the edge from the window's middle.
     sigma_px : float
-        Its blur.
+        Blur of the edge.
     gain : float
-        Change of the levels with the position, in root of the sum over the window: contrast times the filters' gain.
+        Change of the levels per pixel of displacement, as root of the sum of squares over the window: contrast times
+        the filters' gain.
     """
 
     mean: Floats
@@ -62,16 +63,16 @@ class Flank(NamedTuple):
 
 
 def flanks(upright: GreyImage, edges: EdgePoints, light: Floats) -> list[Flank]:
-    """Mean residuals of all flanks that are long and upright enough; none where the fingers' windows overlap.
+    """Mean residuals of all flanks that are long and upright enough; none if the fingers' windows overlap.
 
     Parameters
     ----------
     upright : ndarray, shape (rows, columns)
-        Grey levels, seen with the tips up.
+        Grey levels of the picture, turned so that the tips point up.
     edges : EdgePoints
-        Fitted to them.
+        Edges fitted to the picture.
     light : ndarray of float, shape (levels,)
-        Light of every grey level.
+        Light for every grey level (look-up table).
     """
     if facing_lines(edges.lines, edges.reach_px) is not None:
         return []
@@ -96,7 +97,7 @@ def flanks(upright: GreyImage, edges: EdgePoints, light: Floats) -> list[Flank]:
 def shared_shift_px(found: list[Flank]) -> float:
     """Standard uncertainty of one flank's position from its rows' significant mean residual (pixels).
 
-    0 if there is none.
+    It is 0 if no mean residual is significant.
 
     Parameters
     ----------
@@ -108,12 +109,14 @@ def shared_shift_px(found: list[Flank]) -> float:
 
 
 def even_shift_px(found: list[Flank]) -> float:
-    """The same from the even part of the profile alone; 0 where noise would explain it.
+    """Standard uncertainty of a flank's position from the even part of its mean residual profile only (pixels).
+
+    It is 0 if noise explains the profile.
 
     Parameters
     ----------
     found : list of Flank
-        All flanks of a picture of which nobody says that it was changed.
+        All flanks of a picture that is not known to have been changed after it was taken.
     """
     if not found or np.mean([_whole(flank) / flank.chance for flank in found]) < LEAST_WHOLE:
         return 0.0
@@ -125,14 +128,14 @@ def even_shift_px(found: list[Flank]) -> float:
 
 
 def _whole(flank: Flank) -> float:
-    """Variance of a pixel's mean, from all residuals of the profile."""
+    """Variance of each pixel's mean over the rows, estimated from all residuals of the profile."""
     return float(flank.mean @ flank.mean) / (flank.mean.size - FITTED)
 
 
 def _even(flank: Flank) -> float:
-    """Variance of a pixel's mean, from the residuals of the even part of the profile.
+    """Variance of each pixel's mean over the rows, from the residuals of the profile's symmetric (even) part.
 
-    Light that falls off over the window, on either side of the edge, is not part of the edge and is excluded too.
+    A linear decrease of light over the window on both sides of the edge is not part of the edge, and is excluded too.
     """
     half = 0.5 * flank.mean.size
     away = np.arange(flank.mean.size) + 0.5 - half - flank.offset_px

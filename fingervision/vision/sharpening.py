@@ -1,10 +1,11 @@
 """Sharpening inside a camera with a curved response: it acts on stored levels, and so displaces the edge in light.
 
-In stored levels, an unsharp mask adds as much to the light side of an edge as it takes from the dark side. Converted to
-light the two amounts differ, so that a step fitted there is displaced from the edge. The mask is visible in the mean
-profile of a flank in stored levels, which is fitted as a blurred step of light, coded by the response, plus a fraction
-of its difference from a blurred copy. The same fitted profile, converted to light, gives the position at which the
-light's step was fitted. The difference is the correction, applied to the whole outline.
+In stored levels, an unsharp mask adds as much to the light side of an edge as it takes from the dark side. After
+conversion to light the two amounts differ, so that a step fitted in light is displaced from the edge. The effect of the
+mask is visible in the mean profile of a flank in stored levels. This profile is fitted by a blurred step of light,
+encoded by the response, plus a fraction of the difference between this encoded step and a blurred copy of it. A step is
+then fitted to the fitted profile after conversion to light; its distance from the true edge is the correction of the
+whole outline.
 """
 
 from collections.abc import Callable
@@ -45,9 +46,9 @@ class Sharpening:
     Parameters
     ----------
     shift_px : (float, float)
-        From the step that was fitted in light outwards to the edge, left and right finger.
+        Distance outwards from the step fitted in light to the edge, for the left and the right finger.
     amount, radius_px : float
-        Of the unsharp mask.
+        Amount and radius of the unsharp mask.
     """
 
     shift_px: tuple[float, float]
@@ -57,7 +58,7 @@ class Sharpening:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Profile:
-    """Mean stored level across a flank: distances outwards from the step fitted in light, and numbers of pixels."""
+    """Mean stored level across a flank: distance outwards from the step fitted in light, level, number of pixels."""
 
     t: Floats
     level: Floats
@@ -70,18 +71,18 @@ def is_curved(light: Floats, top_level: int) -> bool:
 
 
 def sharpening(profiles: tuple[Profile, Profile], light: Floats, top_level: int, blur_px: float) -> Sharpening | None:
-    """Estimate an unsharp mask from the mean profiles of both inner flanks; None where there is none.
+    """Estimate an unsharp mask from the mean profiles of both inner flanks; None if there is none.
 
     Parameters
     ----------
     profiles : (Profile, Profile)
-        Left and right finger.
+        Mean profiles of the left and the right finger.
     light : ndarray of float, shape (levels,)
-        Light of every level.
+        Light for every stored level (look-up table).
     top_level : int
-        End of the scale.
+        Highest level of the scale.
     blur_px : float
-        Blur of the step that was fitted in light, the pixel included.
+        Blur of the step fitted in light, the pixel's width included.
     """
     stored = np.arange(top_level + 1.0)
     curve = np.ascontiguousarray(light[: top_level + 1])
@@ -146,14 +147,14 @@ def _fitted(residuals: Callable[[Floats], Floats], start: Floats, free: int) -> 
 
 
 def _adjusted(model: Floats, level: Floats, root: Floats) -> Floats:
-    """Weighted residuals with offset and scale of the model at their best values."""
+    """Weighted residuals, with the model's offset and scale at their least-squares values."""
     basis = np.column_stack((root, root * model))
     seen = root * level
     return np.asarray(basis @ np.linalg.solve(basis.T @ basis, basis.T @ seen) - seen)
 
 
 def _softened(levels: Floats, sigma: float) -> Floats:
-    """Gaussian blur of a row, its ends repeated."""
+    """Gaussian blur of a row of levels; the end values are repeated beyond the ends."""
     soft = np.empty(levels.size)
     _soften(levels, sigma, soft)
     return soft

@@ -1,7 +1,7 @@
 """Interpolation of a picture between its pixels by cubic B-splines, and its effect on the noise.
 
-Unser, IEEE Signal Processing Magazine 16(6), 1999, doi:10.1109/79.799930. A Gaussian smoothing before it costs no time,
-as it is part of the spline's prefilter.
+Source: Unser, IEEE Signal Processing Magazine 16(6), 1999, doi:10.1109/79.799930. Gaussian smoothing before the
+interpolation costs no extra time, because it is part of the spline's prefilter.
 """
 
 from functools import cache
@@ -28,7 +28,7 @@ def gaussian(sigma_px: float) -> Doubles:
 
 @cache
 def _prefilter(sigma_px: float) -> Floats:
-    """Prefilter of the interpolation after a Gaussian, truncated: it gives the coefficients of the cubic B-spline."""
+    """Truncated filter from levels to the coefficients of the cubic B-spline, including Gaussian smoothing."""
     z = np.sqrt(3.0) - 2.0
     k = np.arange(-2 * KERNEL_REACH, 2 * KERNEL_REACH + 1)
     kernel = np.convolve(z ** np.abs(k), gaussian(sigma_px), mode="same")[KERNEL_REACH:-KERNEL_REACH]
@@ -37,7 +37,7 @@ def _prefilter(sigma_px: float) -> Floats:
 
 @cache
 def derivative_power(sigma_px: float = 0.0) -> float:
-    """Variance of the spline's derivative at a pixel along one axis, for unit noise of the pixels."""
+    """Variance of the spline's derivative at a pixel along one axis, for pixel noise of unit variance."""
     kernel = np.convolve(_prefilter(sigma_px).astype(np.float64), [0.5, 0.0, -0.5])
     across = np.convolve(_prefilter(sigma_px).astype(np.float64), [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0])
     return float(kernel @ kernel) * (float(across @ across) if sigma_px > 0.0 else 1.0)
@@ -45,7 +45,7 @@ def derivative_power(sigma_px: float = 0.0) -> float:
 
 @cache
 def phase_power(sigma_px: float = 0.0, steps: int = 64) -> Doubles:
-    """Variance of an interpolated level for unit noise, by the fraction of a pixel along one axis."""
+    """Variance of an interpolated level for unit pixel noise, by the fraction of a pixel along one axis."""
     fraction = np.arange(steps) / steps
     by_phase = np.stack(weights(fraction), axis=1)
     kernel = _prefilter(sigma_px).astype(np.float64)
@@ -53,13 +53,13 @@ def phase_power(sigma_px: float = 0.0, steps: int = 64) -> Doubles:
 
 
 def interpolated_power(place_px: float) -> float:
-    """Variance of a level interpolated at a place along one axis, for unit noise of the pixels."""
+    """Variance of a level interpolated at a position along one axis, for unit pixel noise."""
     table = phase_power()
     return float(table[round((place_px % 1.0) * table.size) % table.size])
 
 
 def weights(fraction: NDArray[np.floating]) -> tuple[NDArray[np.floating], ...]:
-    """Weights of the cubic B-spline for the four pixels about a position."""
+    """Weights of the cubic B-spline for the four pixels around a position."""
     f, g = fraction, 1.0 - fraction
     f2, g2 = f * f, g * g
     first, last = g2 * g / 6.0, f2 * f / 6.0
@@ -68,13 +68,13 @@ def weights(fraction: NDArray[np.floating]) -> tuple[NDArray[np.floating], ...]:
 
 
 def coefficients(levels: Floats, sigma_px: float = 0.0) -> Floats:
-    """Coefficients of the cubic B-spline through a picture's levels after a Gaussian, borders reflected."""
+    """Coefficients of the cubic B-spline through a Gaussian-smoothed picture, with reflected borders."""
     kernel = _prefilter(sigma_px)
     return np.asarray(cv2.sepFilter2D(levels, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REFLECT_101))
 
 
 def levels_and_derivatives(c: Floats) -> tuple[Floats, Floats, Floats]:
-    """Values of the spline at the pixels, and its derivatives with respect to x and y; borders wrap."""
+    """Values and derivatives (by x and y) of the spline at the pixels, with periodic borders."""
 
     def mean(of: Floats, axis: int) -> Floats:
         return (np.roll(of, 1, axis) + 4 * of + np.roll(of, -1, axis)) / 6.0
@@ -93,11 +93,11 @@ def sampled(flat: Floats, start: NDArray[np.intp], stride: int, x: Floats, y: Fl
     flat : ndarray, shape (m,)
         Coefficients.
     start : ndarray of int, shape (k,)
-        Where each image begins.
+        Index at which each image starts.
     stride : int
-        Columns of each image.
+        Number of columns of each image.
     x, y : ndarray, shape (k, n)
-        Places in each image.
+        Positions in each image.
     """
     column, row = np.floor(x), np.floor(y)
     across = weights(x - column)

@@ -3,7 +3,7 @@
 The light of one or more nearly parallel straight edges is `c + d s + sum_k A_k S((t - p_k - m_k s) cos_k)`, with `t`
 across the edges, `s` along them and `S` the integral over the pixel of a Gaussian-blurred step. Under white noise the
 least-squares fit reaches the Cramer-Rao bound of this model (Kay, Estimation Theory, 1993, chapter 8; O'Gorman, IEEE
-PAMI 18(7), 1996, doi:10.1109/34.506799 for lines). Nothing is resampled.
+PAMI 18(7), 1996, doi:10.1109/34.506799 for lines). The picture is not resampled.
 """
 
 from dataclasses import dataclass
@@ -52,16 +52,17 @@ _edges = loop("straight_edge_fit_edges")
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Band in which the edges are searched: axes turned by `direction_rad`, counted from a centre.
+    """Band in which the edges are searched, with axes t (across the edges) and s (along them) from a centre.
 
     Parameters
     ----------
     x_px, y_px : float
-        The middle, in the picture's pixels.
+        Centre of the band, in the picture's pixels.
     direction_rad : float
-        Direction across the edges (the axis t): 0 to the right, pi / 2 downwards. s grows 90 degrees further on.
+        Direction of the axis t across the edges: 0 to the right, pi / 2 downwards. The axis s is turned by 90 degrees
+        from t, in the same sense.
     length_px : float
-        Along the edges, half of it to either side of the middle.
+        Length of the band along the edges, half of it on either side of the centre.
     """
 
     x_px: float
@@ -77,11 +78,11 @@ class EdgeStart:
     Parameters
     ----------
     position_px : float
-        t where s is 0.
+        Coordinate t of the edge at s = 0.
     slope : float
-        Change of t with s.
+        Change of t per unit of s.
     contrast : float or None
-        Level beyond less level before; None where nothing is known of it.
+        Level beyond the edge minus level before it; None if not known.
     """
 
     position_px: float
@@ -91,33 +92,34 @@ class EdgeStart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightEdges:
-    """k edges fitted jointly; arrays of shape (k,).
+    """Edges fitted jointly; k is their number.
 
     Parameters
     ----------
     position_px : ndarray of float, shape (k,)
-        t of each edge where s is 0 (the band's own axes).
+        Coordinate t of each edge at s = 0, in the band's own axes.
     slope : ndarray of float, shape (k,)
-        Change of t with s.
+        Change of t per unit of s.
     covariance : ndarray of float, shape (2 k, 2 k)
-        Of all positions, then all slopes; noise, shared noise, roughness and misfit included.
+        Covariance of all positions, then all slopes; it includes noise, common noise, roughness and misfit.
     contrast : ndarray of float, shape (k,)
-        Level beyond the edge (larger t) minus level before it, at the middle.
+        Level beyond the edge (larger t) minus the level before it, at the middle of the band.
     inside : float
         Level before the first edge.
     blur_px : float
-        Gaussian sigma of the optics across the edges, without the pixel.
+        Gaussian sigma of the optics across the edges, without the pixel's width.
     noise : float
         Standard deviation of the residuals.
     bend_px : float
-        How far the middle of the first edge lies off the chord of its ends.
+        Distance of the middle of the first edge from the chord of its ends.
     least_piece : float
-        Smallest contrast among the pieces of the first edge, as a share of its contrast: an edge is there all along.
+        Smallest contrast among the pieces of the first edge, as a share of its contrast: near 1 if there is an edge
+        over the whole length.
     pixels : int
-        Number of pixels that were fitted.
+        Number of fitted pixels.
     lost, u_lost : float
-        How much of the first step lies beyond the scale's end, as a share of what is seen, and its standard
-        uncertainty; only where it was asked for.
+        Part of the first step that lies beyond the end of the scale, as a share of the visible part, and its standard
+        uncertainty; only computed on request (`cut_off`).
     """
 
     position_px: Floats
@@ -139,19 +141,19 @@ class NoEdgeFitError(ValueError):
 
 
 def reach_px(blur_px: float) -> float:
-    """Half-width of the band that an edge of this blur needs (pixels)."""
+    """Half-width of the band needed for an edge of this blur (pixels)."""
     return REACH_SIGMAS * float(np.hypot(blur_px, ROUNDING**0.5)) + REACH_EXTRA_PX
 
 
 def blurred_box_step(away: Floats, sigma: float, width: float) -> tuple[Floats, Floats, Floats]:
-    """Blurred unit step averaged over a box, and its derivatives with respect to distance and sigma.
+    """Blurred unit step averaged over a box, and its derivatives by distance and sigma.
 
     Parameters
     ----------
     away : ndarray of float
         Distance of the box's middle from the edge, positive beyond it.
     sigma, width : float
-        Blur, and width of the box (of a pixel, across the edge).
+        Blur, and width of the box (that of a pixel, measured across the edge).
     """
     upper, lower = (away + 0.5 * width) / sigma, (away - 0.5 * width) / sigma
     n_upper, n_lower = ndtr(upper), ndtr(lower)
@@ -180,16 +182,16 @@ def fit_straight_edges(
     origin_px : (int, int)
         Column and row of the part's first pixel in the picture.
     band : Band
-        Axes and length.
+        Axes and length of the band.
     starts : tuple of EdgeStart
-        First guesses, to within about two sigma.
+        Initial estimates of the edges, accurate to about two sigma.
     blur_px : float
-        First guess of the blur.
+        Initial estimate of the blur.
     shared_pixels : float
-        So many pixels count as one, where a codec is known to share its errors.
+        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
     cut_off : int
-        +1 where the light plateau of the first edge lies at the end of the scale, -1 where the dark one does: how much
-        of the step is lost there is then looked for.
+        +1 if the lighter plateau of the first edge lies at the end of the scale, -1 if the darker one does: the clipped
+        part of the step is then estimated too. 0 otherwise.
 
     Returns
     -------
@@ -199,7 +201,7 @@ def fit_straight_edges(
     Raises
     ------
     NoEdgeFitError
-        The band leaves the part of the picture, or its pixels do not determine the edges.
+        If the band leaves the part of the picture, or the pixels do not determine the edges.
     """
     known = all(each.contrast is not None for each in starts)
     count = len(starts)

@@ -1,8 +1,8 @@
 """Division of a chain of points into straight runs: the best piecewise line with a penalty for every run.
 
 Dynamic programming over all divisions of the chain (Bellman & Roth, JASA 64, 1969, doi:10.1080/01621459.1969.10501038),
-with total least squares as the cost of a run, computed from the chain's cumulative moments. Points may be left out, for
-a penalty each.
+with total least squares as the cost of a run, computed from the chain's cumulative moments. A point may be left out of
+all runs at the cost of a penalty.
 """
 
 from typing import NamedTuple
@@ -24,12 +24,12 @@ MEDIAN_OF_CHI_SQUARE = 0.79
 
 
 class _Moments(NamedTuple):
-    """Cumulative sums of weights, positions and their products, shape (n + 1, 6), and the positions' origin."""
+    """Cumulative sums of weights, positions and their products, shape (n + 1, 6), and the origin of the positions."""
 
     sums: Floats
 
     def squares(self, first: Ints, last: Ints) -> Floats:
-        """Smallest sum of squared distances from a straight line, for the points first to last (exclusive)."""
+        """Smallest sum of squared distances from a straight line, for the points `first` to `last` (exclusive)."""
         w, x, y, xx, xy, yy = (self.sums[last] - self.sums[first]).T
         weight = np.maximum(w, 1e-300)
         xx, xy, yy = xx - x * x / weight, xy - x * y / weight, yy - y * y / weight
@@ -42,14 +42,14 @@ def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
     Parameters
     ----------
     x, y : ndarray of float, shape (n,)
-        Places in the chain's own order (pixels).
+        Positions of the points in the order of the chain (pixels).
     u : ndarray of float, shape (n,)
-        Standard uncertainty of each across its run, in any unit that all share.
+        Standard uncertainty of each point across its run, in any common unit.
 
     Returns
     -------
     list of ndarray of int
-        Numbers of each run's points, in order; points that belong to no run are left out.
+        Indices of each run's points, in order; points that belong to no run are left out.
     """
     n = x.size
     if n < FEWEST_POINTS:
@@ -82,7 +82,7 @@ def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
 
 
 def _joined(runs: list[Ints], terms: Floats, noise: float) -> list[Ints]:
-    """Join runs on one straight line: the points left out between them were dust."""
+    """Join runs that lie on one straight line: the points left out between them were dust."""
     joined: list[Ints] = []
     for run in runs:
         if joined:

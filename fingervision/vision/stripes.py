@@ -1,7 +1,7 @@
-"""Fit a gap narrower than the blur, in which the light never reaches the level of the background.
+"""Fit a gap narrower than the blur, in which the light does not reach the level of the background.
 
-The contrast of such a gap cannot be separated from its width in the row itself. The contrast is therefore taken from
-the tips, where the same background is in full view, and both edges of a row are fitted together.
+Within a row, the contrast of such a gap cannot be separated from its width. The contrast is therefore taken from the
+tips, where the same background is in full view, and both edges of a row are fitted together.
 """
 
 from dataclasses import dataclass, replace
@@ -30,16 +30,16 @@ CLOSING_SLOPE, NOTCH_SIGMAS = 0.1, 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StripeEdges:
-    """Both edges of a narrow gap (a stripe) in every row; arrays of shape (n,).
+    """Left and right edge of a narrow gap (a stripe) in every row; arrays of shape (n,).
 
     Parameters
     ----------
     left, right : ndarray of float
-        Where the ground begins and ends, in the picture's pixels.
+        Positions where the background begins and ends, in the picture's pixels.
     u_noise : ndarray of float
         Standard uncertainty of each edge from the noise of its own row.
     u_shared : ndarray of float
-        Standard uncertainty of each edge from the contrast, which all rows share.
+        Standard uncertainty of each edge due to the contrast, which is common to all rows.
     """
 
     left: Floats
@@ -49,7 +49,7 @@ class StripeEdges:
 
 
 def with_stripes(upright: GreyImage, edges: EdgePoints, light: Floats) -> EdgePoints:
-    """Return the points, with both edges of a row fitted as one stripe where the fingers nearly touch."""
+    """Return the points, with both edges of a row fitted as one stripe in rows where the fingers nearly touch."""
     lines, reach = edges.lines, edges.reach_px
     facing = facing_lines(lines, reach)
     if facing is None:
@@ -121,24 +121,24 @@ def fit_stripes(
     upright : ndarray, shape (rows, columns)
         Grey levels.
     row : ndarray of int, shape (n,)
-        Rows.
+        Row numbers.
     left, right : ndarray of float, shape (n,)
-        First guess of the edges.
+        Initial estimates of the edges.
     sigma : ndarray of float, shape (n,)
         Blur along the row.
     contrast : float
-        Level of the ground minus level of the fingers.
+        Level of the background minus level of the fingers.
     noise : float
         Standard deviation of the grey levels.
     margin : int
-        Pixels of the fingers to either side.
+        Number of pixels of the fingers on either side.
     light : ndarray of float, shape (levels,), or None
-        Light of every grey level; None where that is the level itself.
+        Light for every grey level (look-up table); None if the levels are proportional to light.
 
     Returns
     -------
     StripeEdges
-        One a row.
+        One pair of edges per row.
     """
     middle = np.rint(0.5 * (left + right)).astype(int)
     reach = int(np.ceil(0.5 * float((right - left).max()))) + margin

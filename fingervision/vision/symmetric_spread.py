@@ -1,7 +1,7 @@
-"""Fit of an edge blurred symmetrically by any optics: how much of a mean profile it leaves unexplained.
+"""Fit of an edge with any symmetric blur: the part of a mean profile that no such blur explains.
 
-A disc of defocus, motion, or a halo turns a step of light into a profile that is odd about the edge, whatever its
-shape. Glare on one side and a shadow on the other do not: their profiles have an even part.
+Defocus, motion or a halo blurs a step of light into a profile that is antisymmetric (odd) about the edge, whatever the
+shape of the blur. Glare and shadow do not: their profiles have a symmetric (even) part.
 """
 
 import numpy as np
@@ -20,16 +20,16 @@ FARTHEST_PX = 1.0
 
 
 def symmetric_squares(t: Floats, value: Floats, weight: Floats, blur: float) -> float:
-    """Weighted sum of squares left by a step with symmetric blur of free shape.
+    """Weighted sum of squared residuals of a step with symmetric blur of free shape.
 
     Parameters
     ----------
     t : ndarray of float, shape (n,)
-        Places, outwards from the single step's edge (pixels).
+        Positions, outwards from the fitted single step (pixels).
     value, weight : ndarray of float, shape (n,)
-        Light there, and the inverse of its variance.
+        Light at these positions, and the inverse of its variance.
     blur : float
-        Of the single step (pixels).
+        Blur of the fitted single step (pixels).
     """
     knots = np.arange(1, STEPS + 1) * max(STEP_IN_BLURS * blur, LEAST_STEP_PX)
     root, place, least = np.sqrt(weight), 0.0, np.inf

@@ -31,14 +31,14 @@ class Symmetric:
     Parameters
     ----------
     x_px, y_px : float
-        In pixels of the part that was given.
+        Centre, in pixels of the given part of the picture.
     covariance : ndarray of float, shape (2, 2)
-        Of both.
+        Covariance of x and y.
     half_turn, quarter_turn, any_turn : float
-        Correlation of the mark with itself turned by 180 and by 90 degrees, and the correlation of its levels with the
-        mean of each ring.
+        Correlation of the mark with itself rotated by 180 and by 90 degrees, and correlation of its levels with the
+        mean of each ring around the centre.
     spread : float
-        Standard deviation of its levels, the plane taken off.
+        Standard deviation of the mark's levels, with a plane of light subtracted.
     noise : float
         Standard deviation of the noise.
     """
@@ -63,18 +63,18 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
     Parameters
     ----------
     part : ndarray of float32, shape (height, width)
-        Light about the mark; at least `MARGIN_PX` beyond its window.
+        Light around the mark, at least `MARGIN_PX` beyond the window.
     start : (float, float)
-        First guess of x and y, to within a few pixels.
+        Initial estimate of x and y, accurate to a few pixels.
     half_px : int
-        The window reaches so far to every side.
+        Half width of the window.
     shared_pixels : float
-        So many pixels count as one, where a codec is known to share its errors.
+        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
 
     Raises
     ------
     NoSymmetryError
-        The search leaves the part or does not settle.
+        If the search leaves the part or does not converge.
     """
     flat = coefficients(part).ravel()
     height, width = part.shape
@@ -153,7 +153,7 @@ def _judged(
 
 
 def _derivative(seen: Floats) -> Doubles:
-    """Derivative of each row's levels along the row, without the two columns at either end."""
+    """Derivative of each row's levels along the row, except in the two columns at either end."""
     levels = seen.astype(np.float64)
     return (8.0 * (levels[:, 3:-1] - levels[:, 1:-3]) - levels[:, 4:] + levels[:, :-4]) / 12.0
 

@@ -29,11 +29,12 @@ class Match:
     Parameters
     ----------
     x_px, y_px : float
-        The template's middle, in pixels of the part that was searched, between pixels by a parabola.
+        Middle of the template, in pixels of the searched part, interpolated between pixels by a parabola.
     correlation : float
-        Zero-normalised.
+        Zero-normalised correlation at the best match.
     is_alone : bool
-        Whether no other place is nearly as much like it, and it does not slide to the border of the search.
+        Whether the match is unique: no other position has a similar correlation, and the maximum is not at the border
+        of the searched area.
     """
 
     x_px: float
@@ -48,7 +49,7 @@ class Template:
     Parameters
     ----------
     levels : ndarray of float32, shape (height, width)
-        Light.
+        Light of the template.
     """
 
     def __init__(self, levels: Floats) -> None:
@@ -63,9 +64,11 @@ class Template:
         Parameters
         ----------
         part : ndarray of float32, shape (height, width)
-            Light; larger than the template to every side by how far the thing may be away and `beyond_px`.
+            Light of the searched part; on every side it is larger than the template by the largest displacement and
+            `beyond_px`.
         beyond_px : int
-            Places so near the border of the search are looked at only to see whether the best one's lobe ends.
+            Width of the border of the searched area that only serves to check whether the correlation falls off around
+            the best match.
         """
         height, width = part.shape
         rows, columns = self.levels.shape
@@ -86,7 +89,7 @@ class Template:
 
 
 def independent_pixels(template: Floats) -> float:
-    """Number of independent pixels in a texture: its pixels divided by the area of its squared autocorrelation."""
+    """Number of independent pixels of a texture: number of pixels over the area of the squared autocorrelation."""
     levels = template.astype(np.float64) - template.mean()
     spectrum = np.abs(np.fft.fft2(levels, [2 * size for size in levels.shape])) ** 2
     correlation = np.fft.ifft2(spectrum).real
@@ -96,7 +99,7 @@ def independent_pixels(template: Floats) -> float:
 
 
 def chance_correlation(template: Floats) -> float:
-    """Correlation that an unrelated texture of the same coarseness may reach by chance somewhere in a search."""
+    """Largest correlation that an unrelated texture of the same coarseness is likely to reach somewhere by chance."""
     return float(np.tanh(CHANCE_SIGMAS / np.sqrt(max(independent_pixels(template), FEWEST_INDEPENDENT) - 3.0)))
 
 

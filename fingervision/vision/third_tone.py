@@ -1,9 +1,9 @@
 """A strip of a third tone along the fingers' sides: a drop shadow with a hard edge, or a pad.
 
-One threshold puts such a strip either with the fingers or with the background, and then the measured outline may be
-that of the shadow, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face each
-other. A strip that belongs to the fingers' class on one inner side only is therefore a shadow. One that belongs to the
-background's class on both inner sides, and on no outer one, is a pair of pads. In both cases the threshold was wrong.
+A threshold assigns such a strip either to the fingers or to the background, so that the measured outline may be that of
+the shadow, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face each other.
+If a strip is assigned to the fingers on one inner side only, it is therefore a shadow. If strips are assigned to the
+background on both inner sides and on no outer side, they are a pair of pads. In both cases the threshold was wrong.
 """
 
 import numpy as np
@@ -36,14 +36,14 @@ _strips = loop("third_tone_strips")
 
 
 def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
-    """Threshold that puts a strip of a third tone into its right class; None where no strip is in the wrong one.
+    """Threshold that puts a strip of a third tone into its right class; None if no strip is in the wrong class.
 
     Parameters
     ----------
     upright : ndarray, shape (rows, columns)
-        Grey levels, seen with the tips up.
+        Grey levels of the picture, turned so that the tips point up.
     edges : EdgePoints
-        Where the fingers were measured.
+        Edges at which the fingers were measured.
     """
     near, lines = edges.reach_px + 1, edges.lines
     seen = (upright, lines.fixed, edges.position, lines.weight, lines.outward)

@@ -1,4 +1,4 @@
-"""Candidates of finger tips: local maxima of the outlines, and the depth of each."""
+"""Candidates of finger tips: local maxima of the outlines, and the prominence of each."""
 
 from dataclasses import dataclass
 
@@ -19,18 +19,19 @@ _find_tops = loop("tops_find")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Top:
-    """A local maximum of an outline towards the tips' side.
+    """A local maximum of an outline, in the direction in which the tips point.
 
     Parameters
     ----------
     outline : ndarray of int32, shape (n, 2)
-        Closed outline of the thing, (across, along), starting at its lowest point.
+        Closed outline of the object, (across, along), starting at its lowest point.
     index : int
-        Place of the top on the outline.
+        Index of the maximum in the outline.
     prominence_px : float
-        How far it goes down before it ends or meets a higher top.
+        Topographic prominence: drop from the maximum to the end of the object, or to the saddle towards a higher
+        maximum.
     is_rooted : bool
-        Whether it goes down as far as the picture does.
+        Whether the object reaches the border of the picture on the side away from the tips.
     """
 
     outline: Outline
@@ -50,7 +51,7 @@ class Top:
 
 
 def find_tops(mask: NDArray[np.uint8], outlines: Outlines, orientation: Orientation) -> list[Top]:
-    """The tops of all outlines with the largest prominence, in its order, at most `MOST_TOPS`."""
+    """The local maxima of all outlines with the largest prominence, in falling order, at most `MOST_TOPS`."""
     outline, index, prominence = np.empty((3, MOST_TOPS), dtype=np.int64)
     is_rooted = np.empty(MOST_TOPS, dtype=np.bool_)
     way = (orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)

@@ -19,11 +19,11 @@ _covered = loop("way_between_covered")
 
 
 def is_free(mask: NDArray[np.uint8], start: Place, end: Place) -> bool:
-    """Whether next to nothing of a mask lies on the straight path between two positions."""
+    """Whether the straight path between two positions is almost free of the mask's objects."""
     return float(_covered(mask, *start, *end)) <= DUST_SHARE
 
 
 def inner_crossing(outline: Outline, height: float) -> tuple[float, float]:
-    """Position (across, along) where a finger's outline, followed from its inner side, rises past a height."""
+    """Position (across, along) at which a finger's outline, followed from its inner side, rises past a height."""
     across, along = _inner_crossing(outline, height)
     return across, along

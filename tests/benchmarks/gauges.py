@@ -5,8 +5,9 @@
 patches      rendered textures moved by tenths of a pixel: bias and SD of shift_x, SD over the bound from the gradient
              of the noiseless picture (both pictures have noise: sigma sqrt(2) (H^-1)^(1/2)), stated u over SD, share of
              the three numbers within 1.96 u
-photographs  textures that scikit-image ships (gravel, grass), moved by whole pixels and binned by 10, once seen through
-             optics of 0.7 px and once without (aliased): bias at shifts of 0.1 to 0.9 px, and the median stated u
+photographs  textures that scikit-image ships (gravel, grass, brick), moved by whole pixels and binned by 10, seen
+             through optics of 0.7 and 0.4 px and without any (aliased), at as many places as `--each`: bias at shifts
+             of 0.1 to 0.9 px, RMS of the error, median stated u, share within 1.96 u
 lines        angle: RMS over the Cramer-Rao bound of a step with known levels and blur, over stated u; within 1.96 u
 circles      RMS of the centre at radius 20, noise 2, blur 0.9; bias of the diameter; share within 1.96 u
 markers      RMS of the middle, over the stated u (the bound of a mark of known shape), share within 1.96 u
@@ -79,24 +80,36 @@ def patches(each: int, folder: Path) -> None:
     )
 
 
-def photographs(_each: int, folder: Path) -> None:
-    gauges = gauges_of(folder, 'kind="patch"\nx_px=24\ny_px=24\nwidth_px=21\nheight_px=21\nreach_px=3')
-    for name, blur in (("gravel", 0.7), ("grass", 0.7), ("gravel", 0.0), ("grass", 0.0)):
-        scene = gaussian_filter(np.asarray(getattr(skimage.data, name)(), dtype=float), 10 * blur)
-        scene = 128 + (scene - scene.mean()) * 40 / scene.std()
+def photographs(each: int, folder: Path) -> None:
+    keys = 'kind="patch"\nx_px=24\ny_px=24\nreach_px=3\n'
+    gauges = [gauges_of(folder, f"{keys}width_px={n}\nheight_px={n}") for n in (21, 31)]
+    cases = [(name, blur) for blur in (0.7, 0.4, 0.0) for name in ("gravel", "grass", "brick")]
+    for name, blur in cases:
+        whole = gaussian_filter(np.asarray(getattr(skimage.data, name)(), dtype=float), 10 * blur)
+        whole = 128 + (whole - whole.mean()) * 40 / whole.std()
         rng = np.random.default_rng(52)
+        errors, u = np.full((each, 9), np.nan), np.full((each, 9), np.nan)
+        for place in range(each):
+            scene = np.roll(whole, rng.integers(0, 512, 2), axis=(0, 1))
+            scene = scene.T if place % 2 else scene
 
-        def camera(shift: int, scene: np.ndarray = scene, rng: np.random.Generator = rng) -> np.ndarray:
-            part = np.roll(scene, shift, axis=1)[:490, 11:501]
-            return seen(part.reshape(49, 10, 49, 10).mean(axis=(1, 3)), 0.3, rng)
+            def camera(shift: int, scene: np.ndarray = scene, rng: np.random.Generator = rng) -> np.ndarray:
+                part = np.roll(scene, shift, axis=1)[:490, 11:501]
+                return seen(part.reshape(49, 10, 49, 10).mean(axis=(1, 3)), 0.3, rng)
 
-        biases, u = [], []
-        for shift in range(1, 10):
-            found = [followed(gauges, [camera(0), camera(shift)])[1][0] for _ in range(5)]
-            values = np.array([_numbers(reading)[0] for reading in found if reading.quantities])
-            biases.append(f"{values[:, 0].mean() - shift / 10:+.4f}" if values.size else "none")
-            u += [float(stated) for stated in values[:, 1]] if values.size else []
-        print(f"photographs  {name}, blur {blur}: {' '.join(biases)} px, u {np.median(u) if u else 0:.4f}")
+            first = camera(0)
+            for shift in range(1, 10):
+                reading = followed(gauges[place % 2], [first, camera(shift)])[1][0]
+                if reading.quantities:
+                    value, stated = _numbers(reading)[0]
+                    errors[place, shift - 1], u[place, shift - 1] = value - shift / 10, stated
+        there = np.isfinite(errors)
+        biases = " ".join(f"{own[valued].mean():+.4f}" for own, valued in zip(errors.T, there.T, strict=True))
+        print(
+            f"photographs  {name}, blur {blur}: n {there.sum()}  bias {biases} px, RMS "
+            f"{np.sqrt(np.mean(errors[there] ** 2)):.4f}, u {np.median(u[there]):.4f}, within "
+            f"{share_within(errors[there], u[there]):.3f}"
+        )
 
 
 def lines(each: int, folder: Path) -> None:

@@ -6,7 +6,8 @@
 As `which_hinge`, but with pictures in between: every recording shows the paper's sample with one hinge 10 to 20 % off
 its stiffness, one link 1 to 1.5 % off its length, or 20 um of play in one pivot (every fourth: nothing), deformed with
 large rotations, rendered with blur, noise and a turn of its own. Poses are those of `measure --mechanism`; what is told
-is held against what was hidden. `--hidden two` hides two at once. `--bodies` leaves poses out. Views:
+is held against what was hidden. `--hidden two` hides two at once. `--bodies` leaves poses out. Views (an odd number of
+them, so that each meets everything that is hidden):
 
 plain     the sample by itself
 alike     a second finger, which does not move, lies 6 to 9 mm beside the right one, and inputs come in any order
@@ -276,11 +277,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         began = time.process_time()
         rng = np.random.default_rng([given.seed, number])
         view_kind = given.view[number % len(given.view)]
-        turn = number // len(given.view)
         if given.hidden == "two":
             kinds = [KINDS[1 + k] for k in rng.choice(3, 2, replace=False)]
         else:
-            kinds = [kind for kind in (KINDS[turn % 4],) if kind != "nothing"]
+            kinds = [kind for kind in (KINDS[number % 4],) if kind != "nothing"]
         what, view = hidden(kinds, rng), view_of(view_kind, given.px_per_mm, rng)
         half = given.frames // 2
         inputs = np.concatenate([np.linspace(-0.3, 1.2, half), np.linspace(1.2, -0.3, given.frames - half)])

@@ -1,8 +1,11 @@
 """Print how the kinds stand on grippers that nothing was fitted to: slope, force, stress and modes of each."""
 
+import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
@@ -52,14 +55,34 @@ def drawn(gripper: Gripper, row: tuple[Material, float, float, float, float, flo
     return gripper
 
 
+def drawn_at_random(count: int, seed: int) -> list[tuple[Material, float, float, float, float, float]]:
+    """Draw rows like those of `HELD_OUT`: t / R 0.0125 to 0.4, width over thickness 1 to 20, plates 1 to 20 mm."""
+    generator = np.random.default_rng(seed)
+    materials = (PA2200, ALUMINIUM, ABS, TITANIUM, STEEL, SILICON)
+    found = []
+    for _ in range(count):
+        radius_mm = float(generator.uniform(4.3, 8.0))
+        thickness_mm = radius_mm * float(np.exp(generator.uniform(np.log(0.0125), np.log(0.4))))
+        wide = float(np.exp(generator.uniform(0.0, np.log(20.0))))
+        row = (round(thickness_mm, 3), round(radius_mm, 2), round(float(np.clip(wide * thickness_mm, 1.0, 20.0)), 2))
+        longer = tuple(round(float(generator.uniform(*ends)), 2) for ends in ((-6.0, 8.0), (-2.0, 2.0)))
+        found.append((materials[generator.integers(len(materials))], *row, *longer))
+    return found
+
+
 def main() -> None:
     """Print errors in % against the plane model on a mesh twice as fine; force and modes with its width effect."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, help="draw others at random; the fixed ones without")
+    parser.add_argument("--count", type=int, default=6, help="how many with --seed")
+    asked = parser.parse_args()
+    rows = HELD_OUT if asked.seed is None else tuple(drawn_at_random(asked.count, asked.seed))
     sample = read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")
     print(
         "material, t, R, plate | finite_element: slope force stress mode (drive free, held) | lumped: same | "
         "lumped mechanism: same | matrix: slope"
     )
-    for row in HELD_OUT:
+    for row in rows:
         began = time.perf_counter()
         gripper = drawn(sample, row)
         fine = REFINED * 0.2 * gripper.hinge.thickness_mm
@@ -87,7 +110,7 @@ def main() -> None:
         cells.append(" ".join(f"{100.0 * (a / b - 1.0):+7.3f}" for a, b in pairs))
         matrix = 100.0 * (StiffnessMatrixGripper(gripper).gap_per_input / gap_per_input(reference.half) - 1.0)
         print(
-            f"{row[0].name:18s} {row[1]:5.2f} {row[2]:4.1f} {row[3]:5.1f} | {' | '.join(cells)} | {matrix:+7.3f} | "
+            f"{row[0].name:18s} {row[1]:6.3f} {row[2]:4.2f} {row[3]:5.2f} | {' | '.join(cells)} | {matrix:+7.3f} | "
             f"{model.half.unknowns} unknowns, quality {model.mesh.quality().min():.2f}, "
             f"{time.perf_counter() - began:.0f} s",
             flush=True,

@@ -1,6 +1,8 @@
 """A mechanism in three dimensions by CalculiX: quadratic wedges through the plate, which share nothing with the models.
 
-The plane mesh is a finer one than the model's. Fixed faces are held in all directions, sliding ones in theirs.
+The plane mesh is a finer one than the model's. Fixed faces are held in all directions, sliding ones in theirs. A face
+that lies along its drive is driven in the mean, as the models do it: an equation over its nodes, and the force is what
+holds the fixed faces.
 """
 
 import subprocess
@@ -86,6 +88,25 @@ class Wedges:
         inside = (x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near)
         return np.flatnonzero((inside & _on_outline(self.plane))[self.plane_node]) + 1
 
+    def mean_over(self, nodes: Indices) -> dict[int, float]:
+        """Weights of nodes of an upright face in its mean motion, from the eight-node faces of the wedges on it."""
+        on = np.zeros(len(self.nodes_mm) + 1, dtype=bool)
+        on[nodes] = True
+        weights: dict[int, float] = {}
+        for corners, middles in _SIDES:
+            sides = self.elements[:, [*corners, *middles]]
+            for side in sides[on[sides].all(axis=1)]:
+                a, b, _, d = (self.nodes_mm[node - 1] for node in side[:4])
+                area = float(np.linalg.norm(np.cross(b - a, d - a)))
+                for node, share in zip(side.tolist(), (-1 / 12,) * 4 + (1 / 3,) * 4, strict=True):
+                    weights[node] = weights.get(node, 0.0) + share * area
+        whole = sum(weights.values())
+        return {node: weight / whole for node, weight in weights.items()}
+
+
+_SIDES = tuple(((a, b, b + 3, a + 3), (6 + a, 12 + b, 9 + a, 12 + a)) for a, b in ((0, 1), (1, 2), (2, 0)))
+"""Corners and middles of the upright faces among a wedge's fifteen nodes."""
+
 
 def _on_outline(mesh: PlaneMesh) -> NDArray[np.bool_]:
     """Whether nodes belong to an edge that only one triangle has."""
@@ -131,14 +152,29 @@ def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, mode
     along = 1 if mechanism.drive.direction[0] != 0.0 else 2
     sign = mechanism.drive.direction[along - 1]
     kept = [f"DRIVE,{3 - along},{3 - along}"] if across else []
+    spread = np.ptp(body.nodes_mm[drive - 1][:, :2], axis=0)
+    in_mean = not across and spread[along - 1] > _ON * size_mm
+    pushed, reacting = f"DRIVE,{along},{along},{sign:g}", ["DRIVE"]
+    unequal = list(lines)
+    if in_mean:
+        if any(axis == along for axis in axes):
+            raise ValueError("a face driven in the mean needs fixed faces that take the whole force")
+        weights = sorted(body.mean_over(drive).items(), key=lambda item: -item[1])
+        count = len(body.nodes_mm) + 1
+        lines[1:1] = [f"{count},0,0,0"]
+        lines += ["*EQUATION", f"{len(weights) + 1}", *(f"{node},{along},{w:.12g}" for node, w in weights)]
+        lines += [f"{count},{along},-1"]
+        pushed, reacting = f"{count},{along},{along},{sign:g}", [f"FIXED{i}" for i in range(len(mechanism.fixed))]
     # The middle plane stays in it: without that a body on slides alone could drift away.
-    static = ["*STEP", "*STATIC", "*BOUNDARY", f"DRIVE,{along},{along},{sign:g}", "DRIVE,3,3", *kept]
-    static += ["*NODE PRINT, NSET=WATCHED", "U", "*NODE PRINT, NSET=DRIVE, TOTALS=ONLY", "RF", "*END STEP"]
+    static = ["*STEP", "*STATIC", "*BOUNDARY", pushed, "DRIVE,3,3", *kept, "*NODE PRINT, NSET=WATCHED", "U"]
+    for name in reacting:
+        static += [f"*NODE PRINT, NSET={name}, TOTALS=ONLY", "RF"]
+    static += ["*END STEP"]
     vibrating = ["*BOUNDARY", "DRIVE,1,3", "*STEP", "*FREQUENCY", f"{modes}", "*NODE FILE", "U", "*END STEP"]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        moved, force = _static(_run(folder, "static", [*lines, *static], ".dat"), sign, along)
-        text = _run(folder, "modes", [*lines, *vibrating], ".dat")
+        moved, force = _static(_run(folder, "static", [*lines, *static], ".dat"), -sign if in_mean else sign, along)
+        text = _run(folder, "modes", [*unequal, *vibrating], ".dat")
         shapes = (folder / "modes.frd").read_text(encoding="ascii", errors="replace")
     frequencies = _frequencies(text)
     out = _out_of_plane(shapes, len(body.nodes_mm), len(frequencies))
@@ -165,7 +201,7 @@ def _static(text: str, sign: float, along: int) -> tuple[dict[int, tuple[float, 
         if len(cells) == 4 and cells[0].isdigit():
             moved[int(cells[0])] = (float(cells[1]), float(cells[2]))
         elif len(cells) == 3 and not cells[0][0].isalpha():
-            force = sign * float(cells[along - 1])
+            force += sign * float(cells[along - 1])
     return moved, force
 
 

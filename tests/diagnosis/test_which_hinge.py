@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +126,30 @@ def test_channels_are_read_and_a_column_of_words_is_left_out(tmp_path: Path) -> 
     assert any("note_mm" in note for note in table.notes)
 
 
+def check_sketch(page: str, slopes: dict[str, float]) -> None:
+    """The page's drawing goes through the recording in time and shows the difference to the drawing, magnified."""
+    data = json.loads(re.search(r'id="mechanism-data">(.*?)</script>', page).group(1))
+    magnified = float(re.search(r"magnified ([\d.e+]+) times", page).group(1))
+    frames, finger = data["frames"], data["names"].index("finger")
+    times = [float(frame["at"].split(" s,")[0]) for frame in frames]
+    assert times == sorted(times)
+    assert len(times) == 24
+    inputs = np.array([frame["input"] for frame in frames])
+    assert inputs.argmax() in (11, 12), "there and back"
+    drawn = truth(TABLES)
+    for k, part in enumerate(("x_mm", "y_mm", "angle_mrad")):
+        own = [frame["bodies"][finger] for frame in frames]
+        seen = np.array([body["measured"][k] - body["predicted"][k] for body in own]) / magnified
+        found = np.polyfit(inputs, seen, 1)[0]
+        noise = (U_MRAD if k == 2 else U_MM) / np.sqrt(120.0) / np.std(inputs)
+        assert found == pytest.approx(slopes[f"finger.{part}"] - drawn[f"finger.{part}"], abs=5.0 * noise + 2e-3)
+    worst = max(frames, key=lambda frame: frame["bodies"][finger]["sigma"])["bodies"]
+    assert "mrad" in worst[finger]["off"]
+    assert [body["measured"] is None for body in worst] == [name == "pillar" for name in data["names"]]
+    assert page.count('class="hinge told"') == 2
+    assert 'type="range"' in page
+
+
 @pytest.mark.slow
 def test_the_place_is_named_and_the_corrected_model_agrees(tmp_path: Path) -> None:
     model = write_toml(tmp_path / "mechanism.toml")
@@ -138,6 +163,7 @@ def test_the_place_is_named_and_the_corrected_model_agrees(tmp_path: Path) -> No
     assert first["place"] == "finger, hinge 1 to hinge 2"
     assert first["parameters"]["ratio"]["value"] == pytest.approx(0.3 / 17.0, rel=0.1)
     assert any(place["channel"].startswith("finger.") and "hinge 1" in place["words"] for place in found["where"])
+    check_sketch((tmp_path / "l" / "report.html").read_text(), truth(changed(hinge_1={"at_mm": [35.3, 34]})))
     again = ask(table, tmp_path / "l" / "model.toml", tmp_path / "again")
     assert not any("place" in effect for effect in again["effects"]), again["sentence"]
 

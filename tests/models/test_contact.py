@@ -15,6 +15,7 @@ from fingervision.models.physics import Physics
 PENALTY_N_MM = 1e6
 """Of each face point: a finger that is pressed with 18 N then sinks in by some 1e-6 mm."""
 WITHIN = 1e-4
+CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def test_force_grip_and_stress_at_two_millimetres_of_closing(gripper: Gripper) -> None:
@@ -95,3 +96,16 @@ def test_the_same_in_the_deformed_shape(gripper: Gripper) -> None:
     assert state.force_n == pytest.approx(2.0 * float(forces.assemble(basis, u=u)[half.driven].sum()), rel=WITHIN)
     assert state.grip_n == pytest.approx(-PENALTY_N_MM * float(through.sum()), rel=WITHIN)
     assert state.gap_mm == pytest.approx(2.0 * half.measured_mm(moved), abs=WITHIN)
+    # Cauchy's stress F S F' / det F at the corners of the triangles that meet at the point.
+    corners = skfem.Basis(tri, skfem.ElementVector(skfem.ElementTriP2()), quadrature=(CORNERS, np.full(3, 1.0 / 6.0)))
+    slope = corners.interpolate(moved).grad
+    F = slope + eye(np.ones(slope.shape[2:]), 2)
+    cauchy = mul(mul(F, law(strained(slope))), transpose(F)) / (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
+    sx, sy, txy = cauchy[0, 0], cauchy[1, 1], cauchy[0, 1]
+    von_mises = np.sqrt(sx**2 - sx * sy + sy**2 + 3.0 * txy**2)
+    places = np.asarray(mesh.nodes_mm)[:, mesh.triangles[:3]]
+    at_peak = np.hypot(places[0] - state.place_mm[0], places[1] - state.place_mm[1]).T < 1e-9
+    assert state.stress_mpa == pytest.approx(float(von_mises[at_peak].max()), rel=WITHIN)
+    assert state.stress_mpa > material.yield_mpa
+    inner = mesh.nodes_mm[0] + model.equilibria([-2.0])[0].displacement_mm[model.plate.x_dofs]
+    assert inner.min() > -1e-5

@@ -59,6 +59,33 @@ def test_motion_across_is_no_blur_of_round_tips() -> None:
     assert abs(found.gap_px - true_gap(left, right, BELOW_PX)) < 0.5 * taken_for_focus_px
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("breadth_px", [1.4, 0.0])
+def test_a_narrow_wall_is_stated_where_no_outer_flank_is_in_view(breadth_px: float) -> None:
+    """A long fillet hides the wall's shape: only the flanks' width, beside the tips', says that something is there."""
+    left, right = Finger(25.3, 98.2, 300.0, 60.0, -0.8), Finger(424.7, 99.1, 300.0, 60.0, 0.8)
+    truth_px, rng = true_gap(left, right, BELOW_PX), np.random.default_rng(3)
+    light = light_on_sensor((left, right), Surface(wall_px=breadth_px), 1.0, SIZE_PX, rng)
+    found = measured(Shot(stored(light + 2.0 / 255.0 * rng.standard_normal(light.shape)), truth_px))
+    assert abs(found.gap_px - truth_px) < 2.0 * np.hypot(found.u_gap_px, found.u_shift_px)
+    assert (found.u_shift_px > 0.0) == (breadth_px > 0.0)
+
+
+@pytest.mark.parametrize("at_px", [0.0, 0.13, 0.3, 0.5])
+def test_a_sharp_still_rectangle_does_not_move(at_px: float) -> None:
+    """Drawn by the share that covers each pixel, without blur: at no sub-pixel place is anything said to move."""
+    picture = np.full((240, 320), 220.0)
+    columns, rows = (np.arange(n)[:, None] + np.array([-0.5, 0.5]) for n in (320, 240))
+    for left, right in ((40.2 + at_px, 110.0 + at_px), (190.0 - at_px, 262.3)):
+        across = np.clip(np.minimum(columns[:, 1], right) - np.maximum(columns[:, 0], left), 0.0, 1.0)
+        down = np.clip(rows[:, 1] - np.maximum(rows[:, 0], 80.0 + 0.5 * at_px), 0.0, 1.0)
+        picture -= 180.0 * np.outer(down, across)
+    rng = np.random.default_rng(int(100 * at_px))
+    found = measured(Shot(stored((picture + 0.5 * rng.standard_normal(picture.shape)) / 255.0), 0.0))
+    assert found.beside == ""
+    assert abs(found.gap_px - (80.0 - 2.0 * at_px)) < 0.05
+
+
 def test_a_clean_edge_is_left_alone() -> None:
     rng = np.random.default_rng(8)
     assert all(measured(plain(rng, Surface())).u_shift_px == 0.0 for _ in range(FRAMES))

@@ -1,4 +1,4 @@
-"""Measured poses, gap and force as channels of one fit, each with the prediction of the drawing."""
+"""Compare measured poses, gap and force with the drawing's predictions, as channels of one joint fit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,35 +20,38 @@ Array = NDArray[np.float64]
 
 GAP = "gap_mm"
 FEWEST_ROWS = 20
-"""Rows with every channel below which a noise of many channels is not known."""
+"""Least number of rows with every channel; with fewer, the noise covariance of the channels cannot be estimated."""
 LEAST_PRESENT = 0.5
-"""Of the rows: a channel that is missing more often would cost the others too many."""
+"""Least share of rows in which a channel must be present: rows without it are lost for all channels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyEvidence:
-    """What the measured channels show beside the drawing.
+    """Results of comparing the measured channels with the drawing.
 
     Parameters
     ----------
     prediction : BodyPrediction
-        The drawing, in the channels that were compared, at the rows that have all of them.
+        Predictions of the drawing for the compared channels, at the rows that have all of these channels.
     findings : PlaceFindings
-        Which place.
+        Faulty hinge, link or pivot, if there is one.
     rows : ndarray of int, shape (k,)
-        Those rows.
+        Indices of these rows.
     names : tuple of str
         The channels as the table calls them.
+    time_s : ndarray of float, shape (k,), or None
+        Times of those rows; None where the table has none.
     """
 
     prediction: BodyPrediction
     findings: PlaceFindings
     rows: NDArray[np.intp]
     names: tuple[str, ...]
+    time_s: Array | None = None
 
 
 def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
-    """Return the predictions of a model's drawing; None where the model has no drawing."""
+    """Return the predictions of a model's drawing; None if the model has no drawing."""
     # isinstance would work the answers out to look for them.
     return cast(DrawnMechanism, model.base).places if hasattr(type(model.base), "places") else None
 
@@ -61,20 +64,20 @@ def body_evidence(
     Parameters
     ----------
     table : MeasuredTable
-        With channels.
+        Table with channels.
     answers : PlaceAnswers
-        The drawing.
+        Predictions of the drawing.
     input_mm : ndarray of float, shape (n,)
-        What the mechanism received.
+        Input that the mechanism received.
     rng : numpy Generator
-        For thresholds.
+        Generator for the simulation of thresholds.
 
     Returns
     -------
     evidence : BodyEvidence or None
-        None where nothing can be compared.
+        None if no channel can be compared.
     notes : tuple of str
-        What a reader must know, a sentence each.
+        Remarks that a reader must know, one sentence each.
     """
     known, notes = known_channels(answers, tuple(table.channels)), []
     unknown = [name for name in table.channels if name not in known]
@@ -112,11 +115,12 @@ def body_evidence(
     prediction = BodyPrediction(answers, tuple(drawn), input_mm[rows])
     runs = _runs_among(table.runs, rows)
     search = PlaceSearch(prediction, np.stack(columns, axis=1), runs, np.array(floors), timed=table.time_s is not None)
-    return BodyEvidence(prediction, search.run(rng), rows, tuple(names)), tuple(notes)
+    time_s = None if table.time_s is None else table.time_s[rows]
+    return BodyEvidence(prediction, search.run(rng), rows, tuple(names), time_s), tuple(notes)
 
 
 def _floor(values: Array, u: Array | None, rows: NDArray[np.intp]) -> float:
-    """Smallest noise that is assumed for a channel: its stated uncertainty, or its last digit."""
+    """Smallest noise assumed for a channel: its stated uncertainty, or the rounding of its last digit."""
     digit = resolution(values) / float(np.sqrt(12.0))
     return max(digit, 0.0 if u is None else float(np.median(u[rows])))
 
@@ -127,9 +131,9 @@ def _runs_among(runs: tuple[slice, ...], rows: NDArray[np.intp]) -> tuple[slice,
 
 
 def added_everywhere(answers: PlaceAnswers, input_mm: Array, sizes: Mapping[str, float]) -> dict[str, Array] | None:
-    """Changes that explanations make to every channel of a drawing, by full key.
+    """Change of every channel caused by given explanations of the drawing, by the key of the explanation.
 
-    None where the drawing lacks one of them.
+    None is returned if the drawing does not contain the place of one of the explanations.
 
     Parameters
     ----------

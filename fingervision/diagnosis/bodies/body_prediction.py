@@ -1,4 +1,4 @@
-"""Predict every channel of a measured table from the drawing, as drawn or with one hinge or link changed."""
+"""Predict every channel of a measured table from the drawing, unchanged or with one hinge or link changed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,9 +14,10 @@ from fingervision.models.place_answers import AS_DRAWN, LinearAnswer, PlaceAnswe
 Array = NDArray[np.float64]
 
 _BENT_NODES = (-1.0, -0.5, 0.35, 0.7, 1.0)
-"""Shares of the input's range on either side at which equilibria in the deformed shape are found."""
+"""Positions, as shares of the input's range on either side, at which equilibria in the deformed shape are computed."""
 _SLIP_NODES = np.geomspace(1e-3, 1e3, 121)
-"""Inputs over the play's radius at which the slip of a pivot is worked out; beyond, it stands at its edge."""
+"""Inputs relative to the play's radius at which the slip of a pivot is tabulated; beyond the last, the pin lies at the
+edge of its hole."""
 FORCE = "force_n"
 
 
@@ -29,9 +30,9 @@ class BodyPrediction:
     answers : PlaceAnswers
         The drawing.
     channels : tuple of str
-        Channels of the table, as the drawing calls them.
+        Names of the table's channels in the drawing.
     input_mm : ndarray of float, shape (n,)
-        What the mechanism received.
+        Input that the mechanism received.
     """
 
     answers: PlaceAnswers
@@ -67,7 +68,7 @@ class BodyPrediction:
     def bent(self) -> Array:
         """Change of the prediction by equilibrium in the deformed shape, shape (n, channels).
 
-        A polynomial of order 2 to 4.
+        The change is interpolated by a polynomial of order 2 to 4 in the input.
         """
         model, names = self.answers.model, self.answers.channels
         reach = float(np.abs(self.input_mm).max())
@@ -101,7 +102,7 @@ class BodyPrediction:
         return np.asarray(np.stack([w**2, w**3, w**4], axis=1)[:, : shape.shape[0]] @ shape)
 
     def _angle_of(self, found: dict[str, float], body: int) -> float:
-        """Rotation of a body by its number; a fixed body does not rotate."""
+        """Rotation of a body, given by its number; 0 for a fixed body."""
         assembly = self.answers.model.assembly
         nodes = np.flatnonzero(assembly.piece == body)
         middle = assembly.plate.nodes_mm[:, nodes].mean(axis=1)
@@ -111,7 +112,7 @@ class BodyPrediction:
 
     @cached_property
     def by_edges(self) -> Array:
-        """Change of the prediction where poses are those of edges in a picture, shape (n, channels)."""
+        """Change of the prediction if poses are measured from edges in a picture, shape (n, channels)."""
         return np.outer(self.input_mm, self.answers.by_edges[self._places])
 
     def slipped(self, flexure: int, play_mm: float) -> Array:
@@ -133,16 +134,16 @@ class BodyPrediction:
 def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float) -> Array:
     """Displacement of a pin in a pivot with play, along x and y, without friction; shape (n, 2).
 
-    The pin goes to the place in its hole with the least elastic energy: with the force F on it per unit of input u, and
-    the stiffness S against a displacement s, the energy s S s / 2 - u F s is minimised over the disc of half the play
-    (a trust-region problem: More and Sorensen (1983), SIAM Journal on Scientific and Statistical Computing 4, 553, DOI
-    10.1137/0904038). Near zero load the pin follows the load; under larger loads it lies against the hole, on the side
-    to which the load points.
+    The pin takes the position in its hole with the least elastic energy: with the force F on it per unit of input u,
+    and the stiffness S against a displacement s, the energy s S s / 2 - u F s is minimised over the disc of half the
+    play (a trust-region problem: More and Sorensen (1983), SIAM Journal on Scientific and Statistical Computing 4, 553,
+    DOI 10.1137/0904038). Near zero load the pin follows the load; under larger loads it lies against the hole, on the
+    side to which the load points.
 
     Parameters
     ----------
     answer : LinearAnswer
-        Of the mechanism.
+        Linear response of the mechanism.
     flexure : int
         The pivot.
     input_mm : ndarray of float, shape (n,)
@@ -178,7 +179,7 @@ def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float)
 
 
 def known_channels(answers: PlaceAnswers, measured: Sequence[str]) -> dict[str, str]:
-    """Match the channels of a table to names in the drawing; only letters, digits and `_` of a name count."""
+    """Match the channels of a table to names in the drawing; only letters, digits and `_` are compared."""
     own = {column_name(name): name for name in answers.channels}
     return {name: own[column_name(name)] for name in measured if column_name(name) in own}
 

@@ -1,4 +1,4 @@
-"""Noise of many channels at once: its common part (error of the input, camera shake) and its correlation in time."""
+"""Joint noise of many channels: its common part (error of the input, camera shake) and its correlation in time."""
 
 from dataclasses import dataclass
 
@@ -10,31 +10,32 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _KNOTS = 8
-"""Pieces of the curve over the input that is taken for no noise, whatever causes it."""
+"""Number of pieces of the spline over the input, whose fit is not counted as noise, whatever its cause."""
 _FEWEST_A_PIECE = 12
 _OUTLIER = 5.0
-"""Standard deviations from that curve beyond which a row is set aside: 1 in 2 million by chance."""
+"""Standard deviations from the spline beyond which a row is excluded: 1 in 2 million by chance."""
 _MOST_CORRELATED = 0.97
 _RANK = 1e-9
-"""Of the largest variance of scaled channels: less is a channel that follows from the others exactly."""
+"""Smallest variance, relative to the largest, of the scaled channels: a smaller one means a channel that is determined
+exactly by the others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelNoise:
-    """Whitening of all channels: afterwards the noise has unit variance and is independent between channels.
+    """Whitening transformation of all channels, after which the noise has unit variance and is independent.
 
     Parameters
     ----------
     mixing : ndarray of float, shape (channels, k)
-        Takes rows of channels to k independent components.
+        Transforms the channels of a row to k independent components.
     correlation : ndarray of float, shape (k,)
-        Of neighbouring rows of a run, by component.
+        Correlation between neighbouring rows of a run, for each component.
     runs : tuple of slice
         Rows of each run.
     kept : ndarray of bool, shape (n,)
-        Rows that are no outliers.
+        Rows that are not outliers.
     sd : ndarray of float, shape (channels,)
-        Standard deviation of one reading.
+        Standard deviation of one reading of each channel.
     degrees : int
         Degrees of freedom of the estimate.
     """
@@ -52,12 +53,12 @@ class ChannelNoise:
         Parameters
         ----------
         rows : ndarray of float, shape (n, channels)
-            A signal.
+            A signal in all channels.
 
         Returns
         -------
         ndarray of float, shape (n * k,)
-            Rows that are set aside are zero.
+            The whitened signal; excluded rows are zero.
         """
         mixed = np.where(self.kept[:, None], rows, 0.0) @ self.mixing
         out = np.empty_like(mixed)
@@ -72,7 +73,7 @@ class ChannelNoise:
 def channel_noise(
     residual: Array, input_mm: Array, runs: tuple[slice, ...], floors: Array, *, timed: bool
 ) -> ChannelNoise:
-    """Estimate the noise of all channels from what remains after fitting smooth curves over the input.
+    """Estimate the noise of all channels from the residuals about smooth curves over the input.
 
     Parameters
     ----------
@@ -83,9 +84,9 @@ def channel_noise(
     runs : tuple of slice
         Rows of each run.
     floors : ndarray of float, shape (channels,)
-        Least noise of each channel: what was stated with the readings, or their last digit.
+        Smallest noise of each channel: the uncertainty stated with the readings, or the rounding of their last digit.
     timed : bool
-        Whether the order of rows is that of time, so that neighbours may share their noise.
+        Whether the rows are in order of time, so that neighbouring rows may have correlated noise.
     """
     curves = _curves(input_mm, runs, timed=timed)
     kept = np.ones(input_mm.size, dtype=bool)
@@ -122,7 +123,7 @@ def channel_noise(
 
 
 def _curves(input_mm: Array, runs: tuple[slice, ...], *, timed: bool) -> Array:
-    """Cubic splines over the input, one constant per run, and the direction of motion."""
+    """Regressors of the curves: cubic splines over the input, one constant per run, and the direction of motion."""
     low, high = float(input_mm.min()), float(input_mm.max())
     pieces = int(np.clip(input_mm.size // _FEWEST_A_PIECE, 1, _KNOTS))
     inner = np.linspace(low, high, pieces + 1)

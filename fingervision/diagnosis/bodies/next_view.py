@@ -1,4 +1,4 @@
-"""Propose the next view: which body to film, or where to put a marker, to resolve an ambiguity set."""
+"""Propose the next view (body to film, or position of a marker) that would resolve an ambiguity set."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,25 +15,25 @@ from fingervision.models.place_answers import PlaceAnswers
 Array = NDArray[np.float64]
 
 ASSUMED = {"_mm": 0.001, "mrad": 0.05, "ce_n": 0.01}
-"""Standard uncertainty of one reading of a view that was not taken yet, where nothing like it was measured: a pose of a
-link of 15 mm at 34 px/mm; a load cell of 0.2 % of 5 N."""
+"""Assumed standard uncertainty of a reading of a proposed view, if no similar quantity was measured: a pose of a link
+of 15 mm at 34 px/mm; a load cell with 0.2 % of 5 N."""
 MOST_MEMBERS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class NextView:
-    """A further view that would distinguish explanations.
+    """A proposed additional view that would distinguish explanations.
 
     Parameters
     ----------
     channels : tuple of str
-        What to measure besides.
+        Channels to be measured in addition.
     expected : float
-        Chi-square by which it is expected to separate the best explanation from the nearest other one.
+        Chi-square by which the view is expected to separate the best explanation from the nearest other one.
     separates : tuple of str
-        Explanations that it is expected to tell from the best.
+        Explanations that the view is expected to distinguish from the best one.
     words : str
-        A sentence.
+        The proposal as a sentence.
     """
 
     channels: tuple[str, ...]
@@ -43,18 +43,18 @@ class NextView:
 
 
 def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
-    """Choose the view that best separates the members of an ambiguity set; None where no view separates any.
+    """Choose the view that best separates the members of an ambiguity set; None if no view separates any.
 
     The criterion is the squared whitened distance that a view adds between the best explanation and every other one.
-    The other's size is refitted to the view and the measured data together, with free constants (T-optimality: Atkinson
-    and Fedorov (1975), Biometrika 62, 57, DOI 10.1093/biomet/62.1.57).
+    The size of the other explanation is refitted to the view and the measured data together, with free constants
+    (T-optimality: Atkinson and Fedorov (1975), Biometrika 62, 57, DOI 10.1093/biomet/62.1.57).
 
     Parameters
     ----------
     evidence : BodyEvidence
-        What the channels said.
+        Results of comparing the measured channels with the drawing.
     answers : PlaceAnswers
-        The drawing.
+        Predictions of the drawing.
     """
     members = _distinct(evidence.findings.members)[:MOST_MEMBERS]
     if len(members) < 2:
@@ -100,7 +100,7 @@ def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
 
 
 def _views(answers: PlaceAnswers, evidence: BodyEvidence) -> list[tuple[str, tuple[str, ...]]]:
-    """Views that were not measured: poses of bodies, displacements of points, and the force."""
+    """List the views that were not measured: poses of bodies, displacements of points, and the force."""
     measured = set(evidence.prediction.channels)
     views: list[tuple[str, tuple[str, ...]]] = []
     for body in answers.moving_bodies:

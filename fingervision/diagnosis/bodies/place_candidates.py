@@ -1,4 +1,4 @@
-"""Candidate explanations: a hinge, link or pivot of the mechanism, and effects of stage or camera that look alike."""
+"""Candidate explanations: a faulty hinge, link or pivot, and effects of stage or camera that look similar."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,35 +19,37 @@ Array = NDArray[np.float64]
 Added = Callable[[float], Array]
 
 PAIRS = (DrawnPart.LINKS_ALIKE, DrawnPart.LINKS_OPPOSITE)
-"""Parts of a drawing that are two links at once."""
+"""Parts of a drawing that consist of two links changed together."""
 _LEAST_SCALE = 0.05
-"""Relative change of the opening by a relative change of a link: with less a link is no lever of it."""
+"""Least relative change of the opening per relative change of a link's length; with less, the link does not act as a
+lever of the opening."""
 _MIRRORED = 1e-3
-"""Of a drawing's size: how near a place must lie to another's mirror image to be its partner."""
+"""Largest distance between a place and another's mirror image, as a share of the drawing's size, at which the two are
+partners."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """One explanation with one parameter, its size.
+    """One candidate explanation, with one parameter: its size.
 
     Parameters
     ----------
     name : str
-        Effect of the catalogue.
+        Name of the effect in the catalogue.
     place : str
-        Hinge or link as the drawing calls it; empty for an effect that has no place.
+        Name of the hinge or link in the drawing; empty for an effect without a place.
     parameter : Parameter
-        Its size.
+        The parameter for the size.
     reference : float
-        A size at which a signature is told.
+        Size at which the signature is computed first.
     added : callable
-        Size to what it adds to every channel, shape (n, channels).
+        Maps a size to the change of every channel, shape (n, channels).
     part : DrawnPart
-        What of the drawing differs there.
+        Kind of part of the drawing that differs.
     detail : str
-        Which end of a link was moved, in words.
+        End of a link that was moved, in words.
     changes : callable
-        Size to what differs from the drawing; nothing for a pivot and for what has no place.
+        Maps a size to the changed quantities of the drawing; empty for a pivot and for an effect without a place.
     """
 
     name: str
@@ -61,17 +63,17 @@ class Candidate:
 
     @property
     def key(self) -> str:
-        """Name and place as in a report: `hinge_stiffness_error@right hinge 2`."""
+        """Name and place in the form used in a report: `hinge_stiffness_error@right hinge 2`."""
         return effect_key(self.name, self.place)
 
     @property
     def full_key(self) -> str:
-        """Key with the end of a link that is misplaced, as in a `model.toml`."""
+        """Key that includes the misplaced end of a link, in the form used in a `model.toml`."""
         return effect_key(self.name, self.place, self.detail)
 
 
 def candidates_of(prediction: BodyPrediction) -> tuple[Candidate, ...]:
-    """List the explanations with a place in the drawing, and those without a place that poses can distinguish."""
+    """List candidates: effects with a place in the drawing, and those without one that poses can distinguish."""
     found = [*_hinges(prediction), *_links(prediction), *_pivots(prediction)]
     found += [*_pairs(prediction, found), *_without_place(prediction)]
     return tuple(found)
@@ -100,9 +102,9 @@ def _stiffer(prediction: BodyPrediction, flexure: int) -> Added:
 
 
 def _links(prediction: BodyPrediction) -> list[Candidate]:
-    """Links between the hinges of a body: one end lies too far out along the line through both ends.
+    """Candidates for links between the hinges of a body: one end is displaced along the line through both ends.
 
-    In a body held by many flexures, each is joined to the nearest others (a minimum spanning tree).
+    In a body with many flexures, links join neighbouring flexures (a minimum spanning tree).
     """
     mechanism, found = prediction.answers.mechanism, list[Candidate]()
     numbers = {flexure.name: place for place, flexure in enumerate(mechanism.flexures)}
@@ -149,7 +151,7 @@ def _changed(prediction: BodyPrediction, changes: Callable[[float], PlaceChanges
 
 
 def _tree(points: object) -> list[tuple[str, str]]:
-    """Join points by the shortest total length of lines (Prim's algorithm)."""
+    """Join points by lines of the smallest total length (minimum spanning tree, Prim's algorithm)."""
     places = dict(points)  # type: ignore[call-overload]
     names = list(places)
     inside, joins = names[:1], []
@@ -176,7 +178,7 @@ def _slipping(prediction: BodyPrediction, flexure: int) -> Added:
 
 
 def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Candidate]:
-    """A link together with its mirror image: equal changes alter the lever ratio, opposite ones the symmetry."""
+    """Candidates of a link together with its mirror image: equal changes alter the ratio, opposite the symmetry."""
     found = []
     mirrored = mirror_of(prediction)
     by_key = {(each.place, each.detail): each for each in singles if each.part is DrawnPart.LINK}

@@ -37,12 +37,12 @@ Explain = Callable[[MeasuredTable, CorrectedModel], "Diagnosis"]
 
 
 def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[MeasuredTable, CorrectedModel]:
-    """Subtract from a table the effects of a corrected model that have a place; unchanged where there are none.
+    """Subtract the effects of a corrected model that have a place from a table; unchanged if there are none.
 
     Raises
     ------
     DataError
-        A place is not one of the drawing's.
+        If a place is not in the drawing.
     """
     placed = {key: next(iter(values.values())).value for key, values in model.effects.items() if split_key(key)[1]}
     if not placed:
@@ -61,18 +61,18 @@ def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[Measure
 def diagnose_with_bodies(
     table: MeasuredTable, model: CorrectedModel, explain: Explain, rng: np.random.Generator
 ) -> "Diagnosis":
-    """Explain a table that has user-named channels.
+    """Diagnose a table that contains user-named channels such as poses.
 
     Parameters
     ----------
     table : MeasuredTable
-        With channels.
+        Table with channels.
     model : CorrectedModel
         The model, without effects that have a place.
     explain : callable
-        Explains the gap of a table by the catalogue.
+        Explains the gap of a table by the effects of the catalogue.
     rng : numpy Generator
-        For thresholds.
+        Generator for the simulation of thresholds.
     """
     answers = drawing_of(model)
     first = explain(table if answers is None else _beside_condensed(table, model, answers), model)
@@ -103,7 +103,7 @@ def diagnose_with_bodies(
 
 
 def _place_alone(done: "Diagnosis") -> "Diagnosis":
-    """Return a diagnosis that names the faulty place only."""
+    """Return a diagnosis that contains the faulty place only."""
     d = done.report.disagreement
     report = replace(
         done.report,
@@ -119,7 +119,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
 
 
 def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: PlaceAnswers) -> MeasuredTable:
-    """Compare the gap with condensed bodies, from which a model of bars joined at points differs by some 0.1 %."""
+    """Correct the gap for the difference between condensed bodies and bars joined at points, some 0.1 %."""
     u = np.array([0.0, 1.0])
     bare = model.base.respond(u)
     drawn = answers.answer().by_input
@@ -145,7 +145,7 @@ def _driven_input(done: "Diagnosis") -> Array:
 
 
 def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:
-    """Subtract the contribution of an explanation from a table."""
+    """Subtract the changes caused by an explanation from the channels of a table."""
     changes: dict[str, object] = {"gap_mm": table.gap_mm - added[GAP]}
     if table.midline_mm is not None:
         first, last = answers.mechanism.pairs[GAP_PAIR]
@@ -187,7 +187,7 @@ def _where(report: DiagnosisReport, evidence: BodyEvidence, answers: PlaceAnswer
 
 
 def _measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
-    """Add the results of the channels to the tables of a report: disagreement by channel, detection limits by place."""
+    """Add the channels' results to the tables of a report: disagreement by channel, detection limits by place."""
     report, findings = done.report, evidence.findings
     channels: dict[str, Mapping[str, float]] = dict(report.disagreement.by_channel)
     for place, name in enumerate(evidence.names):

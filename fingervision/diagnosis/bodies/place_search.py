@@ -1,4 +1,4 @@
-"""Search for the hinge, link or pivot that explains poses and gap, with its ambiguity set."""
+"""Search for the hinge, link or pivot that explains poses and gap, and for indistinguishable alternatives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,36 +16,42 @@ from fingervision.domain.drawing_form import DrawnPart
 Array = NDArray[np.float64]
 
 SLOPE_ERROR, OWN_SLOPE_ERROR = 1e-4, 3e-5
-"""Of the largest slope of its unit: how far a drawing's lumped answer may be off in any channel, and by how much of it
-otherwise than in the mirror image of that channel. Beside finite elements poses of the sample are within 5e-5, and its
-halves alike to 2e-6 (`tests/models/test_body_poses.py` holds 3e-4 of every drawing)."""
+"""Relative model error of a drawing's lumped response in any channel, as a share of the largest slope with the same
+unit; and the part of this error that is not shared with the mirror image of the channel. Compared with finite elements,
+poses of the published sample are within 5e-5, and its halves agree to 2e-6 (`tests/models/test_body_poses.py` tests
+3e-4 for every drawing)."""
 FORCE_SLOPE_ERROR = 0.05
-"""Relative: the modulus of a printed or rolled sheet is known no better (mechanics.md, section 5)."""
+"""Relative uncertainty of the force: the modulus of a printed or rolled sheet is not known better (mechanics.md,
+section 5)."""
 BY_EDGES = 3.0
-"""Poses are those of the bodies' areas (0), of all of their straight edges (1) or of some that a picture shows, which
-may be two or three times as far from the area where a body bends. The table does not say which."""
+"""Prior standard deviation of the coefficient of `BodyPrediction.by_edges`: it is 0 for poses of the bodies' areas, 1
+for poses from all straight edges, and may be two or three for poses from those edges that a picture shows. The table
+does not say which applies."""
 HINGE_ERROR, OWN_HINGE_ERROR = 0.01, 0.003
-"""Relative: the tables of hinges beside bricks, and what a body's own root adds (`models/README.md`); and what of it is
-not shared with the hinge's mirror image."""
+"""Relative errors of a hinge's stiffness: of the hinge tables compared with brick elements, including the root in the
+body (`models/README.md`); and the part not shared with the hinge's mirror image."""
 SCALE_ERROR = 3e-4
-"""Relative: of the picture's scale, from a reference of 2 mm known to a micrometre and its edges (measuring.md)."""
+"""Relative uncertainty of the picture's scale, from a reference of 2 mm known to a micrometre and its edges
+(measuring.md)."""
 ALIKE = 12.0
-"""Squared whitened distance within which two explanations are not told apart, as in `inference/ambiguity_set`."""
+"""Squared whitened distance below which two explanations count as indistinguishable, as in
+`inference/ambiguity_set`."""
 NOT_REFUTED = 6.0
-"""Chi-square behind the best within which data do not speak against an explanation (Cox, 1961)."""
+"""Increase of chi-square over the best explanation below which the data do not reject an explanation (Cox, 1961)."""
 FALSE_CLAIMS = 0.02
-"""Share of tables of noise alone in which the largest gain of all exceeds the threshold."""
+"""False positive rate: share of tables with noise alone in which the largest gain exceeds the threshold."""
 DRAWS = 4000
 REFINED = 0.25
-"""Of the largest gain: what gains less in its signature alone is not looked at more closely."""
+"""Gain relative to the largest one below which a candidate is not refined."""
 STRUCTURE = 1e-3
-"""Significance beyond which what an explanation leaves is structure and no noise."""
+"""Significance level below which the residual of an explanation contains structure."""
 STRUCTURE_SHARE = 0.05
-"""Of what was explained: less structure than this is the form of the explanation (`STANDING_SHARE` of the gap)."""
+"""Structure relative to the explained part that is attributed to the inexact form of the explanation (`STANDING_SHARE`
+for the gap)."""
 FORM_ERROR = 0.03
-"""Relative standard uncertainty of a size by the form of its explanation: condensed bodies and lumped flexures beside
-finite elements of the changed outline, where plays are told up to 4 % and lengths up to 3 % wrong; 2 % covered 84 % of
-56 plays (`python -m tests.benchmarks.which_hinge` prints the coverage)."""
+"""Relative standard uncertainty of a size due to the form of its explanation: condensed bodies and lumped flexures
+compared with finite elements of the changed outline, where estimated plays are up to 4 % and lengths up to 3 % wrong; 2
+% covered 84 % of 56 plays (`python -m tests.benchmarks.which_hinge` prints the coverage)."""
 PLAYS_MM = np.geomspace(0.002, 0.5, 25)
 STEPS = 4
 
@@ -57,13 +63,13 @@ class Fitted:
     Parameters
     ----------
     candidate : Candidate
-        What it is.
+        The candidate explanation.
     size, u : float
-        Its parameter with its standard uncertainty by the noise and by what nobody knows.
+        Fitted size with its standard uncertainty from noise and nuisance parameters.
     gain : float
-        Fall of chi-square.
+        Reduction of chi-square.
     signature : ndarray of float
-        What it explains, whitened, beside what nobody knows.
+        Explained change, whitened and orthogonal to the nuisance parameters.
     """
 
     candidate: Candidate
@@ -74,28 +80,30 @@ class Fitted:
 
     @property
     def u_stated(self) -> float:
-        """Standard uncertainty of the size, including that of the explanation's formula."""
+        """Standard uncertainty of the size, including that of the explanation's form."""
         return hypot(self.u, FORM_ERROR * self.size)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaceFindings:
-    """What poses say.
+    """Result of the search for a faulty place.
 
     Parameters
     ----------
     members : tuple of Fitted
-        The best explanation and all that these data cannot tell from it; empty where there is nothing to explain.
+        The best explanation and all explanations that the data cannot distinguish from it; empty if there is nothing to
+        explain.
     limit : float
-        Fall of chi-square that a claim needs.
+        Reduction of chi-square required for a claim.
     structure : float
-        Chi-square of generic shapes in what the best explanation leaves, where it is no noise; 0 where it is.
+        Chi-square of generic shapes in the residual of the best explanation, if significant; otherwise 0.
     smallest : dict of str to (Candidate, float)
-        Size of every candidate that these data would have shown.
+        Detection limit of every candidate.
     noise : ChannelNoise
-        Of all channels.
+        Joint noise of all channels.
     before, after : ndarray of float, shape (n, channels)
-        Measured minus predicted, constants and the drawing's place in the picture taken out.
+        Residuals without and with the best explanation, with constants and the drawing's position in the picture
+        fitted.
     """
 
     members: tuple[Fitted, ...]
@@ -108,20 +116,20 @@ class PlaceFindings:
 
 
 class PlaceSearch:
-    """Poses and other measured channels compared with the drawing, and the fits of candidates to the difference.
+    """Compares poses and other measured channels with the drawing, and fits candidates to the difference.
 
     Parameters
     ----------
     prediction : BodyPrediction
         The drawing over the inputs of the table.
     measured : ndarray of float, shape (n, channels)
-        What was measured.
+        Measured values.
     runs : tuple of slice
         Rows of each run.
     floors : ndarray of float, shape (channels,)
         Least noise of each channel.
     timed : bool
-        Whether rows are ordered by time.
+        Whether the rows are in order of time.
     """
 
     def __init__(
@@ -135,7 +143,7 @@ class PlaceSearch:
         self._left = self._beside(self.noise.whitened(self.residual))
 
     def _nuisances(self) -> None:
-        """Columns of the nuisance parameters, with their prior standard deviations; infinite where nothing is known."""
+        """Regressors of the nuisance parameters, with prior standard deviations; infinite if nothing is known."""
         prediction, columns, spread = self.prediction, [], []
         n, count = self.residual.shape
         slopes = prediction.linear().by_input[[prediction.answers.channels.index(c) for c in prediction.channels]]
@@ -195,11 +203,11 @@ class PlaceSearch:
         return np.asarray(padded - self._basis @ (self._basis.T @ padded))
 
     def _unknown_part(self, rows: Array) -> Array:
-        """Fit the nuisance parameters to a residual, and return their unconstrained part: constants, rotation and bend.
+        """Fit of the nuisance parameters to a residual; returns the part of constants, rotation and bend only.
 
-        Shape (n, channels).
+        The result has shape (n, channels).
 
-        Errors that the model may have are fitted too, but stay in the residual, because they may be the disagreement.
+        Possible model errors are fitted too, but stay in the residual, because they may be the sought disagreement.
         """
         padded = np.concatenate([self.noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
         shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit
@@ -229,7 +237,7 @@ class PlaceSearch:
         return Fitted(candidate, size, norm**-0.5, max(gain, 0.0), signature)
 
     def _fit_play(self, candidate: Candidate) -> Fitted:
-        """Scan the size of a play, because its width decides where it is taken up."""
+        """Scan the size of a play, because the width of the play decides at which inputs it is crossed."""
         left, found = self._left, []
         for play_mm in PLAYS_MM:
             unit = self.signature(candidate, float(play_mm)) / play_mm
@@ -266,7 +274,7 @@ class PlaceSearch:
         return fitted
 
     def limit(self, rng: np.random.Generator, first: Sequence[Fitted]) -> float:
-        """Fall of chi-square that the best of all candidates rarely exceeds in noise alone."""
+        """Reduction of chi-square that the best of all candidates seldom exceeds in noise alone."""
         units = np.array([f.signature / np.linalg.norm(f.signature) for f in first if np.any(f.signature)])
         if not units.size:
             return float("inf")
@@ -294,7 +302,7 @@ class PlaceSearch:
         return total if total > float(chi2.isf(STRUCTURE, basis.shape[1])) else 0.0
 
     def run(self, rng: np.random.Generator) -> PlaceFindings:
-        """Find the place."""
+        """Run the search for a faulty place."""
         first = [self.fit(candidate) for candidate in self.candidates]
         limit = self.limit(rng, first)
         top = max(f.gain for f in first)

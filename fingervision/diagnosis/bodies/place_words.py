@@ -1,4 +1,4 @@
-"""Sentences about hinges, links and pivots: what differs, by how much, and in which body it shows."""
+"""Sentences about hinges, links and pivots: which one differs, by how much, and in which body it is visible."""
 
 from collections.abc import Sequence
 
@@ -12,16 +12,17 @@ from fingervision.domain.report import Place
 from fingervision.models.place_answers import PlaceAnswers
 
 COVER = 2.0
-"""Standard uncertainties of a stated interval: 95 %."""
+"""Coverage factor of a stated interval: 95 %."""
 BINS = 8
-"""Parts of the input's range over which a pose is looked at."""
+"""Number of parts of the input's range in which a pose is compared."""
 SIGNIFICANT = 5.0
-"""Standard deviations of a part's mean: of a hundred parts of noise one in 17 000 tables has such a one."""
+"""Standard deviations of a part's mean from which it is significant: by chance in one of 17 000 tables of a hundred
+parts."""
 MOST = 6
 
 
 def fitted_words(fitted: Fitted) -> str:
-    """Sentence on what differs where: `right hinge 2: 14 +- 3 % too soft`."""
+    """Sentence on a fitted explanation: `right hinge 2: 14 +- 3 % too soft`."""
     candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
     if candidate.part is DrawnPart.PIVOT:
@@ -39,7 +40,7 @@ def fitted_words(fitted: Fitted) -> str:
 
 
 def set_words(members: Sequence[Fitted]) -> str:
-    """Sentence with the answer: one place, or the set of places that these data cannot distinguish."""
+    """Sentence with the result: one place, or the set of places that these data cannot distinguish."""
     keys = list(dict.fromkeys(member.candidate.key for member in members))
     if len(keys) == 1:
         return fitted_words(members[0])
@@ -48,7 +49,7 @@ def set_words(members: Sequence[Fitted]) -> str:
 
 
 def body_places(evidence: BodyEvidence, answers: PlaceAnswers) -> tuple[Place, ...]:
-    """Find the ranges of input in which a body's pose cannot be noise, the most significant one for each channel."""
+    """Find the ranges of input in which a body's pose deviates significantly, the most significant for each channel."""
     prediction, findings = evidence.prediction, evidence.findings
     u, kept = prediction.input_mm, findings.noise.kept
     found = []

@@ -1,1 +1,1 @@
-"""Design of the next run: the experiment that best separates the explanations still possible."""
+"""Design of the next run: the experiment that best separates the remaining explanations."""

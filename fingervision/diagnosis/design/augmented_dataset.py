@@ -1,4 +1,4 @@
-"""The measured data with a simulated further run appended, as one estimation problem."""
+"""Measured data with a simulated further run appended, as one estimation problem."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,11 +14,11 @@ from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.model import PhysicalModel
 
 PAUSE_S = 30.0
-"""Time between the data and the run: starting, saving."""
+"""Time between the data and the appended run, for saving and starting."""
 AT_END = 1e-3
-"""Share of its range within which a parameter lies at the end; a stop a hundredth inside it was seen."""
+"""Distance from an end of its range, as a share of the range, within which a parameter counts as lying at the end."""
 REFITTED = 8
-"""Steps of a refit."""
+"""Iterations of a refit."""
 Settings = Mapping[str, Mapping[str, float]]
 
 
@@ -31,11 +31,11 @@ class AugmentedDataset:
     first : Problem
         The data.
     both : Problem
-        The data and the run; its `measured` means nothing.
+        Estimation problem for data and run together; its `measured` is a placeholder.
     data_mm : ndarray of float, shape (channels * n,)
-        What was measured, as an explanation's prediction is fitted to it.
+        The measured values in the form in which predictions are fitted to them.
     channels : int
-        Gap, then midline and force where they were measured.
+        Number of channels: the gap, then midline and force if measured.
     """
 
     first: Problem
@@ -45,7 +45,7 @@ class AugmentedDataset:
 
     @classmethod
     def of(cls, data: Observations, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "AugmentedDataset":
-        """Append a run to the data: same noise, later on the same clock; the stage may be re-zeroed before it."""
+        """Append a run with the same noise, later on the same clock; the stage may be re-zeroed before the run."""
         old = data.chain.history
         n, more = old.input_mm.size, input_mm.size
         time = float(old.times.max()) + PAUSE_S + old.sample_time_s * np.arange(more)
@@ -86,7 +86,7 @@ class AugmentedDataset:
         return self.both.chain.history.input_mm[self.first.chain.history.input_mm.size :]
 
     def moved(self, names: tuple[str, ...], values: Settings) -> Point:
-        """Values for both runs together: a stop that was not seen lies at the end of the range, also of a wider one."""
+        """Parameter values for data and run together; an end stop outside the data's range is placed outside both."""
         out: Point = {name: dict(values[name]) for name in names}
         before = {(name, parameter.name): parameter for name, parameter in self.first.parameters(names)}
         for name, now in self.both.parameters(names):
@@ -110,13 +110,13 @@ class AugmentedDataset:
         sigma_mm: tuple[float, ...] | None = None,
         iterations: int = REFITTED,
     ) -> float:
-        """D_jk with both runs: squared whitened distance of a prediction from the refitted rival."""
+        """Squared whitened distance D_jk, over both runs, between a true prediction and the refitted rival."""
         target = self.both.whitened(self.moved(tuple(truth), truth))
         start = self.moved(rival.names, rival.values)
         return fit(self.both, rival.names, start, target=target, sigma_mm=sigma_mm, iterations=iterations).score
 
     def expected(self, truth: Settings) -> Array:
-        """The data as measured, followed by the noiseless prediction for the appended run; whitened."""
+        """Whitened target: the measured data, followed by the noise-free prediction for the appended run."""
         shown = self.both.chain.stacked(self.moved(tuple(truth), truth)).reshape(self.channels, -1)
         new = shown[:, self.data_mm.size // self.channels :]
         return self.both.whitener.one(_behind(self.data_mm, new.ravel(), self.channels))
@@ -124,9 +124,9 @@ class AugmentedDataset:
     def score(
         self, target: Array, explanation: Explanation, starts: Sequence[Settings], sigma_mm: tuple[float, ...] | None
     ) -> float:
-        """Chi-square of an explanation refitted to a target, the best of several searches.
+        """Chi-square of an explanation refitted to a target, the smallest from several starting points.
 
-        Run offsets as in `distance`.
+        Run offsets are treated as in `distance`.
         """
         names = explanation.names
         begins = [self.moved(names, start) for start in starts]
@@ -137,7 +137,7 @@ class AugmentedDataset:
 
 
 def _behind(old: Array, new: Array, channels: int) -> Array:
-    """Append the channels of a run to those of the data; both stacked, shape (channels * n,)."""
+    """Append the channels of the run to those of the data; both stacked, shape (channels * n,)."""
     return np.concatenate([old.reshape(channels, -1), new.reshape(channels, -1)], axis=1).ravel()
 
 

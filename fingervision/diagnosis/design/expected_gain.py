@@ -1,4 +1,4 @@
-"""Expected discrimination of a run: the chi-square by which it will separate two explanations."""
+"""Expected discrimination of a run: the chi-square by which it is expected to separate two explanations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,29 +13,30 @@ from fingervision.diagnosis.noise.noise_posterior import problems_of_drawn_noise
 from fingervision.domain.effect import Array
 
 TRUTHS = 16
-"""Draws of either explanation's parameters, each with a noise of its own."""
+"""Number of draws from each explanation's posterior, each with its own noise."""
 MANY_SAMPLES, FEW_TRUTHS = 6000, 4
-"""Samples above which so few draws of the posterior are followed: a long table leaves little open."""
+"""Number of samples above which fewer draws of the posterior are simulated, because a long table leaves little
+uncertainty."""
 FURTHER = 2
-"""Further starts of a rival's refit: one search may stand still beside the place where it imitates the truth."""
+"""Number of additional starting points of a rival's refit: a single search may end in a local minimum."""
 NOISES = 4000
-"""Draws of what the run's noise adds."""
+"""Number of draws of the run's noise."""
 PROMISED = 0.95
-"""Probability that the stated interval of a gain holds what comes."""
+"""Coverage probability of the stated interval of a gain."""
 REZEROED = 0.5
-"""Chance that the run is offset against the data."""
+"""Prior probability that the run has an offset relative to the data."""
 KEPT = (0.7, 1.3)
-"""Gain that came over the gain that was promised, where a promise is kept."""
+"""Range of (actual gain / predicted gain) in which a prediction counts as fulfilled."""
 MODERATE, SURELY = 75.0, 0.8
-"""A larger promise is sound only where it is as likely as this to be kept."""
+"""Gain above which a prediction counts as sound only if it is fulfilled with at least this probability."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExpectedGain:
     """Predicted chi-square gain of a run: its most probable value, an interval, and the probability of that value.
 
-    Either explanation may be true, and the two often predict different gains; their median would lie between the two,
-    where hardly any gain occurs. `modest` is the most probable gain below `MODERATE`.
+    Either explanation may be true, and the two often lead to different gains; the median of all draws would lie between
+    these two, where hardly any gain occurs. `modest` is the most probable gain below `MODERATE`.
     """
 
     gain: float
@@ -74,17 +75,17 @@ def expected_gain(
     Parameters
     ----------
     data, problem : Observations, Problem
-        The data.
+        The measured data and their estimation problem.
     input_mm : ndarray of float, shape (k,)
-        The run.
+        Input of the run.
     pair : tuple of Explanation
-        What is to be told apart.
+        The two explanations to be distinguished.
     odds : tuple of float
-        How likely either is by the data; together 1.
+        Posterior probabilities of the two explanations, with sum 1.
     found : tuple of sequences of dict
-        Draws of either one's parameters.
+        Posterior draws of the parameters of each explanation.
     rng : numpy Generator
-        For the noise.
+        Generator of the noise.
     rezeroed : bool
         Whether the stage is re-zeroed before the run.
     """
@@ -112,9 +113,9 @@ def expected_gain(
 
 
 def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
-    """The gain, below a limit, near which most draws lie, and their fraction.
+    """The gain, below a limit, near which most draws lie, and the share of draws near it.
 
-    The median where no draw is below the limit.
+    If no draw is below the limit, the gain is the median.
     """
     come = np.sort(come)
     named = come[(come > 0.0) & (come < below)]
@@ -126,11 +127,11 @@ def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
 
 
 def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:
-    """Draw the spread of the runs' offsets, one per channel; from its prior where there is only one run.
+    """Draw the spread of the runs' offsets for each channel; from its prior if there is only one run.
 
     The prior is zero in half of the draws, because the stage need not be re-zeroed before the run, and otherwise the
     half-Cauchy prior with which a diagnosis of both runs judges the offsets (`RunOffsets.spread`). With several runs,
-    the spread is drawn from what they show.
+    the spread is drawn from its posterior.
     """
     if problem.offsets.runs > 1:
         return problem.offsets.drawn_spread(problem.measured - problem.whitened(explanation.values), rng)
@@ -141,7 +142,7 @@ def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generato
 def _score(problem: Problem, explanation: Explanation, sigma_mm: tuple[float, ...] | None) -> float:
     """Chi-square of an explanation refitted to the data alone.
 
-    Run offsets with their own fitted spread unless one is given.
+    The spread of the run offsets is fitted unless one is given.
     """
     sigma = explanation.sigma_mm if sigma_mm is None else sigma_mm
     return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED).score

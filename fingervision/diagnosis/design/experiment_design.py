@@ -1,4 +1,4 @@
-"""Choose the next run: the protocol that separates most pairs of explanations per minute on the bench."""
+"""Choose the next run: the protocol that separates most pairs of explanations per minute of experiment time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,39 +24,43 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
 
 REZERO_MIN = 1.5
-"""Minutes that re-zeroing takes."""
+"""Duration of re-zeroing the stage, in minutes."""
 MOST_MIN, MOST_SAMPLES = 8.0, 6000
-"""A run of more would be another experiment."""
+"""Longest run, in minutes and samples; a longer one would be another experiment."""
 NEEDED, BARELY = 30.0, 20.0
-"""Gain that settles a pair: 9, and what noise and the parameters' uncertainty take of it; and what will just do."""
+"""Predicted gain needed to decide a pair (9, plus an allowance for noise and parameter uncertainty), and the gain that
+is just sufficient."""
 MOST_TRUTHS, MOST_RIVALS = 4, 8
-"""Likeliest members taken for the truth, and rivals of each: more cost time and hardly ever decide a run."""
+"""Most members that are in turn taken as the truth, and rivals of each: more cost time and hardly ever change the
+choice."""
 COMPARED = 6
-"""Pairs among which the one is sought that gains least."""
+"""Number of pairs among which the smallest gain is searched."""
 WITHIN = 1.5
-"""A pair is told apart within a run where known offsets of the runs would raise the gain by no more than this."""
+"""A pair counts as separated within the run if knowledge of the runs' offsets would increase the gain by no more than
+this factor."""
 LIKELY = 0.02
-"""Odds to the likeliest explanation above which another may be the truth that the run is chosen for."""
+"""Probability relative to the most probable explanation above which another may be taken as the truth."""
 SCREENED = 4
-"""Steps of a rival's refit where many runs are compared."""
+"""Iterations of a rival's refit while many runs are compared."""
 SMALLER = ((0.65, SAMPLES_A_STROKE), (0.4, SAMPLES_A_STROKE), (0.65, 6), (0.4, 6), (0.25, 6), (0.12, 6))
-"""Shares of the range, and samples that a stroke has at least, that are tried one after the other."""
+"""Reduced runs that are tried in order: shares of the range, and least number of samples per stroke."""
 ALIKE = 0.03
-"""Difference in what is settled below which another run will do as well."""
+"""Difference in the share of decided pairs below which two runs count as equally good."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSet:
-    """The explanations that the data cannot distinguish.
+    """Explanations that the data cannot distinguish.
 
     Parameters
     ----------
     members : list of Explanation
-        The leading one first.
+        Explanations, the best one first.
     odds : ndarray of float, shape (members,)
-        How likely each is by the data; together 1.
+        Posterior probability of each explanation, with sum 1.
     before : ndarray of float, shape (truths, members)
-        Distance of each truth's prediction to each member as it is; the truths are the first members.
+        Distance between each assumed truth's prediction and each member for the present data; the assumed truths are
+        the first members.
     """
 
     members: list[Explanation]
@@ -82,7 +86,7 @@ class RunPlan:
 
     @property
     def uneven(self) -> float:
-        """Largest ratio of the gains of a pair when one or the other of the two is true.
+        """Largest ratio of a pair's two gains (one or the other explanation true).
 
         The larger this ratio, the wider the interval of the predicted gain.
         """
@@ -90,7 +94,7 @@ class RunPlan:
         return float(np.max(np.maximum(ahead / back, back / ahead), initial=1.0))
 
     def apart(self, j: int, k: int) -> float:
-        """Gain between two members, the first an assumed truth; the smaller one if either may be true."""
+        """Gain between two members, the first an assumed truth; the smaller gain if either may be true."""
         back = self.gains[k, j] if k < len(self.gains) else np.inf
         return float(min(self.gains[j, k], back))
 
@@ -101,7 +105,7 @@ class RunPlan:
         return sorted(found, key=lambda pair: self.apart(*pair))
 
     def worst(self, floor: float) -> float:
-        """Smallest separation among the pairs that the run separates; None if it separates none."""
+        """Smallest separation that is at least `floor`; 0 if there is none."""
         settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
         return float(settled.min()) if settled.size else 0.0
 
@@ -120,7 +124,7 @@ class RunChoice:
         return self.data.chain.history.sample_time_s
 
     def planned(self, name: str, steps: list[Step], iterations: int, times: int = 1) -> RunPlan | None:
-        """Evaluate a run; None where it takes too long."""
+        """Evaluate a run; return None if it takes too long."""
         history = self.data.chain.history
         inputs = driven(steps, self.step_s, rounding_s(self.data.table.input_mm, self.step_s, history.runs))
         if inputs.size > MOST_SAMPLES:
@@ -137,13 +141,13 @@ class RunChoice:
         return RunPlan(name, steps, times, inputs, gains, minutes)
 
     def settled(self, gains: Array, needed: float = NEEDED) -> float:
-        """Fraction of the open pairs that given gains decide, each assumed truth weighted by its odds."""
+        """Share of the open pairs that given gains decide, with each assumed truth weighted by its probability."""
         part = np.where(np.isfinite(gains), np.minimum(gains / needed, 1.0), 0.0)
         odds = self.open.odds[: self.open.truths]
         return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))
 
     def shown(self, run: RunPlan, second: AugmentedDataset, j: int, k: int) -> float:
-        """Expected gain between two members if the more probable one is true and no run has an offset."""
+        """Expected gain between two members, if the more probable is true and the runs have no offsets."""
         if REZERO in run.steps:
             return run.apart(j, k)
         true, other = (j, k) if self.open.odds[j] >= self.open.odds[k] or k >= self.open.truths else (k, j)
@@ -151,10 +155,10 @@ class RunChoice:
         return second.distance(truth.values, rival, sigma_mm=rival.sigma_mm) - float(self.open.before[true, other])
 
     def least(self, run: RunPlan) -> tuple[float, tuple[int, int]] | None:
-        """The separated pair with the smallest gain, and that gain; None without any.
+        """The separated pair with the smallest gain, and this gain; None if no pair is separated.
 
-        Pairs separated within the run come first, because a separation by the run's offset against the data may be
-        mistaken for a re-zeroing.
+        Pairs that are separated within the run come first, because a separation by an offset between run and data could
+        also be due to re-zeroing.
         """
         second = AugmentedDataset.of(self.data, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
         found = [(self.shown(run, second, *pair), pair) for pair in run.pairs()[:COMPARED]]
@@ -162,7 +166,7 @@ class RunChoice:
         return min(within or found, default=None)
 
     def best(self, ends: tuple[float, float]) -> RunPlan | None:
-        """Choose the protocol, and its number of repetitions, that decides most pairs; of equal ones the cheapest."""
+        """Choose protocol and number of repetitions that decide most pairs; among equally good ones, the shortest."""
         found: list[tuple[float, float, int, RunPlan]] = []
         for name, steps in protocols(*ends, self.step_s):
             once = self.planned(name, steps, SCREENED)
@@ -178,10 +182,10 @@ class RunChoice:
         return self.planned(once.name, repeated(once.steps, times), REFITTED, times)
 
     def smaller(self, plan: RunPlan) -> Iterator[RunPlan]:
-        """Reduce repetitions, then range and samples, as long as the run still decides the same pairs.
+        """Reduce repetitions, then range and number of samples, as long as the run decides the same pairs.
 
-        Small motions spare the gripper, and any further gain of a large one depends more on the explanations' formulas
-        than on what was measured.
+        Small motions spare the gripper, and the additional gain of a large motion depends more on the explanations'
+        formulas than on the measured data.
         """
         low, high = float(plan.input_mm.min()), float(plan.input_mm.max())
         half, middle = 0.5 * (high - low), 0.5 * (low + high)

@@ -1,7 +1,7 @@
-"""Evidence other than stage motion that distinguishes explanations: one sentence of advice per pair.
+"""Other evidence than stage motion that distinguishes explanations: one sentence of advice per pair of effects.
 
-Each effect states in which checks it is visible and in which it is not; a check distinguishes two effects that differ
-in this.
+Each effect states in which checks it is visible and in which it is not; a check distinguishes two effects if only one
+of them is visible in it.
 """
 
 from fingervision.diagnosis.inference.hypothesis import Explanation
@@ -10,12 +10,12 @@ from fingervision.effects import catalogue
 
 
 def further_evidence(alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
-    """Advise what else would distinguish explanations that differ by one effect each; one sentence per pair of effects.
+    """Advise how to distinguish explanations that differ by one effect each; one sentence per pair of effects.
 
     Parameters
     ----------
     alternatives : tuple of Explanation
-        What the data cannot tell apart.
+        Explanations that the data cannot distinguish.
     """
     found: dict[tuple[frozenset[str], FurtherCheck], None] = {}
     for one in alternatives:

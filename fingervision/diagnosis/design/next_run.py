@@ -19,24 +19,24 @@ def next_run(
     found: tuple[Point, ...],
     rng: np.random.Generator,
 ) -> NextRun | None:
-    """Choose the run that decides most of the open pairs in the least bench time.
+    """Choose the run that decides most of the open pairs in the least experiment time.
 
-    Runs within the measured range are tried first: beyond it an explanation's formula is not verified, and neither is a
-    gain that depends on it. The stated gain is that of the pair that the run separates least.
+    Runs within the measured range are tried first: outside it an explanation's formula is not verified, so that a
+    predicted gain is not reliable. The stated gain is that of the pair that the run separates least.
 
     Parameters
     ----------
     members : list of Explanation
-        What this data cannot tell apart, the leading one first.
+        Explanations that the data cannot distinguish, the best one first.
     found : tuple of dict
-        Draws of the leading one's parameters.
+        Posterior draws of the best explanation's parameters.
     rng : numpy Generator
-        For the promise's interval.
+        Generator for the interval of the predicted gain.
 
     Returns
     -------
     NextRun or None
-        None where nothing is open, or nothing that can be driven would separate it.
+        None if there is nothing to decide, or no possible run would separate the explanations.
     """
     if len(members) < 2:
         return None
@@ -55,7 +55,7 @@ def next_run(
 def _promised(
     choose: RunChoice, plan: RunPlan, members: list[Explanation], found: tuple[Point, ...], rng: np.random.Generator
 ) -> NextRun | None:
-    """Predict the gain of a run, and reduce the run where so large a predicted gain would be unreliable."""
+    """Predict the gain of a run, and reduce the run if a large predicted gain would be unreliable."""
     listed, odds = choose.open.members, choose.open.odds
     walks: dict[int, tuple[Point, ...]] = {0: found}
 

@@ -1,4 +1,4 @@
-"""Runs that a test bed can execute to distinguish explanations, as steps of a recipe and as samples of the input."""
+"""Runs that a test bed can execute to distinguish explanations, as steps of a recipe and as input samples."""
 
 import numpy as np
 
@@ -7,13 +7,14 @@ from fingervision.domain.effect import Array
 Step = dict[str, object]
 REZERO: Step = {"kind": "rezero"}
 EDGE = 0.03
-"""Share of the range that is left free at either end: an offset or a scale must not drive the stage beyond it."""
+"""Share of the range left free at either end, because an offset or scale error must not drive the stage beyond it."""
 ORDINARY_S, MOST_S = 0.3, 2.0
-"""Time of a reversal: of an ordinary stage, and at most."""
+"""Duration of a reversal for an ordinary stage, and its largest value."""
 FINE = 8
-"""Steps a sample in which a motion is put together."""
+"""Steps per sample when a motion is composed."""
 SAMPLES_A_STROKE = 15
-"""A stroke of fewer samples would be told from another by its corners alone, which no stage drives as drawn."""
+"""Least number of samples in a stroke: shorter strokes would differ mainly in their corners, which no stage executes
+exactly."""
 
 
 def _number(step: Step, key: str) -> float:
@@ -56,8 +57,8 @@ def _driven(step: Step, start: float, step_s: float) -> Array:
 def rounding_s(input_mm: Array, step_s: float, runs: tuple[slice, ...]) -> float:
     """Time that the stage takes to reverse (s), from the sharpest reversal in a record.
 
-    A reversal from speed v spread over T seconds has the acceleration 2 v / T. A record without reversals gives no
-    information; then the value of an ordinary stage, a third of a second, is used.
+    A reversal from speed v spread over T seconds has the acceleration 2 v / T. For a record without reversals the value
+    of an ordinary stage, a third of a second, is used.
     """
     speeds = np.concatenate([np.diff(input_mm[run]) for run in runs]) / step_s
     bends = np.concatenate([np.abs(np.diff(input_mm[run], 2)) for run in runs]) / step_s**2
@@ -73,7 +74,7 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
     Parameters
     ----------
     steps : list of dict
-        Triangles, staircases, moves and holds; a re-zeroing takes no sample.
+        Triangles, staircases, moves and holds; a re-zeroing has no samples.
     step_s : float
         Time between samples.
     round_s : float
@@ -96,16 +97,16 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
 
 
 def measured_ends(input_mm: Array, within_mm: tuple[float, float]) -> tuple[float, float]:
-    """The measured range, extended so that a run begins or turns at the stage's zero where that is near.
+    """The measured range, extended so that a run starts or reverses at the stage's zero if that is near.
 
-    After a motion of only one or two encoder steps the position is poorly known.
+    A stage position only one or two encoder steps from zero would be poorly known.
 
     Parameters
     ----------
     input_mm : ndarray of float, shape (n,)
-        What was measured.
+        Measured input.
     within_mm : tuple of float
-        What the model covers.
+        Range of inputs that the model covers.
     """
     low, high = float(input_mm.min()), float(input_mm.max())
     free = EDGE * (high - low)
@@ -117,7 +118,7 @@ def measured_ends(input_mm: Array, within_mm: tuple[float, float]) -> tuple[floa
 
 
 def repeated(steps: list[Step], times: int) -> list[Step]:
-    """Repeat a protocol within one run: triangles by more cycles, any other from its beginning."""
+    """Repeat a protocol within one run: triangles by more cycles, other protocols from their start."""
     if all(step["kind"] in ("triangle", "rezero") for step in steps):
         return [
             {**step, "cycles": times * int(_number(step, "cycles"))} if "cycles" in step else step for step in steps
@@ -135,9 +136,9 @@ def protocols(
     low_mm, high_mm : float
         Range of the input.
     step_s : float
-        Time between samples: no stroke is faster than they can follow.
+        Time between samples; it limits the speed of strokes.
     stroke_samples : int
-        Samples that a stroke has at least.
+        Least number of samples in a stroke.
     """
     span = high_mm - low_mm
     low, high = round(low_mm + EDGE * span, 4), round(high_mm - EDGE * span, 4)

@@ -1,4 +1,4 @@
-"""Next steps that need no other motion: re-zeroing the stage, or a slot of known width in front of the camera."""
+"""Next steps without another motion: re-zeroing the stage, or a slot of known width in front of the camera."""
 
 import numpy as np
 
@@ -14,13 +14,14 @@ from fingervision.effects import that_show
 WORTH = 9.0
 """Gain in chi-square above which two explanations count as separated."""
 UNTIMED_S = 0.1
-"""Time between samples of a run after a table that has no times."""
+"""Assumed time between samples of a run, if the table has no times."""
 SLOT_FRAMES, SLOT_U_MM = 10, 0.002
-"""Frames averaged on a reference slot, and the standard uncertainty of its width: an ordinary gauge block's."""
+"""Number of frames averaged on a reference slot, and standard uncertainty of the slot's width: that of an ordinary
+gauge block."""
 
 
 def static_check(data: Observations, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
-    """Propose a check without other motion, for the first rival that it separates.
+    """Propose a check without another motion, for the first rival that it separates from the best explanation.
 
     Without times no motion can be evaluated for effects with memory, and re-zeroing is proposed here; with times it is
     one of the protocols.
@@ -39,7 +40,7 @@ def _one_shows(check: FurtherCheck, pair: tuple[Explanation, Explanation]) -> bo
 
 
 def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
-    """Re-zero the stage: an offset of the input disappears, an offset of the gap remains."""
+    """Propose re-zeroing the stage: an offset of the input disappears, an offset of the gap remains."""
     zeroed = that_show(FurtherCheck.REZERO)
     offset = next(e for e in pair if not set(e.names).isdisjoint(zeroed))
     history, offsets = data.chain.history, problem.offsets
@@ -57,7 +58,7 @@ def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Exp
 
 
 def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
-    """Measure a slot of known width: a camera error changes gap and slot, a gripper error only the gap."""
+    """Propose a slot of known width: a camera error changes gap and slot, a gripper error only the gap."""
     slot = np.full(1, round(data.chain.history.rest_gap_mm, 1))
     response = Response(-0.5 * slot, 0.5 * slot)
     for name in that_show(FurtherCheck.SLOT):
@@ -74,7 +75,7 @@ def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explana
 def _still(
     name: str, steps: list[Step], size: float, spread: float, pair: tuple[Explanation, Explanation]
 ) -> NextRun | None:
-    """Proposal whose result is one number with uncertainty `spread`, which no parameter of the rival can match."""
+    """Proposal whose result is one number with uncertainty `spread`, which no parameter of the rival can reproduce."""
     gain = (size / spread) ** 2
     if gain <= WORTH:
         return None

@@ -1,1 +1,1 @@
-"""From a whitened residual to a verdict: hypothesis fits, significance, ambiguity set, model adequacy."""
+"""Inference: hypothesis fits, significance, ambiguity set and model adequacy, which lead to the verdict."""

@@ -9,21 +9,24 @@ from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 
 INDISTINGUISHABLE = 12.0
-"""Chi-square below which two explanations are not told apart. What is 4 from the truth must be told, and the estimate
-from which it is measured stands off the truth itself, by a standard deviation and a half: (sqrt(4) + 1.5)^2."""
+"""Chi-square below which two explanations count as indistinguishable. A distance of 4 from the truth must be detected,
+and the estimate from which the distance is measured itself deviates from the truth by 1.5 standard deviations: (sqrt(4)
++ 1.5)^2."""
 FREEDOM = 4.0
-"""Degrees of freedom of Student's t for the physical priors: a typical size is itself known roughly only, so that far
-beyond it surprise grows slowly (Lange, Little & Taylor 1989)."""
+"""Degrees of freedom of Student's t distribution for the physical priors: typical sizes are known only roughly, so that
+the penalty grows slowly far beyond them (Lange, Little & Taylor 1989)."""
 SURELY = 2.05
-"""Standard deviations: what is true is lost in one table of fifty."""
+"""Standard deviations: the true explanation is lost in one table of fifty."""
 SPARE = 3.0
-"""Chi-square that the best explanation takes from the noise beyond what the truth would."""
+"""Chi-square that the best explanation gains from the noise in excess of the true explanation."""
 ADMISSIBLE = 15.0
-"""Chi-square by which one that is 4 away from the truth comes out worse at most: 4 + SURELY * 2 * sqrt(4) + SPARE."""
+"""Largest chi-square by which an explanation at distance 4 from the truth is worse than the best: 4 + SURELY * 2 *
+sqrt(4) + SPARE."""
 IDLE_SHARE = 0.3
-"""Of what the best explanation gains: what gains less explains nothing."""
+"""Share of the best explanation's gain below which another explanation counts as explaining nothing."""
 PLAIN = 50.0
-"""Chi-square beyond which a richer form has shown itself, however little that is of all that is explained."""
+"""Gain in chi-square above which a richer formula is considered proven, even if it is a small share of the explained
+part."""
 
 
 def ambiguity_set(
@@ -76,15 +79,16 @@ def ambiguity_set(
 
 
 def _net(nothing: Explanation, explanation: Explanation) -> float:
-    """Gain in chi-square beyond what its free parameters gain from noise."""
+    """Gain in chi-square over the model without effects, minus the gain expected from noise for its free parameters."""
     return nothing.score - explanation.score - 2.0 * explanation.free
 
 
 def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
-    """Whether the best may lead only because its richer formula contains the other's prediction.
+    """Whether the best explanation may lead only because its richer formula contains the other's prediction.
 
-    The formula of a delay is inexact where the stage turns between two samples, and a well-damped resonance rounds
-    corners as well. Formulas deviate by about that much; a larger lead is counted as evidence for the richer one.
+    An example is a delay and a well-damped resonance, both of which round corners: the formula of a delay is inexact
+    where the stage reverses between two samples. A lead of this size is attributed to the inexact formula; a larger
+    lead counts as evidence for the richer formula.
     """
     worse = other.score - best.score
     return (
@@ -96,28 +100,30 @@ def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, oth
 
 
 def _least_refuted(distance: float) -> float:
-    """Chi-square by which an explanation must be worse than another before the data refute it.
+    """Difference in chi-square above which an explanation counts as rejected in favour of another.
 
-    If it is true, the other leaves `distance` more than it, with a standard deviation of 2 sqrt(distance) (Cox 1961).
-    Two explanations that such data could distinguish are both kept if these data favour neither.
+    If an explanation is true, the other's chi-square is larger by `distance` on average, with a standard deviation of 2
+    sqrt(distance) (Cox 1961). Two explanations that such data could distinguish are both kept if the present data
+    favour neither.
     """
-    return -distance + SURELY * 2.0 * float(np.sqrt(distance)) + SPARE
+    return -distance + SURELY * 2.0 * float(np.sqrt(max(0.0, distance))) + SPARE
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
-    """Fit one explanation to the prediction of another; the score is D_jk, the remaining squared whitened distance.
+    """Fit one explanation to another's prediction; its score is D_jk, the remaining squared whitened distance.
 
-    In both directions run offsets have the spread of the best explanation, because a worse one would hide its misfit in
-    them.
+    In both directions the run offsets have the spread found for the best explanation, because a worse explanation would
+    hide its misfit in a larger spread.
     """
     target = problem.whitened(truth.values)
     return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12)
 
 
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
-    """Drop what only imitates an effect predicted by the drawing and found as predicted: that would be a coincidence.
+    """Drop explanations that only imitate an effect predicted by the drawing and found as predicted.
 
-    Example: an end stop at exactly the input at which the drawn fingers meet is the drawn fingers' contact.
+    The agreement would otherwise be a coincidence. For example, an end stop at exactly the input at which the drawn
+    fingers meet is the contact of these fingers.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:
@@ -137,15 +143,15 @@ def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explan
 
 
 def odds(problem: Problem, explanation: Explanation, rows: int) -> float:
-    """-2 log of the posterior odds: BIC, prior density of the parameters, and prior of the number of alternatives."""
+    """-2 log of the posterior odds: BIC, prior density of the parameters, and prior for the number of alternatives."""
     return explanation.bic(rows) + surprise(problem, explanation) + choices(problem, explanation)
 
 
 def choices(problem: Problem, explanation: Explanation) -> float:
     """-2 log of the prior probability of one explanation among all with the same number of effects.
 
-    There are so many more pairs than single effects that some pair fits well by chance; all numbers of effects have
-    equal prior probability (extended BIC, Chen & Chen 2008).
+    There are many more pairs than single effects, so that some pair fits well by chance; therefore each number of
+    effects has the same total prior probability (extended BIC, Chen & Chen 2008).
     """
     return 2.0 * float(np.log(comb(len(problem.effects), len(explanation.names))))
 

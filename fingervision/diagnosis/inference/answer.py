@@ -1,4 +1,4 @@
-"""Judge the result of a search by the fraction of the disagreement that it explains."""
+"""Assess the result of a search by the share of the disagreement that it explains."""
 
 from dataclasses import dataclass, replace
 
@@ -14,18 +14,18 @@ from fingervision.domain.effect import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """The result of a search, with the residual that remains.
+    """Result of a search, with its residual.
 
     Parameters
     ----------
     data : Observations
         Measurement and model.
     found : Findings
-        Of the search.
+        Findings of the search.
     before_mm, after_mm : ndarray of float, shape (channels * n,)
-        Measured minus predicted, without and with the answer.
+        Measured minus predicted values, without and with the explanation found.
     stands : Standing
-        How much of the disagreement the answer leaves.
+        Share of the disagreement that remains.
     """
 
     data: Observations
@@ -35,19 +35,19 @@ class Answer:
     stands: Standing
 
     def values(self) -> Settings:
-        """Parameters of all that was found: of the effects, and of the map's curve."""
+        """Parameters of everything that was found: the effects, and the curve of a position map."""
         return _values(self.data, self.found)
 
 
 def judged(data: Observations, found: Findings) -> Answer:
-    """Compare the result with the disagreement; names that increase the disagreement are withdrawn.
+    """Compare the result with the disagreement; effects that increase the disagreement are withdrawn.
 
     Parameters
     ----------
     data : Observations
         Measurement and model.
     found : Findings
-        Of the search.
+        Findings of the search.
     """
     before = data.stacked_mm - data.chain.stacked({})
     after = data.stacked_mm - data.chain.stacked(_values(data, found))
@@ -64,21 +64,21 @@ def judged(data: Observations, found: Findings) -> Answer:
 
 
 def without_names(data: Observations, found: Findings, unknown: str | None) -> tuple[Observations, Findings]:
-    """Withdraw every name, including that of the map.
+    """Withdraw all named effects, including a position map.
 
     Parameters
     ----------
     data, found
-        Measurement and what the search found.
+        Measurement, and findings of the search.
     unknown : str or None
-        Why no name is given.
+        Reason why no effect is named.
     """
     nothing = replace(found, best=found.problem.nothing(), alternatives=(), unknown=unknown)
     return replace(data, position_map=None, run_gains=None), nothing
 
 
 def _values(data: Observations, found: Findings) -> Settings:
-    """Parameters of all that was found: of the effects, and of the map's curve."""
+    """Parameters of everything that was found: the effects, and the curve of a position map."""
     if data.position_map is None:
         return found.best.values
     return {**found.best.values, NAME: data.position_map.values()}

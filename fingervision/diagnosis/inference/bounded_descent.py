@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 from fingervision.domain.effect import Array
 
 AT_BOUND = 1e-6
-"""Share of a parameter's range within which it lies at its bound: rounding of the search."""
+"""Distance from a bound, as a share of the parameter's range, within which a parameter counts as lying at the bound."""
 TRIALS = 5
-"""Dampings that are tried in one step, each eight times the one before: the last is a step along the gradient."""
+"""Number of damping values tried in one iteration, each eight times the one before: the last gives a step along the
+gradient."""
 SMALLEST_GAIN, SMALLEST_GAIN_SHARE = 0.02, 1e-5
-"""A step that lowers chi-square by less ends the search: a hundredth of a standard deviation changes no answer."""
+"""Smallest reduction of chi-square, absolute and relative, for which the search continues: less changes parameters by
+under a hundredth of a standard deviation."""
 
 
 class LeastSquares(Protocol):
-    """Protocol of what is minimised: a weighted sum of squares whose weights may depend on the residual."""
+    """Protocol of a function to be minimised: a weighted sum of squares whose weights may depend on the residual."""
 
     def residual(self, x: Array) -> Array:
         """Target minus prediction, shape (m,), at parameters of shape (p,)."""
@@ -29,7 +31,7 @@ class LeastSquares(Protocol):
         """Normal matrix, shape (p, p), and gradient of the sum of squares, shape (p,)."""
 
     def reweighted(self, residual: Array) -> Self:
-        """Choose the weights that suit a residual."""
+        """Return the function with weights chosen for a residual."""
 
 
 Weighted = TypeVar("Weighted", bound=LeastSquares)
@@ -42,17 +44,17 @@ class Descent(Generic[Weighted]):
     Parameters
     ----------
     squares : LeastSquares
-        What was minimised, with its last weights.
+        The minimised function, with its last weights.
     x : ndarray of float, shape (p,)
         Parameters.
     residual : ndarray of float, shape (m,)
-        With them.
+        Residual at these parameters.
     cost : float
         Weighted sum of squares.
     normal : ndarray of float, shape (p, p)
         Normal matrix of the last step.
     free : ndarray of bool, shape (p,)
-        Parameters that no bound holds.
+        Parameters that are not at a bound.
     """
 
     squares: Weighted
@@ -72,16 +74,16 @@ class Descent(Generic[Weighted]):
 
 
 def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterations: int) -> Descent[Weighted]:
-    """Reduce a sum of squares within bounds.
+    """Minimise a sum of squares within bounds.
 
     Parameters
     ----------
     squares : LeastSquares
-        What is minimised.
+        Function to be minimised.
     start, lower, upper : ndarray of float, shape (p,)
-        Where to begin, and the bounds.
+        Starting point and bounds.
     iterations : int
-        Steps at most.
+        Largest number of iterations.
     """
     x, damping = start, 1e-3
     residual = squares.residual(x)
@@ -117,17 +119,17 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
 def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Array:
     """Minimise a quadratic form within bounds, to the accuracy that a search step needs.
 
-    A parameter that would exceed its bound is fixed there and the others are solved again. If it were only clipped, the
-    others would keep values that suit a step which is not made.
+    A parameter that would exceed its bound is fixed at the bound, and the others are solved for again. If it were only
+    clipped, the others would keep values that belong to a step that is not taken.
 
     Parameters
     ----------
     matrix : ndarray of float, shape (p, p)
         Half the second derivatives.
     pull : ndarray of float, shape (p,)
-        Half the downward slope.
+        Half the negative gradient.
     bounds : tuple of ndarray of float, each of shape (p,)
-        Least and largest step of each parameter; they enclose zero.
+        Smallest and largest step of each parameter; the interval includes zero.
 
     Returns
     -------
@@ -153,14 +155,14 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
 
 
 def _free(x: Array, pull: Array, normal: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Which parameters may move: those that no bound blocks and that the data determine."""
+    """Which parameters are free: those that no bound blocks and that the data determine."""
     near = AT_BOUND * (upper - lower)
     held = ((x <= lower + near) & (pull <= 0.0)) | ((x >= upper - near) & (pull >= 0.0))
     return np.asarray(~held & (np.diag(normal) > 1e-12), dtype=bool)
 
 
 def _in_own_units(normal: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Scale the free part of the normal matrix so that each parameter is in units of its own precision.
+    """Scale the free part of the normal matrix so that each parameter is in units of its own standard error.
 
     Without scaling, a time constant in hours beside micrometres would make the matrix singular.
     """

@@ -1,4 +1,4 @@
-"""Cross-validation: residual on a run left out of the fit, and on the fitted runs."""
+"""Cross-validation: residual for a run left out of the fit, and for the fitted runs."""
 
 from dataclasses import replace
 
@@ -12,14 +12,14 @@ from fingervision.domain.effect import Array
 
 
 def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
-    """RMS over left and right where both exist, else over the gap; the constant of the midline removed (mm).
+    """RMS over left and right if both are measured, else over the gap; without the midline's constant (mm).
 
     Parameters
     ----------
     residual_mm : ndarray of float, shape (channels * samples,)
         Gap, then midline.
     samples : int
-        Rows of one channel.
+        Number of rows in one channel.
     edges : bool
         Whether the second channel is the midline.
     """
@@ -32,7 +32,7 @@ def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
 
 
 def left_out_rms_mm(data: Observations, problem: Problem, best: Explanation) -> tuple[float | None, float | None]:
-    """Leave each run out of the fit in turn and predict it; RMS before and after, None with one run."""
+    """Leave each run out of the fit in turn and predict it; RMS without and with effects, None for a single run."""
     history = data.chain.history
     n, channels = history.input_mm.size, len(data.channels)
     if len(history.runs) < 2:

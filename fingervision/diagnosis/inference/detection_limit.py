@@ -1,4 +1,4 @@
-"""Detection limit of each effect: the smallest size that these data would have shown."""
+"""Detection limit of each effect: the smallest size that would have been detected in these data."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.signatures import Signatures
 
 SEEN_SIGMAS = 1.645
-"""Standard deviations above the threshold: nineteen of twenty effects of that size are seen."""
+"""Standard deviations above the threshold at which nineteen of twenty effects are detected."""
 
 
 def detection_limits(

@@ -1,6 +1,6 @@
 """Candidate explanations of one to three effects: ranked by linear signatures, then refitted jointly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -15,25 +15,32 @@ from fingervision.domain.parameter import Parameter
 Progress = Callable[[float], None]
 SCANNED = 6
 """Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
+BEGINS = 4
+"""Signatures from which a single effect is fitted: time constants and widths have several valleys, seldom more."""
+REFINED = 8
+"""Extensions that are refitted thoroughly: what lies behind these after seven steps has never come out first."""
+PROMISE = 0.5
+"""Share of the asked gain that a signature must promise before its refit is tried: a refit between the shapes of the
+grid gains a fifth more at most (`REFIT_MARGIN`), along a valley of the effects before it seldom twice as much."""
 LEAST_GAIN = 4.0
-"""Chi-square that an effect's signature must take for a refit to be tried."""
+"""Least chi-square gain of an effect's signature for which a refit is tried."""
 FEW_ROWS = 0.1
-"""Share of the rows on which a stop or a contact acts that only the ends of strokes speak for; what acts on more is
-averaged over many roundings."""
+"""Share of the rows affected by an end stop or a contact below which only the ends of strokes give evidence for it;
+with more rows the encoder's rounding averages out."""
 ALIKE = 12.0
-"""Squared whitened distance within which two predictions are one, as in the ambiguity set."""
+"""Squared whitened distance below which two predictions count as equal, as in the ambiguity set."""
 STEPS_HIDDEN = 1.0
-"""Steps of the encoder within which an effect is not told from its roundings."""
+"""Encoder steps below which an effect is indistinguishable from rounding."""
 FINEST, COARSEST = 0.003, 0.02
-"""Relative distance of the sizes of a jump that are tried alone: two thousand at most, and no fewer than signatures."""
+"""Relative spacing of the sizes tried for a jump: at most two thousand sizes, and no fewer than signatures."""
 FINE_VALUES = 4_000_000
-"""Values that such predictions may have in all: 32 MB."""
+"""Largest number of values in all such predictions: 32 MB."""
 SWAPS_REFITTED = 24
-"""Partners refitted beside the halves of the best pair: each half has at most 26."""
+"""Number of partners refitted for each half of the best pair: each half has at most 26."""
 
 
-def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
-    """Fit each effect alone, from its four most promising signatures; best first."""
+def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins: int = BEGINS) -> list[Explanation]:
+    """Fit each effect alone, from its most promising signatures; best first."""
     nothing = problem.nothing()
     gain, coefficient = atoms.gains(nothing.residual, problem.offsets, problem.offsets.metric(nothing.sigma_mm))
     owner = np.array(atoms.names)
@@ -43,19 +50,19 @@ def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list
         if not mine.size:
             continue
         mine = mine[np.argsort(-gain[mine])]
-        begins = [atoms.begin(k, coefficient[k]) for k in mine[:4]]
+        starts = [atoms.begin(k, coefficient[k]) for k in mine[:begins]]
         listed = [parameter for _, parameter in problem.parameters((name,)) if parameter.run is None]
         if len(listed) == 1 and listed[0].rugged and listed[0].logarithmic and 2.0 * gain[mine[0]] > np.max(gain):
             between = [{listed[0].name: value} for value in _finely(problem, listed[0]).tolist()]
-            begins.append(scan(problem, nothing, name, between)[0])
-        tries = [fit(problem, (name,), {name: begin}, iterations=5) for begin in begins]
+            starts.append(scan(problem, nothing, name, between)[0])
+        tries = [fit(problem, (name,), {name: start}, iterations=5) for start in starts]
         best = min(tries, key=lambda explanation: explanation.score)
         found.append(fit(problem, (name,), best.values, iterations=iterations))
     return sorted(found, key=lambda explanation: explanation.score)
 
 
 def _finely(problem: Problem, parameter: Parameter) -> Array:
-    """Sizes of a jump so near to each other that a stroke's last jump moves by one sample; shape (k,)."""
+    """Sizes of a jump, spaced so closely that the last jump of a stroke moves by one sample; shape (k,)."""
     history = problem.chain.history
     steps = np.concatenate([np.diff(history.input_mm[run]) for run in history.runs])
     moving = np.abs(steps[np.abs(steps) > 0.0])
@@ -67,12 +74,37 @@ def _finely(problem: Problem, parameter: Parameter) -> Array:
 
 
 def extended(
-    problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
+    problem: Problem,
+    atoms: Signatures,
+    bases: list[Explanation],
+    most: int,
+    progress: Progress,
+    *,
+    scanned: int = SCANNED,
+    refined: int = REFINED,
+    asked: Mapping[str, float] | None = None,
 ) -> list[Explanation]:
-    """Add each effect to each base explanation: start from signatures in the base's residual, then refit jointly."""
+    """Add each effect to each base explanation: start from signatures in the base's residual, then refit jointly.
+
+    Parameters
+    ----------
+    problem, atoms
+        The data, and what each effect would add.
+    bases : list of Explanation
+        Explanations to which one effect is added.
+    most, refined : int
+        Extensions that are refitted, and how many of them thoroughly.
+    progress : callable
+        Told the share that is done.
+    scanned : int
+        Bases beside which an effect that jumps is tried at all its sizes.
+    asked : mapping of str to float or None
+        Fall of chi-square by each effect below which nobody will believe in it; extensions that promise less than half
+        of it are not refitted. None to try all.
+    """
     owner = np.array(atoms.names)
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
-    scanned = SCANNED if problem.chain.history.input_mm.size <= LONG else 1
+    scanned = scanned if problem.chain.history.input_mm.size <= LONG else 1
     for place, base in enumerate(bases):
         metric = problem.offsets.metric(base.sigma_mm)
         gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, tangents(problem, base))
@@ -80,12 +112,13 @@ def extended(
             mine = np.flatnonzero(owner == name)
             if name in base.names or not mine.size:
                 continue
+            least = LEAST_GAIN if asked is None else max(LEAST_GAIN, PROMISE * asked.get(name, 0.0))
             if place < scanned and any(parameter.rugged for _, parameter in problem.parameters((name,))):
                 start, score = scan(problem, base, name, [atoms.starts[k] for k in mine])
-                if base.score - score > LEAST_GAIN:
+                if base.score - score > least:
                     planned.append((score, base, name, start))
             k = int(mine[np.argmax(gain[mine])])
-            if gain[k] > LEAST_GAIN:
+            if gain[k] > least:
                 planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
     planned.sort(key=lambda plan: plan[0])
     found: dict[tuple[str, ...], Explanation] = {}
@@ -97,15 +130,16 @@ def extended(
         progress((index + 1) / most)
     ranked = sorted(found.values(), key=lambda explanation: explanation.score)
     return sorted(
-        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:8]] + ranked[8:], key=lambda e: e.score
+        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:refined]] + ranked[refined:],
+        key=lambda e: e.score,
     )
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Replace each effect of the best explanation by every other effect, the rest starting at their fitted values.
+    """Replace each effect of the best explanation by every other effect; the rest start at their fitted values.
 
-    Fitted alone, the other effect absorbed the action of two effects, and its parameters end far out in a valley from
-    which no joint search returns.
+    An effect that was fitted alone has absorbed the influence of both effects; its parameters are then so far from the
+    joint optimum that a joint search starting there would not find it.
     """
     if not pairs:
         return pairs
@@ -120,7 +154,7 @@ def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> li
 
 
 def different(problem: Problem, explanations: list[Explanation], most: int) -> list[Explanation]:
-    """Keep the best of several explanations with equal predictions, such as offsets of input, gap and edge."""
+    """Keep the best of explanations with equal predictions, such as offsets of input, gap and edge."""
     found, predicted = list[Explanation](), list[Array]()
     for explanation in explanations:
         curve = problem.whitened(explanation.values)
@@ -134,7 +168,7 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of what the larger explanation adds, as a fraction of its whole change of the prediction in mm."""
+    """Size of the additional part of the larger explanation, as a share of its whole change of the prediction in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
     if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
@@ -142,7 +176,7 @@ def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> 
 
 
 def within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether one of its effects acts by less than an encoder step, on few rows or at the ends, as rounding does."""
+    """Whether one of the effects acts, like rounding, by less than an encoder step, on few rows or at stroke ends."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
@@ -163,15 +197,14 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
 
 
 def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
-    """Choose by Schwarz's criterion (Schwarz 1978)."""
+    """Choose the explanation with the smallest BIC (Schwarz 1978)."""
     return min(candidates, key=lambda explanation: explanation.bic(samples))
 
 
 def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose one effect; a simpler formula is preferred if the richer one gains no more than formulas deviate.
+    """Choose one effect; prefer a simpler formula if the richer one gains no more than formulas are inexact.
 
-    Such a difference is due to the formulas' inexactness, and no reason to prefer a resonance to a delay that falls
-    between two samples.
+    For example, such a small difference is no reason to prefer a resonance to a delay by a fraction of a sample.
     """
     best = likeliest(singles, samples)
     within = FORM_SHARE**2 * (nothing.score - best.score)

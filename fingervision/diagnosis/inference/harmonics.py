@@ -1,4 +1,7 @@
-"""Harmonics: a screw's cyclic error has harmonics that the catalogue's sine lacks; small ones need no second name."""
+"""Harmonics of a named cyclic error: a real screw has harmonics that the catalogue's sine does not include.
+
+If they are small, they are attributed to the named effect.
+"""
 
 from dataclasses import dataclass
 
@@ -9,23 +12,23 @@ from fingervision.domain.effect import Array
 from fingervision.effects import catalogue
 
 ORDERS = (2, 3)
-"""Harmonics that a screw's or a resolver's first one brings along."""
+"""Orders of the harmonics that accompany the first harmonic of a screw or resolver."""
 LARGEST = 0.25
-"""Share of the first harmonic beyond which another is a cause of its own."""
+"""Amplitude relative to the first harmonic above which another harmonic counts as a separate cause."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Harmonics:
-    """Harmonics of a named cyclic error, and the residual that they explain.
+    """Harmonics of a named cyclic error, and the part of the residual that they explain.
 
     Parameters
     ----------
     columns : ndarray of float, shape (m, k)
         Whitened changes of the prediction, sine and cosine of each order.
     words : str
-        The strongest of them.
+        Description of the strongest harmonic.
     gain : float
-        Chi-square that they take.
+        Chi-square that the harmonics explain.
     """
 
     columns: Array
@@ -34,14 +37,14 @@ class Harmonics:
 
 
 def harmonics(problem: Problem, best: Explanation) -> Harmonics:
-    """Fit the harmonics of a named cyclic error; none where they are too large to belong to it.
+    """Fit the harmonics of a named cyclic error; none if they are too large to belong to it.
 
     Parameters
     ----------
     problem : Problem
         Data and observation model.
     best : Explanation
-        What was named.
+        The named explanation.
     """
     none = Harmonics(np.zeros((problem.measured.size, 0)))
     periodic = [(name, effect.wave) for name, effect in catalogue().items() if name in best.names and effect.wave]

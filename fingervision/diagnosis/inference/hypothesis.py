@@ -12,11 +12,12 @@ from fingervision.domain.parameter import Parameter
 
 Point = dict[str, dict[str, float]]
 START_VARIANCE = 1.0 / 3.0
-"""Variance of a start state that may be anywhere between -1 and 1."""
+"""Variance of a start state that is uniformly distributed between -1 and 1."""
 FORM_SHARE = 0.02
-"""By how much of what an effect changes the catalogue's form of it is typically off."""
+"""Typical inexactness of an effect's formula, as a share of the change that the effect causes."""
 SMALL_SHARE = 0.05
-"""What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
+"""Residual, as a share of the explained part, that is attributed to the formula of an effect rather than to another
+effect: a few per cent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,21 +27,21 @@ class Explanation:
     Parameters
     ----------
     names : tuple of str
-        Effects, in the order of the chain.
+        Names of the effects, in the order of the measuring chain.
     values : mapping of str to mapping of str to float
-        Estimates.
+        Estimated parameters.
     score : float
-        Chi-square with run offsets allowed for, plus the offsets' own penalty.
+        Chi-square with fitted run offsets, plus a penalty for the offsets.
     residual : ndarray of float, shape (m,)
         Whitened target minus prediction.
     covariance : ndarray of float, shape (p, p)
-        Of the parameters in their order; zero rows for those at a bound.
+        Covariance of the parameters in their order; zero rows for those at a bound.
     free : int
-        Parameters of the effects that are not at a bound.
+        Number of the effects' parameters that are not at a bound.
     sigma_mm : tuple of float
-        Spread of the run offsets under this explanation, one a channel.
+        Spread of the run offsets under this explanation, for each channel.
     starts_price : float
-        Price of the fitted start states: twice the logarithm of prior width over posterior width, summed.
+        Penalty of the fitted start states: twice the logarithm of prior width over posterior width, summed.
     """
 
     names: tuple[str, ...]
@@ -53,13 +54,13 @@ class Explanation:
     starts_price: float = 0.0
 
     def bic(self, samples: int) -> float:
-        """Schwarz's criterion: score plus penalty for the free parameters and start states."""
+        """Bayesian information criterion (Schwarz 1978): score plus penalties for free parameters and start states."""
         return self.score + self.free * float(np.log(samples)) + self.starts_price
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """Everything that the score of an explanation depends on: data, chain, noise and offsets.
+    """Everything on which the score of an explanation depends: data, measuring chain, noise and run offsets.
 
     Parameters
     ----------
@@ -70,13 +71,14 @@ class Problem:
     whitener, offsets
         The observation model.
     effects : mapping of str to Effect
-        Those that the data can show.
+        Effects that the data can show.
     form_share : float
-        Share of what is explained that the form of an effect may leave over, as a ratio of amplitudes.
+        Share (as a ratio of amplitudes) of the explained part that the formula of an effect may leave as residual.
     stalled : frozenset of str
-        Effects for which readings that stand at an end of the range speak.
+        Effects suggested by readings that stay constant at an end of the range.
     mapped : float
-        Squared whitened length of what a map of position errors explains beside every explanation; 0 without one.
+        Squared whitened length of the part that a map of position errors explains in addition to every explanation; 0
+        without a map.
     """
 
     chain: MeasuringChain
@@ -89,7 +91,7 @@ class Problem:
     mapped: float = 0.0
 
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
-        """Parameters of some effects, with bounds narrowed to what the data can show."""
+        """Parameters of given effects, with bounds narrowed to the range that the data can show."""
         found: list[tuple[str, Parameter]] = []
         for name in names:
             searched = self.effects[name].search(self.whitener.history)
@@ -97,7 +99,7 @@ class Problem:
         return found
 
     def only_run(self, column: Array, run: int | None) -> Array:
-        """Keep the rows of one run of a column of shape (m,), or all rows where `run` is None."""
+        """Keep the rows of one run in a column of shape (m,), or all rows if `run` is None."""
         if run is None or len(self.chain.history.runs) == 1:
             return column
         rows = self.chain.history.runs[run]
@@ -108,7 +110,7 @@ class Problem:
         return out
 
     def whitened(self, settings: Mapping[str, Mapping[str, float]]) -> Array:
-        """Predict and whiten; shape (m,)."""
+        """Predict and whiten; the result has shape (m,)."""
         return self.whitener.one(self.chain.stacked(settings))
 
     def score(self, settings: Mapping[str, Mapping[str, float]]) -> float:
@@ -118,14 +120,14 @@ class Problem:
         return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
 
     def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
-        """-2 log of the posterior up to a constant, integrated over the spreads of the run offsets."""
+        """-2 log of the posterior up to a constant, marginalised over the spreads of the run offsets."""
         residual = self.measured - self.whitened(settings)
         sigma, penalty = self.offsets.spread(residual)
         metric = self.offsets.metric(sigma)
         return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
 
     def nothing(self) -> Explanation:
-        """Score of the model without any effect."""
+        """The model without any effect, with its score."""
         residual = self.measured - self.whitened({})
         sigma, penalty = self.offsets.spread(residual)
         score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty

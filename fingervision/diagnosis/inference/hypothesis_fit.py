@@ -1,4 +1,4 @@
-"""Fitting a hypothesis: effects inside the measuring chain, refitted jointly by generalised least squares."""
+"""Fit a hypothesis: the effects are placed in the measuring chain and fitted jointly by generalised least squares."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,30 +11,31 @@ from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 
 SCANS = ((0.06, 241), (0.012, 13), (0.003, 13), (0.0006, 25))
-"""Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
-thorough search: with a thousand jumps in a record the right size has a basin some ten-thousandths wide."""
+"""Relative half-widths, and numbers of values, of the scans of a parameter on which the prediction depends
+discontinuously. The first scan is for a thorough search: with a thousand jumps in a record, the basin of the right size
+is only some ten-thousandths wide."""
 MANY_STEPS = 20
-"""Steps of a thorough fit; Levenberg-Marquardt from a signature's start needs five to twelve."""
+"""Most iterations of a thorough fit; from a signature's start, Levenberg-Marquardt needs five to twelve."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _JointSquares:
-    """Chi-square of some effects' parameters, with run offsets allowed.
+    """Chi-square as a function of some effects' parameters, with run offsets fitted.
 
     Parameters
     ----------
     problem : Problem
         Data and observation model.
     aim : ndarray of float, shape (m,)
-        Whitened curve to explain.
+        Whitened target.
     order : tuple of str
-        Effects, in the order of the chain.
+        Names of the effects, in the order of the measuring chain.
     listed : list of (str, Parameter)
-        Their parameters with the bounds that the data leave.
+        Parameters of the effects, with the bounds narrowed by the data.
     metric : ndarray of float
-        Of the run offsets.
+        Metric that accounts for the run offsets.
     sigma_mm : tuple of float or None
-        Spread of run offsets that is kept; None to let it follow the residual.
+        Fixed spread of the run offsets; None to estimate it from the residual.
     """
 
     problem: Problem
@@ -60,7 +61,7 @@ class _JointSquares:
         return self.problem.offsets.squared(residual, self.metric)
 
     def reweighted(self, residual: Array) -> "_JointSquares":
-        """Adapt the spread of the offsets to the residual, unless it is given."""
+        """Adapt the spread of the run offsets to the residual, unless it is fixed."""
         offsets = self.problem.offsets
         spread = self.sigma_mm if self.sigma_mm is not None else offsets.spread(residual)[0]
         return replace(self, metric=offsets.metric(spread))
@@ -99,22 +100,22 @@ def fit(
     sigma_mm: tuple[float, ...] | None = None,
     iterations: int = 12,
 ) -> Explanation:
-    """Fit effects jointly, by a search within their bounds.
+    """Fit effects jointly, by a search within the bounds of their parameters.
 
     Parameters
     ----------
     problem : Problem
         Data and observation model.
     names : tuple of str
-        Effects.
+        Names of the effects.
     start : mapping
-        Where to begin.
+        Initial values of the parameters.
     target : ndarray of float, shape (m,), or None
-        Whitened curve to explain; None for the measurement.
+        Whitened target; None for the measurement.
     sigma_mm : tuple of float or None
-        Spread of run offsets; None to profile it.
+        Spread of the run offsets; None to estimate it.
     iterations : int
-        Steps at most.
+        Largest number of iterations.
     """
     aim = problem.measured if target is None else target
     order = tuple(name for name in problem.effects if name in names)
@@ -165,7 +166,7 @@ def _bounds(listed: list[tuple[str, Parameter]]) -> tuple[Array, Array]:
 
 
 def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
-    """Group parameters whose derivatives one prediction gives: start states of different runs affect different rows."""
+    """Group parameters that can be differentiated by one prediction: start states of runs affect separate rows."""
     groups: dict[object, list[int]] = {}
     for i, (name, parameter) in enumerate(listed):
         groups.setdefault(i if parameter.run is None else name, []).append(i)
@@ -175,14 +176,14 @@ def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
 def scan(
     problem: Problem, base: Explanation, name: str, starts: Sequence[Mapping[str, float]]
 ) -> tuple[dict[str, float], float]:
-    """Try one more effect added to a fixed explanation.
+    """Add one more effect to an explanation whose parameters stay fixed.
 
     Returns
     -------
     start : dict
-        The best of `starts`.
+        The best of the given `starts`.
     score : float
-        With it, without any refit.
+        Score with these parameters, without a refit.
     """
     predicted = [problem.chain.stacked({**base.values, name: start}) for start in starts]
     residual = problem.measured[:, None] - problem.whitener.columns(np.stack(predicted, axis=1))[0]

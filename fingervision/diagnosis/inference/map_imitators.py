@@ -1,7 +1,7 @@
-"""Effects that a map of position errors can represent: functions of position alone, beyond a straight line.
+"""Effects that a map of position errors can represent: functions of position alone, except a straight line.
 
-If a map is fitted too, no data can distinguish such an effect from the map, whatever its size. Effects with reversal,
-memory or dependence on time can be distinguished.
+If a map is fitted too, no data can distinguish such an effect from the map, whatever the effect's size. Effects with
+reversal, memory or dependence on time can be distinguished.
 """
 
 from dataclasses import replace
@@ -14,11 +14,11 @@ from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.domain.effect import Array, Flags
 
 LINE_SHARE = 1e-3
-"""Share of its squared length that a straight line may leave of an effect that acts like one: ratios and offsets bend
-that little over a stroke, and a map has no line."""
+"""Share of the squared length that a straight-line fit may leave of an effect that counts as a line: ratios and offsets
+deviate from a line by so little over a stroke. A map contains no straight line."""
 CURVE_SHARE = 0.02
-"""Share of the squared length beyond a line that some curve may leave of an effect that acts like a map: 14 % as
-amplitude, less than which the forms of effects are off on real rigs (ISO 230-2 reversals: 19 to 24 %)."""
+"""Share of the squared length, beyond the line, that a curve over position may leave of an effect that counts as a map:
+14 % in amplitude, less than the inexactness of effects' formulas for real stages (ISO 230-2 reversals: 19 to 24 %)."""
 
 
 def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, str]:
@@ -27,14 +27,14 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
     Parameters
     ----------
     problem : Problem
-        Without the map.
+        Estimation problem without the map.
     position_map : PositionMap
         The map.
 
     Returns
     -------
     reasons : dict of str to str
-        Why each cannot show, by name.
+        Reason, by name of effect, why the data cannot show it.
     """
     still = _of_the_place(problem)
     atoms = signatures(replace(problem, effects={name: problem.effects[name] for name in still})) if still else None
@@ -57,16 +57,16 @@ def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Ex
     Parameters
     ----------
     problem : Problem
-        Without the map.
+        Estimation problem without the map.
     position_map : PositionMap
         The map.
     explanation : Explanation
-        What was found beside it.
+        Effects found in addition to the map.
 
     Returns
     -------
     reasons : dict of str to str
-        Why each has no place beside the map, by name.
+        Reason, by name of effect, why it is excluded if a map is fitted.
     """
     chain, values = problem.chain, explanation.values
     whole = chain.stacked(values)
@@ -101,7 +101,7 @@ def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[
     offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
 
     def left(beside: Array) -> Array:
-        """Squared lengths after projection on offsets and the columns `beside`; shape (k,)."""
+        """Squared lengths after projection off the run offsets and the columns `beside`; shape (k,)."""
         moved = beside - offsets.design @ (metric @ (offsets.design.T @ beside))
         rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
         shared = offsets.design.T @ rest

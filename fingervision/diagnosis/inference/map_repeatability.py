@@ -1,8 +1,8 @@
 """Check that a map of position errors is repeatable: a map fitted to some passes must predict the others.
 
-By definition, a map is the same at each visit of a position (ISO 230-2). Runs that differ in gain, or a creep
-interrupted by stops at several positions, can be fitted by a curve over the input as well; but such a curve does not
-predict a run that was not used in its fit.
+By definition, a map of position errors is the same at each visit of a position (ISO 230-2). Runs that differ in gain,
+or a creep interrupted by stops at several positions, can also be fitted by a curve over the input, but such a curve
+does not predict a run that was not used in its fit.
 """
 
 import numpy as np
@@ -14,7 +14,8 @@ from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.domain.effect import Array, History
 
 MOST_PASSES = 8
-"""Parts into which the passes of one run are sorted: with more each part says less by itself, and costs as much."""
+"""Largest number of parts into which the passes of one run are divided: more parts contain less information each and
+cost as much."""
 
 
 def foretells_other_passes(problem: Problem, explanation: Explanation, position_map: PositionMap) -> bool:
@@ -27,16 +28,16 @@ def foretells_other_passes(problem: Problem, explanation: Explanation, position_
     Parameters
     ----------
     problem : Problem
-        Without the map.
+        Estimation problem without the map.
     explanation : Explanation
-        Beside which it was estimated.
+        Effects with which the map was estimated.
     position_map : PositionMap
-        Its columns are in units of its coefficients, which are standard normal numbers.
+        The map; its coefficients are standard normal numbers.
 
     Returns
     -------
     bool
-        True as well where nothing can be left out.
+        Whether the map predicts the parts left out; True also if no part can be left out.
     """
     part = _parts(problem.chain.history)
     numbers = np.unique(part)
@@ -67,7 +68,7 @@ def _gain(gram: Array, aim: Array) -> float:
 
 
 def _parts(history: History) -> NDArray[np.intp]:
-    """Part of each row: its run, or in a single run the number of earlier visits of its position."""
+    """Part to which each row belongs: its run or, in a single run, the number of earlier visits of its position."""
     input_mm = history.input_mm
     part = np.zeros(input_mm.size, dtype=np.intp)
     if len(history.runs) > 1:

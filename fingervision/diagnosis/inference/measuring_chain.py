@@ -17,27 +17,27 @@ Settings = Mapping[str, Values]
 
 @dataclass(frozen=True, eq=False)
 class MeasuringChain:
-    """A model with its history; enabled effects act in the catalogue's order.
+    """A model with its input history; enabled effects act in the order of the catalogue.
 
     Parameters
     ----------
     model : Model
-        The gripper.
+        Model of the gripper.
     history : History
         Input, times and runs.
     fixed : mapping
-        Effects that are part of the model (a corrected model).
+        Effects that are part of the model (for a corrected model).
     midline_mm : float
-        Where the fingers' middle stands in the picture: camera effects act about the image centre.
+        Position of the fingers' midline in the picture, because camera effects act about the picture's centre.
     seen_midline_mm : float or None
-        Where the camera sees the middle, on the median: a camera that moves it had it elsewhere before. None where
-        `midline_mm` is known from elsewhere.
+        Median position of the midline as the camera sees it; the true position differs if the camera shifts it. None if
+        `midline_mm` is known from another source.
     curved : bool
-        Whether stage and fingers went along curves between two samples, as a delay shows, or along straight lines.
+        Whether the input follows curves between samples, which matters for delays, or straight lines.
     path : InputPath or None
-        The way between and besides the measured rows; None where the rows are all of it.
+        Path of the input between the measured rows, and outside them; None if the measured rows contain all of it.
     dynamics : (ndarray of float, Response) or None
-        What a model that is a function of time adds to its answer at rest along a path, with that path's times.
+        Difference of a dynamic model from its static response along a path, with the times of this path.
     """
 
     model: Model
@@ -51,7 +51,7 @@ class MeasuringChain:
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
-        """The effects of the catalogue in order, each as this model computes it."""
+        """The effects of the catalogue in order, each in the form that this model computes."""
         laws = own_laws(self.model)
         effects = {name: obeyed(effect, laws.get(name)) for name, effect in catalogue().items()}
         return {name: _along_curves(effect) for name, effect in effects.items()} if self.curved else effects
@@ -119,7 +119,7 @@ class MeasuringChain:
         return input_mm
 
     def stacked(self, settings: Settings) -> Array:
-        """Gap, and midline and force where they were measured, one after another; shape (channels * n,)."""
+        """Stack gap and, if measured, midline and force into one column; shape (channels * n,)."""
         response = self.respond(settings)
         parts = [response.gap_mm]
         if self.history.both_edges:
@@ -130,12 +130,12 @@ class MeasuringChain:
 
 
 def own_laws(model: Model) -> Mapping[str, PhysicalLaw]:
-    """Formulas for effects by name: a drawn gripper has its own physics for some effects, a table has none."""
+    """Formulas of the model's own for effects, by name: a drawn gripper has such formulas, a table has none."""
     return model.laws if isinstance(model, PhysicalModel) else {}
 
 
 def obeyed(effect: Effect, law: PhysicalLaw | None) -> Effect:
-    """Return the effect as a model computes it: by the model's own law, else by the catalogue's formula."""
+    """Return the effect in the form that a model computes: by the model's own law, else by the catalogue's formula."""
     if law is None or not isinstance(effect, PointEffect):
         return effect
 

@@ -1,6 +1,6 @@
-"""Model adequacy: a test for structure in the residual of the best explanation.
+"""Model adequacy: test for structure in the residual of the best explanation.
 
-Structure gives the verdict *unknown*.
+Significant structure leads to the verdict *unknown*.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from fingervision.diagnosis.input.input_uncertainty import below_the_input
 from fingervision.domain.effect import Array, Flags
 
 LONG = 4000
-"""Samples above which fewer probes must do."""
+"""Number of samples above which fewer probes are used."""
 VERY_STRONG = 10.0
-"""Evidence on the scale of BIC (Kass & Raftery 1995)."""
+"""Threshold of very strong evidence on the scale of BIC (Kass & Raftery 1995)."""
 SAME_SHAPE = 0.9
-"""Correlation above which a probe is what an effect does itself."""
+"""Correlation above which a probe has the same shape as an effect."""
 STAND_INS = 2
-"""Probes that may take the place of several effects: a bump's width lies between two of the grid."""
+"""Number of probes that may replace several effects: a bump's width may lie between two widths of the grid."""
 
 
 def shapes_of(problem: Problem) -> Probes:
@@ -44,21 +44,21 @@ class _Basis:
 
     @classmethod
     def of(cls, problem: Problem, columns: Array) -> "_Basis":
-        """Precompute what every evaluation of the probes needs."""
+        """Precompute the quantities that every evaluation of the probes needs."""
         return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
 
     def beside_offsets(self, metric: Array) -> Array:
-        """Squared lengths after projection on the offsets that a metric allows; shape (k,)."""
+        """Squared lengths after projection off the run offsets that a metric allows; shape (k,)."""
         return np.asarray(self.squares - np.einsum("ij,ij->j", self.shared, metric @ self.shared))
 
 
 def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
-    """Fall of chi-square by each column, in the residual of an explanation and the columns already taken.
+    """Reduction of chi-square by each column, in the residual of an explanation and of columns already used.
 
     Returns
     -------
     gain, dot, norm : ndarray of float, shape (k,)
-        `dot / norm` is the column's coefficient; both are zero where nothing new is left of the column.
+        `dot / norm` is the column's coefficient; both are zero if the column depends linearly on columns already used.
     """
     offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
     columns = basis.columns
@@ -77,24 +77,25 @@ def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) ->
 
 
 def _explained(problem: Problem, found: Explanation) -> float:
-    """Squared whitened length of an explanation's change of the prediction, except what run offsets compensate."""
+    """Squared whitened length of an explanation's change of the prediction, without what run offsets absorb."""
     changed = problem.whitened(found.values) - problem.whitened({})
     return problem.offsets.squared(changed, problem.offsets.metric(found.sigma_mm))
 
 
 def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[Explanation]) -> str | None:
-    """Sentence naming generic shapes that effects only imitate; None where the effects themselves are the cause.
+    """Sentence that names generic shapes which effects only imitate; None if the effects themselves are the cause.
 
-    Three effects fit almost any shape, and must explain the data far better than generic shapes do. One or two effects
-    are imitations only where the shapes are far better, by more than the inexactness of the effects' formulas.
+    Three effects can fit almost any shape, and must therefore explain the data much better than generic shapes do. One
+    or two effects count as imitations only if the shapes fit much better, by more than the inexactness of the effects'
+    formulas.
 
     Parameters
     ----------
     found : Explanation
-        The effects.
+        The effects to be tested.
     fewer : list of Explanation
-        Explanations of fewer effects, beside which one or two shapes are tried, each at the price of its amplitude and
-        of the choice among all shapes (`choices`).
+        Explanations with fewer effects, to which one or two shapes are added, each with a penalty for its amplitude and
+        for the choice among all shapes (`choices`).
     """
     several = len(found.names) > 2
     columns, rows = shapes.columns, int(problem.measured.size)
@@ -122,11 +123,11 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
 
 
 def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
-    """Mark probes that have the shape of one of the effects, and straight lines; shape (k,).
+    """Mark probes that have the shape of one of the effects, or are straight lines; shape (k,).
 
-    Example: in readings at rest, play is a mere difference between the two directions, and the probe of that shape is
-    no other explanation. A ramp over time beside an offset has the shape of a warming; beside a map of position errors
-    every function of position counts as a line.
+    For example, in readings at rest, play is merely a difference between the two directions, and the probe with this
+    shape is not another explanation. A ramp over time in addition to an offset has the shape of warming; in addition to
+    a map of position errors, every function of position counts as a line.
     """
     metric, design = problem.offsets.metric(found.sigma_mm), problem.offsets.design
     norm = np.maximum(basis.beside_offsets(metric), 1e-12)
@@ -144,14 +145,14 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
 
 
 def _beside(design: Array, metric: Array, columns: Array) -> Array:
-    """Whitened columns after projection on the runs' offsets and other random effects."""
+    """Whitened columns after projection off the runs' offsets and other random effects."""
     return np.asarray(columns - design @ (metric @ (design.T @ columns)), dtype=np.float64)
 
 
 def own_shapes(problem: Problem, explanation: Explanation) -> list[Array]:
-    """Change of the whitened prediction by each effect of an explanation, with the others present.
+    """Change of the whitened prediction by each effect of an explanation, with the other effects present.
 
-    Each of shape (m,).
+    Each change has shape (m,).
     """
     whole, values = problem.whitened(explanation.values), explanation.values
     others = [{other: values[other] for other in explanation.names if other != name} for name in explanation.names]
@@ -168,7 +169,7 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
-    """Largest gain of a probe that errors of the recorded input alone cause at jumps."""
+    """Largest gain of a probe that is caused by errors of the recorded input at jumps alone."""
     most, basis = [], _Basis.of(problem, columns)
     for _ in range(FEWEST):
         shaken, target = noise_alone(problem, best, rng)

@@ -1,4 +1,4 @@
-"""Null bootstrap: the distribution of the gain of one more effect when only noise is present."""
+"""Null bootstrap: distribution of the gain of one more effect if only noise is present."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,31 +12,34 @@ from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
 
 QUANTILE = 0.98
-"""Of the largest excess over all families: one table of noise in fifty makes a claim (one in forty cost more nulls)."""
+"""Quantile of the largest excess over all families: one table of noise in fifty leads to a claim (one in forty would
+require more simulated tables)."""
 DRAWS, LONG_DRAWS, FEWEST = 40, 20, 10
-"""Refitted draws at most, of a long record, and before which none stops: a Gumbel quantile from 40 is known to 15 %."""
+"""Largest number of refitted draws, the same for a long record, and the least number before stopping: a Gumbel quantile
+estimated from 40 draws is known to 15 %."""
 SURELY = 3.0
-"""Standard errors of the quantile beyond which no further draw would change the answer."""
+"""Distance from the quantile in standard errors above which no further draw would change the decision."""
 LONG = 6000
-"""Samples above which fewer draws must do."""
+"""Number of samples above which fewer draws are made."""
 OWN_QUANTILE = 0.95
-"""Of what one family takes from noise: as far out as so many draws tell."""
+"""Quantile of one family's gain in noise: as high as the number of draws permits."""
 LINEAR_DRAWS = 300
-"""Draws of linear gains: the 98 % quantile is then the sixth largest of 300."""
+"""Number of draws of linear gains: the 98 % quantile is then the sixth largest value."""
 REFIT_MARGIN = 0.2
-"""Share at most by which the threshold of linear signatures is raised for all that refitting finds between them."""
+"""Largest relative increase of the threshold for linear signatures to allow for the additional gain by refitting
+between them."""
 REFITTED = 2
-"""Effects of each draw that are refitted: those whose signatures take the most of it."""
+"""Number of effects refitted in each draw: those whose signatures gain most."""
 GUMBEL = float(-np.log(-np.log(QUANTILE)) - np.euler_gamma) * float(np.sqrt(6.0)) / float(np.pi)
-"""Standard deviations from the mean of a maximum's distribution (Gumbel 1958) to its quantile."""
+"""Distance of the quantile from the mean of a maximum's distribution, in standard deviations (Gumbel 1958)."""
 
 
 def noise_doubt(problem: Problem) -> float:
-    """Relative standard uncertainty of the noise power at low frequency, of the channel where it is largest.
+    """Largest relative standard uncertainty, over the channels, of the noise power at low frequency.
 
     The power at zero frequency is proportional to (1 + rho) / (1 - rho), and an autoregression determines rho with
-    standard uncertainty sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). A spectrum fitted without its slowest
-    part determines the power there less well (`noise_by_spectrum`).
+    standard uncertainty sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). If a spectrum is fitted without its
+    slowest part, the power there is less well determined (`noise_by_spectrum`).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
@@ -50,11 +53,11 @@ def noise_doubt(problem: Problem) -> float:
 def linear_thresholds(
     problem: Problem, names: tuple[str, ...], columns: Array, sigma: tuple[float, ...], rng: np.random.Generator
 ) -> dict[str, float]:
-    """Gains that the best column of a family exceeds in noise alone only with a small fixed probability.
+    """Thresholds: gains that the best column of a family seldom exceeds in noise alone.
 
-    A family of many shapes gains more from noise than a single column does; one common threshold would be that of the
-    largest family. Therefore each family is compared with its own upper tail, and the largest excess over all families
-    must be rare: the families have equal shares of the false positives (Beran 1988).
+    A family of many shapes gains more from noise than a single column does; a common threshold would be that of the
+    largest family. Therefore each family is compared with its own upper quantile, and the probability of an excess in
+    any family is limited: the families have equal shares of the false positives (Beran 1988).
 
     Parameters
     ----------
@@ -63,7 +66,7 @@ def linear_thresholds(
     columns : ndarray of float, shape (m, k)
         Whitened signatures or probes.
     sigma : tuple of float
-        Spread of the run offsets, one a channel.
+        Spread of the run offsets for each channel.
     """
     offsets, metric = problem.offsets, problem.offsets.metric(sigma)
     kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
@@ -82,11 +85,12 @@ def linear_thresholds(
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
     margin = 1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))
     tail, excess = {}, np.full(LINEAR_DRAWS, -np.inf)
+    taken = (kept.T @ noise) ** 2 / np.where(usable, norm, 1.0)[:, None]
     for name in dict.fromkeys(names):
         mine = usable & (owner == name)
         if not mine.any():
             continue
-        gains = np.max((kept.T[mine] @ noise) ** 2 / norm[mine, None], axis=0) * doubt
+        gains = np.max(taken[mine], axis=0) * doubt
         # Refitting finds what lies between the shapes of the grid; a single column has no shape.
         gains = gains * margin + 1.5 if mine.sum() > 1 else gains
         tail[name] = float(np.quantile(gains, OWN_QUANTILE))
@@ -96,15 +100,16 @@ def linear_thresholds(
 
 
 def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -> tuple[Problem, Array]:
-    """Simulate a measurement in which `base` is the whole truth.
+    """Simulate a measurement for which the explanation `base` is true.
 
     Returns
     -------
     shaken : Problem
-        With a recorded input that holds other errors. They are in the input that every effect acts on, so that some
-        effects seem to take them out again: a delay of part of a sample averages two of them, a stop cuts the largest.
+        Estimation problem with other random errors in the recorded input. All effects act on this input, so that some
+        of them seem to reduce its errors: a delay by part of a sample averages two errors, an end stop clips the
+        largest.
     target : ndarray of float, shape (m,)
-        Whitened measurement.
+        The simulated measurement, whitened.
     """
     offsets, whitener = problem.offsets, problem.whitener
     truth = problem.whitened(base.values)
@@ -128,18 +133,18 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
 
 
 def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
-    """Whether an explanation jumps at inputs that are poorly known: if one jump moves, all later ones move."""
+    """Whether an explanation jumps at inputs that are poorly known, so that one wrong jump shifts all later ones."""
     unsure = problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()
     return bool(unsure) and any(parameter.rugged for _, parameter in problem.parameters(names))
 
 
 def rare(values: Sequence[float]) -> float:
-    """Estimate from a few draws the quantile of a maximum that is exceeded once in 50 draws."""
+    """Estimate, from a few draws, the quantile of a maximum that is exceeded once in 50 draws."""
     return float(np.mean(values)) + GUMBEL * float(np.std(values))
 
 
 def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
-    """Simulate the noise of the pictures alone, channels stacked; shape (m,), in mm."""
+    """Simulate the noise of the pictures only; channels are stacked, shape (m,), in mm."""
     out = []
     for noise in problem.whitener.noises:
         for run in problem.chain.history.runs:
@@ -157,9 +162,9 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
 
 
 def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
-    """Smallest gain required of effects in addition to those of `base`.
+    """Smallest gain required of the effects that are added to those of `base`.
 
-    Infinite for effects that run offsets imitate fully.
+    It is infinite for an effect that run offsets can imitate completely.
     """
     return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
 
@@ -173,10 +178,10 @@ def exceeds_noise(
     suspects: list[dict[str, Mapping[str, float]]],
     rng: np.random.Generator,
 ) -> bool:
-    """Whether an excess over the thresholds is above the quantile for a further effect in noise alone.
+    """Whether an excess over the thresholds is larger than that of a further effect in noise alone.
 
-    Linear signatures on their grid of shapes gain less from noise than refitted effects do, because a fit finds the
-    best period between two grid values, or the best samples for an end stop. Each draw is therefore fitted like the
+    Linear signatures on a grid of shapes gain less from noise than refitted effects do, because a fit also finds the
+    best period between two grid values, or the best position of an end stop. Each draw is therefore fitted like the
     measurement: with `base`, extended by the likeliest effects, and refitted. `suspects` are effects with parameters
     that the measurement favours; they are tried on every draw.
     """

@@ -1,4 +1,4 @@
-"""Plausibility checks for mistakes in a table: a mirrored or rescaled column, exchanged directions."""
+"""Plausibility checks for mistakes in a table: a mirrored or rescaled column, or exchanged directions."""
 
 from dataclasses import dataclass
 
@@ -11,35 +11,36 @@ from fingervision.domain.effect import Array, DriveEffect
 from fingervision.effects.play_operator import play
 
 LEAST_CORRELATION = 0.5
-"""Correlation of measured and predicted gap below which the model does not describe the motion at all."""
+"""Least correlation of measured and predicted gap; below it the model does not describe the motion at all."""
 LARGEST_RATIO = 3.0
-"""Ratio of measured to predicted motion above which, or below whose inverse, a unit or the model is wrong: the
-catalogue's scale, lever and input errors together make 1.3 * 1.3 * 1.2 = 2.03."""
+"""Largest ratio of measured to predicted motion (or its inverse) before a wrong unit or model is reported: the
+catalogue's scale, lever and input errors together reach 1.3 * 1.3 * 1.2 = 2.03."""
 ENDS = (0.05, 0.95)
-"""Quantiles between which a motion is taken."""
+"""Quantiles of the gap whose difference is taken as its motion."""
 DELAYS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
-"""Delays at which the measured motion is looked for."""
+"""Delays at which the measured motion is compared."""
 SWAPPED_SIGMAS = 6.0
-"""Standard errors by which the gap must lead at reversals, before swapped directions are asked about: far beyond
-what any other effect's leftover leaves there."""
+"""Standard errors by which the gap must lead at reversals before exchanged directions are suspected: far more than the
+residual of any other effect."""
 SWAPPED_SHARE = 0.5
-"""Share of the disagreement's square that a leading play must explain: the rest may be other effects'."""
+"""Least share of the squared disagreement that a leading play must explain: the rest may be due to other effects."""
 LEAST_NORM = 1e-6
-"""Share of a play's shape that an offset and a ratio must leave for it to be told from them."""
+"""Least share of a play's shape that remains after fitting an offset and a ratio, so that the play is distinguishable
+from these."""
 WIDTHS = 25
-"""Widths of the play that are tried."""
+"""Number of widths of the play that are tried."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A mistake that was found, in a sentence; with `blocks` no effect can be named until it is corrected."""
+    """A mistake in the table, as a sentence; if `blocks` is True, no effect can be named until it is corrected."""
 
     words: str
     blocks: bool
 
 
 def gross_mistake(data: Observations) -> Finding | None:
-    """Compare the measured motion with the predicted one as a whole: sign, unit, and any relation at all."""
+    """Compare measured and predicted motion as a whole: sign, unit, and whether they are related at all."""
     gap, predicted = data.table.gap_mm, data.chain.respond({}).gap_mm
     if np.ptp(predicted) == 0.0:
         return None
@@ -69,7 +70,7 @@ def gross_mistake(data: Observations) -> Finding | None:
 
 
 def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
-    """Check for play of the wrong sign: at reversals the gap leads the input instead of lagging behind it."""
+    """Check for play of the wrong sign: the gap leads the input at reversals instead of lagging behind."""
     history = data.chain.history if data.chain.path is None else data.chain.path.history
     rows = np.arange(history.input_mm.size) if data.chain.path is None else data.chain.path.rows
     if history.time_s is None:
@@ -114,13 +115,13 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
 
 
 def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) -> Array:
-    """Project whitened values on the complement of columns; shape as given."""
+    """Project whitened values off the given columns; same shape."""
     moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
     return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])
 
 
 def _later(data: Observations) -> list[Array]:
-    """Predicted gap for a stage without delay, and for delays up to a second."""
+    """Predicted gap for a stage without delay, and with delays up to a second."""
     late = [name for name, effect in data.effects.items() if isinstance(effect, DriveEffect) and effect.act_curved]
     if not late:
         return [data.chain.respond({}).gap_mm]

@@ -1,8 +1,8 @@
 """A map of position errors added to an explanation: a Gaussian process judged by its marginal likelihood.
 
 The map is a random effect (Rasmussen & Williams 2006, chapter 2): its curve is integrated out, and the log determinant
-penalises its freedom. Mean and straight line are removed from it, because offsets and ratios are effects of the
-catalogue.
+penalises its flexibility. Mean and straight line are removed from the map, because offsets and ratios are effects of
+the catalogue.
 """
 
 from dataclasses import dataclass, replace
@@ -19,20 +19,22 @@ from fingervision.effects.position_error_map import EFFECT, covariance, curve_va
 
 NAME = EFFECT.name
 SET_POINTS = 60
-"""Different inputs up to which each is a node of the curve; above, nodes are spread evenly."""
+"""Number of different inputs up to which each input is a node of the curve; for more, nodes are equidistant."""
 NODES = 13
-"""Of a curve over many inputs: about as many targets as an error map is tabulated at."""
+"""Number of nodes of a curve over many inputs: about the number of positions at which error maps are tabulated."""
 SMOOTH = 0.1
-"""Shortest length of a map over the range: what changes faster repeats with a period, or is no property of the place
-that anybody could have measured beforehand."""
+"""Shortest correlation length of a map as a share of the range: faster changes are either periodic, or not a property
+of the position that could have been measured in advance."""
 PASSES = 1.8
-"""Travel over range from which on each place was passed twice: an error seen once is not known to repeat."""
+"""Least ratio of travel to range, so that each position was passed twice: an error seen once is not known to be
+repeatable."""
 LENGTHS, SIZES = 10, 25
-"""Lengths and sizes that are tried."""
+"""Numbers of correlation lengths and sizes that are tried."""
 EVENLY = 200
-"""Places that stand for a whole range: enough that its ends count for no more than their share."""
+"""Number of positions that represent the range of a continuous motion, so many that the ends have no more than their
+share."""
 SLOPE_STEP = 1e-3
-"""Share of the range over which the prediction is differentiated by the input."""
+"""Step, as a share of the range, for differentiating the prediction by the input."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,17 +44,17 @@ class PositionMap:
     Parameters
     ----------
     nodes_mm : ndarray of float, shape (k,)
-        Inputs at which the curve is known.
+        Inputs at the nodes of the curve.
     root_mm : ndarray of float, shape (k, k)
-        The curve at the nodes is `root_mm` times independent standard normal numbers.
+        Matrix that converts independent standard normal numbers to the curve at the nodes.
     columns_mm : ndarray of float, shape (channels * n, k)
-        What each of these numbers does to the prediction.
+        Change of the prediction per unit of each of these numbers.
     rms_mm, length_mm : Estimate
-        Root mean square of the curve once it is estimated, of the process before; and the process's length.
+        Root mean square of the curve (before estimation, of the process), and correlation length of the process.
     price : float
-        Logarithm of the determinant and of the choice of size and length, on the scale of chi-square.
+        Penalty on the scale of chi-square: logarithm of the determinant, and of the choice of size and length.
     coefficients : ndarray of float, shape (k,)
-        The numbers as they were estimated.
+        Estimates of the standard normal numbers.
     """
 
     nodes_mm: Array
@@ -79,12 +81,12 @@ class PositionMap:
         return described | curve_values(self.nodes_mm.tolist(), self.curve_mm.tolist())
 
     def is_like(self, other: "PositionMap") -> bool:
-        """Whether size and length agree with another map's within the uncertainty of either."""
+        """Whether size and length agree with those of another map within the uncertainties."""
         pairs = ((self.rms_mm, other.rms_mm), (self.length_mm, other.length_mm))
         return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
-        """Estimate the curve for an explanation; `behind` random effects follow the map's in the problem."""
+        """Estimate the curve for an explanation; in the problem, `behind` columns follow those of the map."""
         best, covariance_of_best = estimated_coefficients(problem, explanation, self.coefficients.size, behind)
         curve = self.root_mm @ best
         rms = float(np.sqrt(np.mean(curve**2)))
@@ -95,7 +97,7 @@ class PositionMap:
 
 
 def why_no_map(history: History, path: InputPath | None) -> str | None:
-    """Reason why these data cannot show a repeatable map; None where they can."""
+    """Reason why these data cannot show a repeatable map; None if they can."""
     history = history if path is None else path.history
     narrowed = EFFECT.search(history)
     if isinstance(narrowed, str):
@@ -114,16 +116,16 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
     Parameters
     ----------
     problem : Problem
-        Without a map.
+        Estimation problem without a map.
     explanation : Explanation
-        Whose residual the map is to explain.
+        Explanation whose residual the map should explain.
 
     Returns
     -------
     found : PositionMap
-        The likeliest.
+        The most probable map.
     gain : float
-        By how much it lowers -2 log of the marginal likelihood, its price paid.
+        Reduction of -2 log of the marginal likelihood, minus the map's penalty.
     """
     history = problem.chain.history
     nodes_mm = _nodes(history)

@@ -12,26 +12,30 @@ from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 
 EVALUATED = 1e6
-"""Samples that a whole walk may predict: a long table's likelihood is close to a normal one and needs few steps."""
+"""Largest number of samples predicted in one random walk: the likelihood of a long table is close to normal, so that
+few steps suffice."""
 LEAST_STEPS, MOST_STEPS = 200, 1200
-"""Steps of a walk: at 200 a standard deviation is known to a tenth where a quarter of the steps are independent."""
+"""Least and largest number of steps of a walk: with 200 steps, of which a quarter are independent, a standard deviation
+is known to a tenth."""
 LEARNT = 150
-"""After so many steps the local walk takes its widths from where it has been (Haario, Saksman & Tamminen 2001)."""
+"""Number of steps after which the local walk takes its widths from the visited points (Haario, Saksman & Tamminen
+2001)."""
 FREEDOM = 5.0
-"""Degrees of freedom of the independent proposals: tails that the posterior's do not outreach."""
+"""Degrees of freedom of the independent proposals, whose tails must be longer than the posterior's."""
 SCALES = (0.02, 0.1, 0.4, 1.2)
-"""Steps of the local walk over the curvature's widths: one of them suits where the curvature misleads."""
+"""Step sizes of the local walk relative to the widths from the curvature: one of them is suitable if the curvature is
+misleading."""
 START_STEP = 1e-3
-"""Step of the derivative by a start state."""
+"""Step for the derivative by a start state."""
 JUMPS = 0.01
-"""Relative width that the walk begins with where the prediction jumps."""
+"""Initial relative width of the walk for parameters on which the prediction depends discontinuously."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Coordinates:
-    """Coordinates of the sampler: reciprocals of corner radii and periods, logarithms of times, else the parameters.
+    """Coordinates of the sampler: reciprocals of corner radii and periods, logarithms of times, other parameters as is.
 
-    In these coordinates, a likelihood that is long and curved in the parameters is nearly parabolic.
+    In these coordinates, a log likelihood with long, curved contours in the parameters is nearly parabolic.
     """
 
     listed: tuple[tuple[str, Parameter], ...]
@@ -39,7 +43,7 @@ class _Coordinates:
 
     @classmethod
     def about(cls, problem: Problem, explanation: Explanation) -> "_Coordinates":
-        """Sample the effects' own parameters; the start states stay fixed (`beside_starts` leaves them open)."""
+        """Coordinates of the effects' own parameters; start states are fixed (see `beside_starts`)."""
         listed = problem.parameters(explanation.names)
         starts: dict[str, dict[str, float]] = {}
         for name, parameter in listed:
@@ -119,14 +123,15 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
     """Sample the posterior under flat priors within the bounds (Metropolis et al. 1953; Tierney 1994).
 
     The curvature at the best fit ignores bounds and non-parabolic likelihoods: a fraction estimated as zero is still
-    uncertain, and the size of a jump has no derivative at all. Independent proposals from the curvature alternate with
-    local steps of several sizes, so that either kind of posterior is reached. All spreads of the runs' offsets, and all
-    noise levels within `noise_doubt`, are sampled too; this gives the posterior Student's tails (Box & Tiao 1973).
+    uncertain, and the prediction has no derivative by the size of a jump. Independent proposals from the curvature
+    alternate with local steps of several sizes, so that both kinds of posterior are explored. The spreads of the runs'
+    offsets, and noise levels within `noise_doubt`, are sampled too, so that the posterior has Student's tails (Box &
+    Tiao 1973).
 
     Returns
     -------
     tuple of dict
-        Parameters, as an explanation's `values`.
+        Draws of the parameters, in the form of an explanation's `values`.
     """
     walk = _Coordinates.about(problem, explanation)
     best = walk.of(explanation.values)
@@ -170,7 +175,7 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
 def beside_starts(problem: Problem, explanation: Explanation) -> Problem:
     """Treat the start states of an explanation as random effects around their fitted values.
 
-    A start state at a bound stays there, because values beyond are impossible.
+    A start state at a bound stays fixed, because values beyond the bound are impossible.
     """
     base = problem.chain.stacked(explanation.values)
     columns = []
@@ -192,16 +197,16 @@ def beside_starts(problem: Problem, explanation: Explanation) -> Problem:
 def settled(
     problem: Problem, explanation: Explanation, rng: np.random.Generator
 ) -> tuple[Explanation, tuple[Point, ...]]:
-    """Give an explanation the spread of its posterior, and at a bound also the posterior mean.
+    """Give an explanation the spread of its posterior, and for parameters at a bound also the posterior mean.
 
     A best fit at a bound is a corner of the region that the data allow; the posterior mean predicts better.
 
     Returns
     -------
     explanation : Explanation
-        Its covariance is the mean square of the draws about its values. The form of an effect is off by `FORM_SHARE`,
-        in as many independent shapes as the catalogue tells apart: so much noise besides. The size of a jump is known
-        no better than the recorded input in which it is seen.
+        Explanation whose covariance is the mean square of the draws about its values. Noise of relative size
+        `FORM_SHARE` is added for the inexactness of an effect's formula, in as many independent shapes as the catalogue
+        distinguishes. The size of a jump is not known better than the recorded input.
     found : tuple of dict
         The draws.
     """

@@ -1,4 +1,4 @@
-"""Probes: generic shapes that are no effect of the catalogue, for structure that no effect explains."""
+"""Probes: generic shapes, not effects of the catalogue, that detect structure which no effect explains."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, History
 
 SPAN = 5
-"""Samples over which a speed is taken."""
+"""Number of samples over which a speed is computed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probes:
-    """Whitened unit shapes and their descriptions; columns of shape (m, k), RMS before whitening."""
+    """Whitened unit shapes with descriptions; columns of shape (m, k), and RMS of each before whitening."""
 
     words: tuple[str, ...]
     columns: Array
@@ -21,7 +21,7 @@ class Probes:
 
 
 def _speed(input_mm: Array, time_s: Array) -> Array:
-    """Speed as the slope over `SPAN` samples: differences of neighbours contain the input's errors."""
+    """Speed as the slope over `SPAN` samples, because differences of neighbours contain the input's errors."""
     if input_mm.size <= SPAN:
         return np.full(input_mm.size, float(np.ptp(input_mm)) / max(float(np.ptp(time_s)), 1e-9))
     ahead = np.minimum(np.arange(input_mm.size) + SPAN // 2 + 1, input_mm.size - 1)
@@ -37,7 +37,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
     Parameters
     ----------
     most : int
-        Columns at most; finer shapes are thinned out beyond it.
+        Largest number of columns; beyond it, finer shapes are thinned out.
     """
     n, u = history.input_mm.size, history.input_mm
     shapes: list[tuple[str, Array]] = []
@@ -98,11 +98,21 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
     if history.force:
         channels.append((0.0, 0.0, 1.0, "the force"))
     shapes = shapes[:: max(1, len(shapes) * len(channels) // most)]
-    words, columns = [], []
-    for gap, midline, force, channel in channels:
-        for label, shape in shapes:
-            parts = [gap * shape, midline * shape] if history.both_edges else [gap * shape]
-            columns.append(np.concatenate([*parts, *([force * shape] if history.force else [])]))
-            words.append(f"{label} in {channel}")
-    raw = np.stack(columns, axis=1)
-    return Probes(tuple(words), whitener.columns(raw)[0], np.sqrt(np.mean(raw**2, axis=0)))
+    words = tuple(f"{label} in {channel}" for *_, channel in channels for label, _ in shapes)
+    bare = np.array([shape for _, shape in shapes]).T
+    # A shape is whitened once in each channel: the edges' shapes are sums of the gap's and the midline's.
+    shares = np.array(
+        [
+            [gap, midline, force][: 1 + history.both_edges] + [force] * history.force
+            for gap, midline, force, _ in channels
+        ]
+    )
+    count = bare.shape[1]
+    columns = np.empty((shares.shape[1] * n, len(words)))
+    for channel in range(shares.shape[1]):
+        whitened = whitener.of_channel(bare, channel)
+        rows = columns[channel * n : (channel + 1) * n]
+        for k, share in enumerate(shares[:, channel]):
+            np.multiply(whitened, share, out=rows[:, k * count : (k + 1) * count])
+    power = np.outer(np.sum(shares**2, axis=1) / shares.shape[1], np.mean(bare**2, axis=0))
+    return Probes(words, columns, np.sqrt(power.ravel()))

@@ -10,28 +10,28 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.domain.effect import Array
 
 LEAST_GAIN = 10.0
-"""Twice the logarithm of a Bayes factor that is very strong evidence (Kass & Raftery 1995,
-doi:10.1080/01621459.1995.10476572): what a random effect must gain beyond its price."""
+"""Least gain of a random effect beyond its penalty: twice the logarithm of a Bayes factor that is very strong evidence
+(Kass & Raftery 1995, doi:10.1080/01621459.1995.10476572)."""
 
 
 def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) -> tuple[Array, Array]:
-    """Normal equations of columns in addition to an explanation, the runs' offsets integrated out.
+    """Normal equations of columns in addition to an explanation, with the runs' offsets integrated out.
 
     Parameters
     ----------
     problem : Problem
-        Without the columns.
+        Estimation problem without the columns.
     explanation : Explanation
-        Whose residual they are to explain.
+        Explanation whose residual the columns should explain.
     raw_mm : ndarray of float, shape (m, k)
-        What a unit of each coefficient does to the prediction.
+        Change of the prediction per unit of each coefficient.
 
     Returns
     -------
     matrix : ndarray of float, shape (k, k)
-        Of the whitened columns.
+        Normal matrix of the whitened columns.
     right : ndarray of float, shape (k,)
-        The whitened columns times the residual.
+        Products of the whitened columns and the residual.
     """
     offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
     white = problem.whitener.columns(raw_mm)[0]
@@ -45,11 +45,11 @@ def estimated_coefficients(problem: Problem, explanation: Explanation, count: in
     Parameters
     ----------
     problem : Problem
-        With the effect's columns among those that are refitted beside every explanation.
+        Estimation problem whose refitted columns include those of the random effect.
     explanation : Explanation
-        Whose residual they explain.
+        Explanation whose residual the random effect explains.
     count, behind : int
-        Columns of the effect, and columns of other random effects that stand behind them.
+        Number of columns of the effect, and number of columns of other random effects that follow them.
 
     Returns
     -------

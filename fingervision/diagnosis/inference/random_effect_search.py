@@ -1,4 +1,4 @@
-"""Search with random effects added: gains that differ from run to run, and a map of position errors."""
+"""Search with a random effect added: gains that differ from run to run, or a map of position errors."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
 from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
@@ -21,19 +21,20 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
 
 BESIDE = 3
-"""Likeliest single effects beside which gains of runs and maps are tried: a hundredth of a search each."""
+"""Number of the most probable single effects with which run gains and maps are tried; each costs a hundredth of a
+search."""
 ROUNDS = 2
-"""Times that effects and a random effect are fitted in turn: the second moves either by little."""
+"""Rounds in which effects and random effect are fitted alternately; the second round changes both only little."""
 
 Effected = TypeVar("Effected", bound=RunGains | PositionMap)
 
 
 def beside_gains(state: Searched, look: Look) -> Searched:
-    """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one.
+    """Search with run-to-run gains included, and keep the result if it is much more probable.
 
-    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name. If
-    further effects are not far more probable than such gains, the gains are kept: naming an effect claims more than
-    stating a scatter.
+    Beside an effect that changes the prediction more than they do, such gains are nuisance parameters; alone they are
+    structure without a name. If further effects are not much more probable than such gains, the gains are kept, because
+    naming an effect claims more than stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
@@ -65,10 +66,10 @@ def beside_gains(state: Searched, look: Look) -> Searched:
 
 
 def beside_map(state: Searched, look: Look) -> Searched:
-    """Search beside a map of position errors, and keep what is found where it is the far likelier explanation.
+    """Search with a map of position errors included, and keep the result if it is much more probable.
 
-    The map competes only where something remains that the other effects do not explain, and at the price of its
-    freedom; where an effect with a few numbers does as well, it stays.
+    The map is tried only if the other effects leave an unexplained residual, and with a penalty for its flexibility; if
+    an effect with a few parameters fits as well, the effect is kept.
     """
     history, found = state.data.chain.history, state.found
     reason = why_no_map(history, state.data.chain.path)
@@ -120,9 +121,10 @@ def beside_map(state: Searched, look: Look) -> Searched:
 def _likelier(
     found: Findings, estimated: Callable[[Problem, Explanation], tuple[Effected, float]], least: float
 ) -> tuple[Explanation | None, Effected] | None:
-    """Find a random effect, added to few effects, that gains `least` over the answer; return it with these, or None.
+    """Find few effects plus a random effect that gain `least` over the present best explanation, or return None.
 
-    Two or three effects can imitate much: a map that was measured from one side only, or runs of different gain.
+    Two or three effects can imitate a random effect, such as a map measured from one side only, or runs of different
+    gain.
     """
     problem = found.problem
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
@@ -138,7 +140,8 @@ def _likelier(
         known = _refitted(_beside(problem, effect), known)
         tried.append((known.bic(rows) + effect.price, known, effect))
     cost, known, effect = min(tried, key=lambda one: one[0])
-    if cost > found.best.bic(rows) - least:
+    rival = found.best if least < 0.0 else min(found.best, found.nearest, key=lambda e: e.bic(rows))
+    if cost > rival.bic(rows) - least:
         return None
     return (known if known.names else None), effect
 
@@ -146,7 +149,7 @@ def _likelier(
 def _line(problem: Problem) -> Explanation:
     """Fit a straight line over the input, as an offset and a ratio where both can be named.
 
-    With a map there is no such line.
+    A map of position errors contains no straight line.
     """
     names = tuple(name for name in ("rest_gap_error", "lever_ratio_error") if name in problem.effects)
     return fit(problem, names, {name: {} for name in names}, iterations=5) if names else problem.nothing()
@@ -160,11 +163,11 @@ def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
 
 
 def _refitted(problem: Problem, one: Explanation) -> Explanation:
-    return fit(problem, one.names, one.values, iterations=10) if one.names else problem.nothing()
+    return fit(problem, one.names, one.values, iterations=MANY_STEPS) if one.names else problem.nothing()
 
 
 def _does_more(beside: Searched) -> bool:
-    """Whether the named effects change the prediction by more than the scatter of the runs' gains does."""
+    """Whether the named effects change the prediction by more than the scatter of the runs' gains."""
     best, gains = beside.found.best, beside.data.run_gains
     if gains is None or not best.names:
         return False
@@ -175,27 +178,26 @@ def _does_more(beside: Searched) -> bool:
 
 def _gained(state: Searched, beside: Searched, effect: RunGains | PositionMap) -> float:
     """By how much -2 log of the likelihood falls by a random effect and what was found beside it, the price paid."""
-    best = state.found.best
     plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
-    rival = fit(plain, best.names, best.values, iterations=20) if best.names else plain.nothing()
-    return rival.bic(rows) - beside.found.best.bic(rows) - effect.price
+    rivals = [_refitted(plain, one) for one in (state.found.best, state.found.nearest)]
+    return min(rival.bic(rows) for rival in rivals) - beside.found.best.bic(rows) - effect.price
 
 
 def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:
-    """Leave effects out of the search, each for its reason."""
+    """Exclude effects from the search, each with its reason."""
     kept = {name: effect for name, effect in data.effects.items() if name not in reasons}
     return replace(data, effects=kept, excluded={**data.excluded, **reasons})
 
 
 def _left(problem: Problem, explanation: Explanation) -> Explanation:
-    """Judge an explanation as it stands by another observation model."""
+    """Score an explanation, without refitting, in another estimation problem."""
     residual = problem.measured - problem.whitened(explanation.values)
     return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
 
 
 def _without(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """The same problem without a random effect's columns, which are the first ones where it was added last."""
+    """The problem without a random effect's columns, which are the first columns if the effect was added last."""
     count, drawing = effect.coefficients.size, problem.whitener.drawing
     kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
     return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=kept)))

@@ -1,7 +1,7 @@
-"""Reference slots measured during a run: a camera error acts on slot and gap, a gripper error on the gap alone.
+"""Reference slots measured during a run: a camera error affects slot and gap, a gripper error only the gap.
 
-The gap alone cannot distinguish a wrong scale from a wrong lever ratio, nor an edge bias from a wrong rest gap; an
-opening of known width can.
+The gap alone cannot distinguish a wrong scale from a wrong lever ratio, nor an edge bias from a wrong rest gap; a
+measured slot of known width can.
 """
 
 from collections.abc import Mapping
@@ -27,16 +27,16 @@ Values = Mapping[str, Mapping[str, float]]
 
 
 def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Findings, tuple[str, ...]]:
-    """Drop the explanations that a reference slot contradicts, and report what the slots showed.
+    """Drop the explanations that a reference slot contradicts, and report the result of the slots.
 
-    If all are contradicted none is dropped: then something else is wrong, and the sentence says so.
+    If the slots contradict all explanations, none is dropped: then something else is wrong, which a sentence reports.
 
     Returns
     -------
     Findings
-        With the best of the explanations that are left, first among them.
+        Findings with the best of the remaining explanations first.
     tuple of str
-        A sentence for each slot, and one for what was dropped.
+        One sentence for each slot, and one about dropped explanations.
     """
     slots = data.table.slots
     if not slots:

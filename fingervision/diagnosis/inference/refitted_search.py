@@ -1,4 +1,4 @@
-"""Search for effects and refit the uncertain dimensions of the drawing alternately, until both agree."""
+"""Search for effects and refit the drawing's uncertain dimensions alternately, until neither changes the other."""
 
 from dataclasses import dataclass, replace
 
@@ -21,26 +21,27 @@ from fingervision.diagnosis.input.intersample_interpolation import likelier_inte
 from fingervision.diagnosis.input.observations import Observations
 
 BY_ACCIDENT = 1e-3
-"""Probability by which the runs' offsets have a mean so far from zero by accident (Student's t), below which they share
-a cause."""
+"""Probability of the observed or a larger mean of the runs' offsets by chance (Student's t), below which the offsets
+are given a common cause."""
 LOWERED = 0.9
-"""Times what stands that an answer with such a cause must leave at most."""
+"""Largest ratio of the residuals with and without such a common cause for which it is accepted."""
 MOST_SEARCHES = 3
-"""The second is nearly always the last, and none is needed where the drawing's numbers act along a straight line."""
+"""Most searches: the second is nearly always the last, and none is needed if the prediction depends linearly on the
+drawing's dimensions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refitted:
-    """Result of the search, with the measurement compared to the refitted gripper.
+    """Result of the search, with the measurement compared to the gripper with refitted dimensions.
 
     Parameters
     ----------
     data : Observations
-        Measurement and model; the drawing's uncertain numbers stand where they explain the most.
+        Measurement and model, with the uncertain dimensions at the values that explain most.
     found : Findings
-        What the search found.
+        Findings of the search.
     posterior : tuple of dict
-        Draws of the best explanation's parameters.
+        Posterior draws of the best explanation's parameters.
     """
 
     data: Observations
@@ -55,18 +56,18 @@ def refitted_search(
     without: frozenset[str],
     progress: Progress,
 ) -> Refitted:
-    """Search in stages: interpolation between samples, a map of position errors, run gains, a redrawn gripper.
+    """Search in stages: interpolation between samples, a map of position errors, run gains, refitted dimensions.
 
     Parameters
     ----------
     data : Observations
         Measurement and model.
     rng : numpy Generator
-        For the bootstrap and the posterior.
+        Generator for bootstrap and posterior.
     forced, without : frozenset of str
-        Effects that the user insists on, or rules out.
+        Effects that the user requires, or excludes.
     progress : callable
-        Told the share that is done.
+        Called with the share of the work that is done.
     """
     look = Look(rng, forced, progress)
     state = look.again(data)
@@ -82,7 +83,7 @@ def refitted_search(
 
 
 def _over_the_ends(state: Searched, look: Look) -> Searched:
-    """Search along a path with overshoots, and keep the result where an effect with memory then fits better."""
+    """Search along a path with overshoots; keep the result if an effect with memory then fits better."""
     data = state.data.with_overshoots()
     if data is state.data:
         return state
@@ -97,10 +98,10 @@ def _over_the_ends(state: Searched, look: Look) -> Searched:
 
 
 def _common_offset(state: Searched, look: Look) -> Searched:
-    """Search again for a constant common to all runs, which run offsets had absorbed.
+    """Search again for a constant common to all runs, which had been absorbed by the run offsets.
 
-    Runs with nearly the same offset share a cause; the spread of their offsets is then limited to their departure from
-    the mean.
+    If all runs have nearly the same offset, this has a common cause; the spread of the offsets is then limited to their
+    deviation from the mean.
     """
     runs = len(state.data.chain.history.runs)
     found = state.found

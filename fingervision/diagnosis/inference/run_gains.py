@@ -1,8 +1,8 @@
 """Gains that differ from run to run: a random effect on the ratio of gap to input, added to every explanation.
 
-A part that was clamped anew, or a polymer at another temperature, moves slightly more or less in each run. Like the
-runs' offsets, these gains are zero-mean random effects (Laird & Ware 1982, doi:10.2307/2529876), because their common
-mean is a ratio error, which is an effect of the catalogue.
+For example, a part that is clamped again for each run, or a polymer at another temperature, moves by slightly more or
+less in each run. Like the runs' offsets, these gains are zero-mean random effects (Laird & Ware 1982,
+doi:10.2307/2529876), because their common mean is a ratio error, which is an effect of the catalogue.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from fingervision.diagnosis.inference.random_effect import estimated_coefficient
 from fingervision.domain.effect import Array
 
 FEWEST_RUNS = 2
-"""One run has no scatter of gains."""
+"""Least number of runs: a single run has no scatter of gains."""
 SIZES = np.geomspace(1e-4, 0.2, 34)
 """Standard deviations of the gain that are tried; runs that differ by more than a fifth are not one experiment."""
 
@@ -26,13 +26,13 @@ class RunGains:
     Parameters
     ----------
     columns_mm : ndarray of float, shape (channels * n, runs)
-        What one standard deviation of each run's gain does to the prediction.
+        Change of the prediction per standard deviation of each run's gain.
     sd : float
         Standard deviation of the gain from run to run, as a ratio.
     price : float
-        Logarithm of the determinant and of the choice of `sd`, on the scale of chi-square.
+        Penalty on the scale of chi-square: logarithm of the determinant, and of the choice of `sd`.
     coefficients : ndarray of float, shape (runs,)
-        The gains in units of `sd`, as they were estimated.
+        Estimated gains in units of `sd`.
     """
 
     columns_mm: Array
@@ -47,11 +47,11 @@ class RunGains:
 
     @property
     def scatter_mm(self) -> Array:
-        """Change of the prediction by the gains' departures from their mean."""
+        """Change of the prediction by the gains' deviations from their mean."""
         return np.asarray(self.columns_mm @ (self.coefficients - self.coefficients.mean()), dtype=np.float64)
 
     def without_mean(self) -> "RunGains":
-        """Remove the gains' common mean, which is left to the effects of the catalogue."""
+        """Remove the gains' common mean, which is an effect of the catalogue."""
         shared = np.full((self.coefficients.size,) * 2, 1.0 / self.coefficients.size)
         return replace(self, columns_mm=self.columns_mm - self.columns_mm @ shared)
 
@@ -65,7 +65,7 @@ class RunGains:
         )
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
-        """Estimate the gains for an explanation; `behind` random effects follow them in the problem."""
+        """Estimate the gains for an explanation; in the problem, `behind` columns follow those of the gains."""
         return replace(
             self, coefficients=estimated_coefficients(problem, explanation, self.coefficients.size, behind)[0]
         )
@@ -77,16 +77,16 @@ def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGain
     Parameters
     ----------
     problem : Problem
-        Without such gains.
+        Estimation problem without such gains.
     explanation : Explanation
-        Whose residual they are to explain, and whose prediction they multiply.
+        Explanation whose residual the gains should explain, and whose prediction they multiply.
 
     Returns
     -------
     found : RunGains
-        The likeliest.
+        The most probable gains.
     gain : float
-        By how much they lower -2 log of the marginal likelihood, their price paid.
+        Reduction of -2 log of the marginal likelihood, minus the gains' penalty.
     """
     history = problem.chain.history
     n = history.input_mm.size

@@ -19,7 +19,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     swapped,
     within_a_step,
 )
-from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure, shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
@@ -27,34 +27,46 @@ from fingervision.diagnosis.inference.signatures import Signatures, signatures
 from fingervision.diagnosis.inference.significance import Evidence
 
 TRIPLE_SHARE = 0.15
-"""A third effect needs evidence of its own: three effects bend to almost anything."""
+"""Least share of the whole change of the prediction that a third effect must contribute (`added_share`): three effects
+can fit almost anything."""
 PAIRS_REFITTED = 60
-"""Pairs refitted jointly, those first whose signatures take the most: all of 27 effects would be 351."""
+"""Number of pairs that are refitted jointly, those first whose signatures gain most: 27 effects have 351 pairs."""
 PART_OF_UNKNOWN = 9.0
-"""Times what still stands, in chi-square, that a part must explain to be told beside *unknown*: it then leaves a
-third of it, as RMS."""
+"""Ratio, in chi-square, of the part that an effect explains to the remaining residual above which the effect is
+reported in addition to *unknown*: the residual is then a third of the disagreement, as RMS."""
 COMPLETE = 0.05
-"""Share of what stands beyond the noise, in chi-square, that a complete explanation leaves: forms that only bend to
-what an effect's form leaves over take less of it."""
+"""Largest remaining share, in chi-square beyond the noise, of a complete explanation: effects that only fit the
+inexactness of another effect's formula reduce it by less."""
 NOISY = 2.0 * 2.0**0.5
-"""Square roots of the rows by which the chi-square of noise exceeds them now and then: two of its standard deviations,
-sqrt(2 n)."""
+"""Excess of the chi-square of noise over the number of rows n that occurs now and then, in units of sqrt(n): two
+standard deviations sqrt(2 n)."""
 PAIRS_EXTENDED = 6
 """Pairs of different predictions to which a third effect is added: three of them may be one pair by three names."""
+LIKELIEST = 6
+"""Explanations, best first, among which Schwarz's criterion chooses: those of one prediction are seldom more."""
+TRIPLES_REFITTED = 24
+"""Triples refitted jointly, those first whose signatures take the most: a fifth of what all pairs would be."""
+ROUGH = 2
+"""Starts, and explanations refitted thoroughly, of a first search that is for the noise alone; where its fit is poor,
+the chi-square of the answer says so, and the search is repeated (`searched.QUIET`)."""
 BASES = 14
-"""Single effects to which a second one is added."""
+"""Number of single effects to which a second effect is added."""
 SHORT = 100
-"""Samples below which the noise is estimated beside single effects only."""
+"""Number of samples below which the noise is estimated with single effects only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """Result of a search; explanations in descending order of their score."""
+    """Result of a search; explanations in descending order of their score.
+
+    `nearest` is the likeliest of one or two effects, whether or not its second effect is large enough to be named.
+    """
 
     best: Explanation
     alternatives: tuple[Explanation, ...]
     nothing: Explanation
     singles: tuple[Explanation, ...]
+    nearest: Explanation
     unknown: str | None
     left_over: str | None
     smallest: dict[str, dict[str, object]]
@@ -63,18 +75,20 @@ class Findings:
 
 
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
-    """Whether the larger explanation removes nearly all of the residual of the smaller one, as a true one does.
+    """Whether the larger explanation removes nearly all of the smaller one's residual, as a true one does.
 
     The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
-    added fits part of that inexactness, however large the residual is; other effects in its place that leave noise
-    alone depend less on it.
+    added fits part of that inexactness, however large the residual is. Other effects in its place depend less on it;
+    where these leave noise alone, only what formulas are typically off by speaks for the smaller one: a creep that
+    left 70 times the noise, 3.6 % of what it explained, had stood for a ratio and an offset that leave none.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows
     joins = set(smaller.names) <= set(larger.names)
-    share = state.problem.form_share if joins else SMALL_SHARE
+    noise_alone = not joins and larger.score - rows < NOISY * rows**0.5
+    share = state.problem.form_share if joins else FORM_SHARE if noise_alone else SMALL_SHARE
     plain = max(float(rows), share**2 * (state.nothing.score - smaller.score))
-    return stands > plain and larger.score - rows < max(COMPLETE * stands, 0.0 if joins else NOISY * rows**0.5)
+    return stands > plain and (noise_alone or larger.score - rows < COMPLETE * stands)
 
 
 def search(
@@ -84,22 +98,23 @@ def search(
     progress: Progress,
     known: Explanation | None = None,
 ) -> Findings:
-    """Find the best explanation, those indistinguishable from it, and the remaining structure.
+    """Find the best explanation, the indistinguishable ones, and the remaining structure.
 
-    The stages are one effect, two, three, the test for *unknown*, the ambiguity set; each returns a new state.
+    The stages are the fits of one, two and three effects, the test for *unknown*, and the ambiguity set; each stage
+    returns a new state.
 
     Parameters
     ----------
     problem_beside : callable
-        Gives the problem with the noise estimated on an explanation's residual.
+        Returns the estimation problem with the noise estimated from the residual of a given explanation.
     rng : numpy Generator
-        For the bootstrap of the null.
+        Generator for the null bootstrap.
     forced : frozenset of str
-        Effects that the user insists on.
+        Effects that the user requires.
     progress : callable
-        Told the share that is done.
+        Called with the share of the work that is done.
     known : Explanation or None
-        Found by an earlier search of the same measurement: the noise is estimated beside it.
+        Explanation found by an earlier search of the same measurement, from whose residual the noise is estimated.
     """
     state = _one_effect(_noise_known(problem_beside, known), rng, forced)
     progress(0.3)
@@ -114,24 +129,25 @@ def search(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _State:
-    """What the search has found so far.
+    """State of the search.
 
     Parameters
     ----------
     problem, atoms : Problem, Signatures
-        The data, and what each effect would add.
+        The estimation problem, and the signatures of all effects.
     nothing, best : Explanation
-        The model as it is, and the explanation that stands.
+        The model without effects, and the present best explanation.
     peers : list of Explanation
-        Explanations of as many effects as the best, best first.
+        Explanations with as many effects as the best, best first.
     shapes : Probes
-        Generic shapes that no catalogue names.
+        Generic shapes that are not in the catalogue.
     singles, pairs, triples : list of Explanation
-        All of one effect, and the likeliest of two and three, best first.
+        All explanations with one effect, and the most probable ones with two and three, best first.
     evidence : Evidence or None
-        What gains are judged by.
+        Criterion for the significance of gains.
     imitation, unknown, left_over : str or None
-        Probes for which effects only stand in; structure that nothing explains; structure that is small.
+        Description of a probe that effects only imitate; of structure that no effect explains; of remaining structure
+        that is small.
     """
 
     problem: Problem
@@ -154,22 +170,22 @@ class _State:
         return max(2, int(self.problem.measured.size))
 
     def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
-        """Whether the best of some explanations gains more over `base` than noise would give it."""
+        """Whether the best of some explanations gains more over `base` than noise alone would."""
         return self.evidence is not None and self.evidence.speaks_for(found, base)
 
 
 def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> _State:
-    """Estimate the noise with the known effects removed, or with those of a rough first search."""
+    """Estimate the noise from the residual of the known effects, or of those from a rough first search."""
     if known is not None:
         problem = problem_beside(known)
         nothing = problem.nothing()
         return _State(problem, signatures(problem), nothing, nothing, [nothing], shapes_of(problem))
     problem = problem_beside(None)
     atoms = signatures(problem)
-    rough = single_effects(problem, atoms, 4)
+    rough = single_effects(problem, atoms, 4, ROUGH)
     # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
     many = problem.chain.history.input_mm.size >= SHORT
-    pairs = extended(problem, atoms, rough[:3], 16, lambda _: None) if many else []
+    pairs = extended(problem, atoms, rough[:3], 16, lambda _: None, scanned=1, refined=ROUGH) if many else []
     first = [*rough[:1], *pairs[:1]]
     if first:
         problem = problem_beside(min(first, key=lambda e: e.bic(problem.measured.size)))
@@ -179,7 +195,7 @@ def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known:
 
 
 def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str]) -> _State:
-    """Fit every effect alone; the simplest one that is as good as the best is kept, if its gain is significant."""
+    """Fit every effect alone; keep the simplest that is as good as the best, if its gain is significant."""
     problem = state.problem
     singles = [e for e in single_effects(problem, state.atoms, 20) if not within_a_step(problem, e)]
     evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
@@ -192,11 +208,11 @@ def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str])
         return replace(state, best=simplest(near, state.values, state.nothing), peers=singles)
     if not (state.speaks_for(singles, state.nothing) or forced):
         return state
-    return replace(state, best=simplest(singles[:6], state.values, state.nothing), peers=singles)
+    return replace(state, best=simplest(singles[:LIKELIEST], state.values, state.nothing), peers=singles)
 
 
 def _two_effects(state: _State, progress: Progress) -> _State:
-    """Fit pairs built from the single effects, then again from each half's place in the best pair."""
+    """Fit pairs built from single effects, then pairs in which one effect of the best pair is replaced."""
     if not state.best.names:
         return state
     problem, singles = state.problem, state.singles
@@ -206,18 +222,22 @@ def _two_effects(state: _State, progress: Progress) -> _State:
     # Beside a simpler form a second effect would gain what the richest has gained already.
     if not pairs:
         return state
-    large = added_share(problem, singles[0], pairs[0]) > SMALL_SHARE or _completes(state, singles[0], pairs[0])
-    if large and state.speaks_for(pairs, singles[0]):
-        return replace(state, best=likeliest(pairs[:6], state.values), peers=pairs)
+    large = added_share(problem, singles[0], pairs[0]) > SMALL_SHARE
+    if (large or any(_completes(state, singles[0], pair) for pair in pairs[:LIKELIEST])) and state.speaks_for(
+        pairs, singles[0]
+    ):
+        return replace(state, best=likeliest(pairs[:LIKELIEST], state.values), peers=pairs)
     return state
 
 
 def _three_effects(state: _State, progress: Progress) -> _State:
-    """Fit triples, unless one or two probes with fewer effects do as well."""
+    """Fit triples, unless one or two probes with fewer effects fit as well."""
     if len(state.best.names) != 2:
         return state
     problem, pairs = state.problem, state.pairs
-    tried = extended(problem, state.atoms, different(problem, pairs, PAIRS_EXTENDED), 24, progress)
+    bases = different(problem, pairs, PAIRS_EXTENDED)
+    asked = None if state.evidence is None else state.evidence.thresholds
+    tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH, asked=asked)
     triples = [e for e in tried if not within_a_step(problem, e)]
     state = replace(state, triples=triples)
     if not triples:
@@ -231,7 +251,7 @@ def _three_effects(state: _State, progress: Progress) -> _State:
         return replace(state, imitation=imitation) if large else state
     triples.sort(key=lambda e: e.bic(state.values))
     triples = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
-    return replace(state, triples=triples, best=likeliest(triples[:6], state.values), peers=triples)
+    return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST], state.values), peers=triples)
 
 
 def _without_imitations(state: _State) -> _State:
@@ -254,7 +274,7 @@ def _gated(state: _State, rng: np.random.Generator) -> _State:
 
 
 def _findings(state: _State, forced: frozenset[str]) -> Findings:
-    """Collect what is indistinguishable from the best; of an unknown residual, keep a part only if it explains much."""
+    """Collect explanations indistinguishable from the best; for *unknown*, keep an effect that explains much."""
     problem, best, nothing = state.problem, state.best, state.nothing
     alternatives, distances = [best], dict[tuple[str, ...], float]()
     if best.names and not forced:
@@ -276,6 +296,7 @@ def _findings(state: _State, forced: frozenset[str]) -> Findings:
         alternatives=tuple(alternatives),
         nothing=nothing,
         singles=tuple(state.singles),
+        nearest=likeliest([nothing, *state.singles[:1], *state.pairs[:LIKELIEST]], state.values),
         unknown=state.unknown,
         left_over=state.left_over,
         smallest=smallest,

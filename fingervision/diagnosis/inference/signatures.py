@@ -10,7 +10,7 @@ from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array, History, start_key
 
 START_MOVES = 1e-3
-"""Share of the range that a first move must exceed to tell from which side a run begins."""
+"""Least size of a first motion, as a share of the range, that determines from which side a run starts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,13 +20,13 @@ class Signatures:
     Parameters
     ----------
     names : tuple of str, length k
-        Effect of each column.
+        Name of the effect of each column.
     starts : tuple of dict, length k
         Parameters of each column.
     grows : tuple of (str, float, float) or None, length k
-        Parameter that scales the column nearly linearly with its neutral value and step; None where none does.
+        Parameter that scales the column nearly linearly, with its neutral value and step; None if there is none.
     columns : ndarray of float, shape (m, k)
-        Whitened difference to the model without the effect.
+        Whitened difference from the model without the effect.
     """
 
     names: tuple[str, ...]
@@ -37,12 +37,12 @@ class Signatures:
     def gains(
         self, residual: Array, offsets: RunOffsets, metric: Array, along: Array | None = None
     ) -> tuple[Array, Array]:
-        """Fall of chi-square that each column alone achieves in a residual, and its coefficient; shape (k,).
+        """Reduction of chi-square that each column alone achieves in a residual, and its coefficient; shape (k,).
 
         Parameters
         ----------
         along : ndarray of float, shape (m, p), or None
-            Columns that are refitted alongside and projected out.
+            Columns that are refitted at the same time and projected out.
         """
         shared = offsets.design.T @ self.columns
         weighted = residual - offsets.design @ (metric @ (offsets.design.T @ residual))
@@ -74,7 +74,7 @@ class Signatures:
         return out
 
     def begin(self, index: int, coefficient: float) -> dict[str, float]:
-        """Parameters from which to start a search, with the amplitude scaled by the coefficient."""
+        """Parameters from which a search starts, with the amplitude scaled by the coefficient."""
         start, grow = dict(self.starts[index]), self.grows[index]
         if grow is not None:
             name, neutral, step, lower, upper = grow
@@ -83,7 +83,7 @@ class Signatures:
 
 
 def signatures(problem: Problem) -> Signatures:
-    """Enable every effect at every starting value, in the complete chain."""
+    """Compute the signatures: every effect at each of its starting values, in the complete measuring chain."""
     bare = problem.chain.stacked({})
     names, starts, grows, columns = [], [], [], []
     for name in problem.effects:
@@ -113,7 +113,7 @@ def signatures(problem: Problem) -> Signatures:
 
 
 def start_patterns(history: History) -> tuple[dict[str, float], ...]:
-    """Start states from which to search: in the middle, as the first motion would leave them, and at the other end."""
+    """Start states from which to search: in the middle, as left by the first motion, and at the other end."""
     first = []
     for run in history.runs:
         moves = np.diff(history.input_mm[run])

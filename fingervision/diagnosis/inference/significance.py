@@ -1,4 +1,4 @@
-"""Significance of a gain: whether noise alone would give one more effect as much."""
+"""Significance of a gain: whether noise alone would give one more effect the same gain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from fingervision.diagnosis.inference.null_bootstrap import exceeds_noise, jumps
 from fingervision.diagnosis.inference.signatures import Signatures
 
 SUSPECTS = 2
-"""Explanations of the measurement that are tried on every draw of noise as well."""
+"""Number of explanations of the measurement that are also tried on every draw of noise."""
 CLEARLY = 2.5
-"""Times the linear threshold above which a gain needs no bootstrap to be judged."""
+"""Ratio of a gain to the linear threshold above which no bootstrap is needed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Thresholds and simulations by which gains are judged.
+    """Thresholds and simulations for judging gains.
 
     Parameters
     ----------
     problem, atoms
-        The data, and the effects' signatures.
+        The estimation problem, and the effects' signatures.
     thresholds : mapping of str to float
-        Chi-square that each effect must gain at least.
+        Least chi-square gain of each effect.
     rng : numpy Generator
-        For draws of noise.
+        Generator for draws of noise.
     """
 
     problem: Problem
@@ -41,7 +41,7 @@ class Evidence:
         return cls(problem, atoms, linear_thresholds(problem, atoms.names, columns, sigma, rng), rng)
 
     def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
-        """Whether the best of some explanations gains more over `base` than noise would give it."""
+        """Whether the best of some explanations gains more over `base` than noise alone would."""
         asked = {e.names: price(self.thresholds, base, e.names) for e in found}
         ranked = sorted(found, key=lambda e: e.score + asked[e.names])
         if not ranked:

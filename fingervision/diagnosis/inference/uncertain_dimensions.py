@@ -1,7 +1,8 @@
 """Uncertain dimensions of the drawing, refitted within their uncertainties together with the effects.
 
-They enter as random effects (Henderson 1950): y = M(theta) + J (theta - theta_0), with theta - theta_0 normal about
-zero with the stated uncertainty. J is evaluated at the last estimate; the prior stays centred on the drawn value.
+The dimensions theta are random effects (Henderson 1950): y = M(theta) + J (theta - theta_0), with theta - theta_0
+normally distributed about zero with the stated uncertainty. The Jacobian J is evaluated at the last estimate; the prior
+stays centred on the drawn value.
 """
 
 from collections.abc import Mapping
@@ -16,11 +17,11 @@ from fingervision.domain.effect import Array
 from fingervision.domain.model import PhysicalModel
 
 STEP = 0.1
-"""Of the uncertainty: the step that the derivatives are taken over."""
+"""Step of the derivatives, as a share of the standard uncertainty."""
 FARTHEST = 6.0
-"""Standard uncertainties that a number may be redrawn by; its normal prior hardly ever lets it come so far."""
+"""Largest change of a dimension, in standard uncertainties; its normal prior makes larger changes improbable."""
 BENT = 1.0
-"""Chi-square by which a tangent may miss the body itself before the search is worth repeating."""
+"""Largest error of the linearised prediction, in chi-square, for which the search is not repeated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,11 +31,12 @@ class DrawingRefit:
     Parameters
     ----------
     columns : ndarray of float, shape (m, p)
-        Change of the stacked prediction by one standard uncertainty of each.
+        Change of the stacked prediction per standard uncertainty of each dimension.
     moved : mapping of str to float
-        How many standard uncertainties each stands from its drawn value in the model, by dotted name.
+        Present deviation of each dimension from its drawn value in the model, in standard uncertainties, by dotted
+        name.
     known : mapping of str to float
-        Share of the uncertainty that the measurement leaves.
+        Share of each standard uncertainty that remains after the measurement.
     """
 
     columns: Array
@@ -43,7 +45,7 @@ class DrawingRefit:
 
     @property
     def shift(self) -> Array:
-        """Change of the prediction by the refit, by its tangent; shape (m,)."""
+        """Change of the prediction due to the refit, in linear approximation; shape (m,)."""
         return np.asarray(self.columns @ np.array(list(self.moved.values())), dtype=np.float64)
 
 
@@ -55,9 +57,9 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
     chain : MeasuringChain
         History and fixed effects.
     drawn : PhysicalModel
-        The gripper as drawn.
+        The drawn gripper.
     moved : mapping of str to float
-        In standard uncertainties.
+        Deviations of the dimensions in standard uncertainties.
     """
     columns, names = [], []
     for name in drawn.uncertain:
@@ -77,7 +79,7 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
 
 
 def with_moved(drawn: PhysicalModel, moved: Mapping[str, float]) -> PhysicalModel:
-    """Return the gripper, computed anew, with each dimension moved by this number of its standard uncertainties."""
+    """Return the gripper, computed again, with each dimension changed by a number of its standard uncertainties."""
     return drawn.drawn_anew(_changes(drawn, moved))
 
 
@@ -93,7 +95,7 @@ def estimated(
     Returns
     -------
     moved, known : dict of str to float
-        In standard uncertainties, by dotted name.
+        Deviations, and remaining uncertainties, in standard uncertainties, by dotted name.
     """
     offsets = problem.offsets
     metric = offsets.metric(explanation.sigma_mm)

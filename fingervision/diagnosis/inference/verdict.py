@@ -1,4 +1,4 @@
-"""Decide the verdict: effects are named only where they explain nearly all of the disagreement."""
+"""Decide the verdict: effects are named only if they explain nearly all of the disagreement."""
 
 from dataclasses import dataclass, replace
 
@@ -17,45 +17,47 @@ from fingervision.domain.effect import Array
 from fingervision.domain.report import Verdict
 
 STANDING_SHARE = 0.05
-"""Share of the disagreement, as RMS, that a named explanation may leave: the catalogue's forms are off by that much."""
+"""Largest share of the disagreement, as RMS, that named effects may leave: the inexactness of the catalogue's
+formulas."""
 STANDING_NOISES = 3.0
-"""Standard deviations of the noise that it may leave in any case: less hardly shows to the eye."""
+"""Residual in standard deviations of the noise that is acceptable in any case, because it is hardly visible."""
 TRUSTED = 10.0
-"""Times the measurement's own random uncertainty that noise may have: more is structure that looks like noise."""
+"""Largest ratio of the estimated noise to the measurement's own random uncertainty; above it, structure was mistaken
+for noise."""
 NEEDED = 1.1
-"""Times that dropping an effect may raise what stands, as RMS; an effect that lowers it by more is seen by eye."""
+"""Factor by which dropping an effect may increase the residual (RMS); an effect that reduces it by more is kept."""
 AS_MUCH = 2.0**0.5
-"""Times what stands that a straight line may leave for a curve beside unknown structure, as RMS: twice its power, for
-that structure bends the richer form as it does the noise."""
+"""Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
+power, because a richer formula also fits part of that structure."""
 MANY_ASIDE = 0.1
-"""Share of the rows that may be gross errors beside a model that agrees: of more, something is the cause."""
+"""Largest share of rows that may be gross errors if the model agrees; a larger share must have a cause."""
 COMMON = 2.0
-"""Standard errors from zero from which on the mean of the runs' offsets is a constant that they share."""
+"""Mean of the runs' offsets, in standard errors from zero, above which it counts as a common constant."""
 LACK_OF_FIT = 1e-3
-"""Significance of the F ratio of lack of fit to pure error, above which nothing is to be explained."""
+"""Significance of the F ratio of lack of fit to pure error above which there is nothing to explain."""
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """Fraction of the disagreement that an explanation leaves unexplained.
+    """Share of the disagreement that an explanation leaves unexplained.
 
-    All values are RMS over left and right where both exist, else over the gap; the midline's constant, the runs'
-    deviations from their common mean and outliers are removed.
+    All values are RMS over left and right if both are measured, else over the gap; the midline's constant, the runs'
+    deviations from their common mean, and outliers are removed.
 
     Parameters
     ----------
     before_mm, after_mm : float
-        Without and with the explanation.
+        RMS without and with the explanation.
     noise_mm : float
-        What would be left of a true one: noise of the picture, and the recorded input's own error.
+        RMS that a true explanation would leave: noise of the picture, and the recorded input's own error.
     rows : int
-        Values that count.
+        Number of values used.
     noise_degrees : int or None
-        Degrees of freedom of a noise that comes from repeats; None where it comes from the residual itself.
+        Degrees of freedom of a noise estimated from repeats; None for a noise estimated from the residual itself.
     rounding_mm : float
-        Largest error that the rounding of a reading makes: half its last digit.
+        Largest rounding error of a reading: half of its last digit.
     aside_share : float
-        Share of the rows that were set aside as gross errors.
+        Share of the rows excluded as gross errors.
     """
 
     before_mm: float
@@ -68,7 +70,7 @@ class Standing:
 
     @property
     def explained_share(self) -> float:
-        """1 - (after / before)^2, from 0 to 1."""
+        """Explained share of the variance, 1 - (after / before)^2, from 0 to 1."""
         return float(np.clip(1.0 - (self.after_mm / max(self.before_mm, 1e-300)) ** 2, 0.0, 1.0))
 
     @property
@@ -93,7 +95,7 @@ class Standing:
 
 
 def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
-    """Compute the unexplained fraction; `before_mm` and `after_mm` of shape (channels * n,)."""
+    """Compute the unexplained share; `before_mm` and `after_mm` have shape (channels * n,)."""
     if data.run_gains is not None:
         after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
@@ -134,9 +136,9 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
-    """Subtract each run's deviation from the mean of all runs; a common constant remains, if it is one.
+    """Subtract each run's deviation from the mean of all runs; a significant common constant remains.
 
-    If runs were zeroed at random, their mean differs from zero by an amount that their scatter allows.
+    The mean is not significant if random zeroing of the runs, judged by their scatter, would cause as large a mean.
     """
     means = np.array([values[run].mean() for run in runs])
     common = float(means.mean())
@@ -160,9 +162,9 @@ def standing_of(data: Observations, found: Findings) -> Standing:
 
 
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
-    """Drop effects that explain less than the remaining residual: such an effect may only imitate a part of it.
+    """Drop effects that explain less than the remaining residual, because they may only imitate a part of it.
 
-    Where structure remains beside several effects, each further one is fitted to that structure as well as to its own.
+    If structure remains in addition to several effects, each effect is fitted to part of that structure as well.
     """
     rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
     while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):
@@ -177,10 +179,10 @@ def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
 
 
 def with_simpler_parts(data: Observations, found: Findings) -> Findings:
-    """With unknown structure, replace an effect by a straight line where the line leaves about as much residual.
+    """If there is unknown structure, replace an effect by a straight line that leaves about as much residual.
 
-    A richer formula gains by fitting unexplained structure: an apparent warming within two seconds may be only an
-    offset and one odd stretch of the record.
+    A richer formula gains by fitting unexplained structure: an apparent warming within two seconds may only be an
+    offset and one unusual part of the record.
     """
     most_mm = AS_MUCH * standing_of(data, found).after_mm if found.unknown is not None else 0.0
     while found.unknown is not None:
@@ -193,7 +195,7 @@ def with_simpler_parts(data: Observations, found: Findings) -> Findings:
 
 
 def _with_a_line(found: Findings) -> list[Explanation]:
-    """Explanations in which one curved effect of the best is replaced by a straight line over the input."""
+    """Explanations in which one curved effect of the best one is replaced by a straight line over the input."""
     best, problem = found.best, found.problem
     curved = [n for n, s in zip(best.names, own_shapes(problem, best), strict=True) if not is_a_line(problem, s)]
     out = []

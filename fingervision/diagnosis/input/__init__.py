@@ -1,1 +1,1 @@
-"""The recorded input: smoothing, encoder, and the stage's path between the readings."""
+"""The recorded input: smoothing, encoder, and path of the stage between the readings."""

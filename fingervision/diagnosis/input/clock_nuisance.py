@@ -1,4 +1,4 @@
-"""The clock offset between input and pictures as a random effect, where it was found from the same motion."""
+"""Clock offset between input and pictures as a random effect, if it was estimated from the same motion."""
 
 import numpy as np
 
@@ -6,9 +6,10 @@ from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.domain.effect import Array
 
 FREEDOM = 3.0
-"""Times its uncertainty that the offset is left to be refitted within. It was found from these very data, so that its
-uncertainty is no knowledge besides them: within 3 u the prior adds a ninth to what the data say, where u itself would
-count them twice and state a play that is entangled with the offset too surely."""
+"""Factor on the offset's uncertainty for its prior when it is refitted. The offset was found from these same data, so
+that its uncertainty is no independent knowledge: with 3 u the prior adds a ninth of the data's information, whereas
+with u the data would be counted twice, and the uncertainty of a play that is correlated with the offset would be
+understated."""
 
 
 def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
@@ -17,9 +18,9 @@ def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
     Parameters
     ----------
     chain : MeasuringChain
-        Model over the recorded input.
+        Model with the recorded input.
     u_clock_s : float
-        Standard uncertainty of the offset; 0 where the clocks are one.
+        Standard uncertainty of the offset; 0 if both have the same clock.
     """
     history = chain.history
     if u_clock_s == 0.0 or history.time_s is None:

@@ -7,22 +7,24 @@ import numpy as np
 from fingervision.domain.effect import Array
 
 HELD_SHARE = 0.5
-"""Share of the samples that repeat the one before; a motion that is recorded moves in most of its samples."""
+"""Share of samples equal to the one before, above which an input may be a command; a recorded motion changes in most
+samples."""
 ISOLATED_SHARE = 0.9
-"""Share of the jumps that stand alone between two equal values; ramps and strokes have neighbouring steps."""
+"""Share of jumps that are isolated between equal values; ramps and strokes have neighbouring steps."""
 FEWEST_LINES = 8.0
-"""Lines of an encoder over the range: one that resolves the range into fewer is of no use to anybody."""
+"""Least number of encoder lines over the range; an encoder with fewer would be useless."""
 LEAST_HOLD = 6
-"""Samples of a hold in the second half of which a gap that follows a motion can be told from one that stands."""
+"""Least number of samples in a hold for which the second half shows whether the gap moves or is constant."""
 FOLLOWS = 0.5
-"""Slope of the gap in holds over what a steady motion through them would give: 1 for an encoder, 0 for a command."""
+"""Slope of the gap within holds, relative to that of a steady motion: 1 for an encoder, 0 for a command; this is the
+limit between them."""
 
 
 def is_commanded(input_mm: Array, runs: tuple[slice, ...], gap_of_input: Array, gap_mm: Array) -> bool:
-    """Whether the input is a command, which keeps its value until it jumps.
+    """Whether the input is a command, which stays constant until it jumps.
 
-    A coarse encoder also stays constant and jumps while the stage moves slowly. In that case the gap moves while the
-    record is constant; under a command the gap is constant too.
+    The record of a coarse encoder also stays constant and jumps while the stage moves slowly. In that case the gap
+    moves while the record is constant; for a command, the gap is constant too.
 
     Parameters
     ----------

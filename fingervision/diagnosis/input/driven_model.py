@@ -2,7 +2,7 @@
 
 The chain of effects is evaluated thousands of times, and a function of time takes seconds. It is therefore split into
 its static response, a table on which drive effects act, and a dynamic remainder computed once along the driven path.
-The remainder is computed again along the path that the effects found have changed.
+The remainder is computed again along the path as changed by the effects found.
 """
 
 from dataclasses import replace
@@ -18,16 +18,16 @@ from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import HOLDS_S, FunctionModel
 
 PREPARED_S = HOLDS_S[0]
-"""Seconds that the model is held at a run's first input before the run begins."""
+"""Time for which the model is held at a run's first input before the run starts."""
 
 
 def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[CorrectedModel, FunctionModel | None]:
-    """Replace a function of time by its static response, over the inputs of a table.
+    """Replace a dynamic model by its static response, for the inputs of a table.
 
     Raises
     ------
     DataError
-        The table has no times.
+        If the table has no times.
     """
     if not isinstance(model.base, FunctionModel):
         return model, None
@@ -42,7 +42,7 @@ def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[Correct
 
 
 def with_dynamics(chain: MeasuringChain, function: FunctionModel, settings: Settings) -> MeasuringChain:
-    """Add the function's difference from its static response, along the path after the drive effects of `settings`."""
+    """Add the difference between a dynamic model and its static response, along the path after the drive effects."""
     history = chain.history if chain.path is None else chain.path.history
     driven_mm = _behind_drive(chain, history, {**chain.fixed, **settings})
     jobs = []

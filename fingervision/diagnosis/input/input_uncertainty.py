@@ -5,11 +5,12 @@ import numpy as np
 from fingervision.diagnosis.inference.hypothesis import Problem
 
 OF_ROUNDING, OF_NOISE = 0.5, 0.1
-"""Shares of it that many samples do not average out: an encoder rounds alike what stands alike, noise is smoothed."""
+"""Shares of the encoder's rounding error, and of the input's noise, that do not average out over many samples: equal
+positions are rounded equally, noise is smoothed."""
 
 
 def below_the_input(problem: Problem, size_mm: float) -> bool:
-    """Whether a change of the gap is smaller than the input's remaining error or its encoder's step would cause."""
+    """Whether a change of the gap is smaller than that caused by the input's remaining error or its encoder's step."""
     history = problem.chain.history
     gap = problem.chain.stacked({})[: history.input_mm.size]
     slope = float(np.ptp(gap)) / history.input_span_mm

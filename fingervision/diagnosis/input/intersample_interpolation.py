@@ -9,29 +9,29 @@ from fingervision.domain.effect import DriveEffect, Effect, PointEffect
 from fingervision.effects import catalogue
 
 CLEARLY = 10.0
-"""Chi-square by which curves must explain the data better than straight lines."""
+"""Chi-square by which curves must fit better than straight lines."""
 
 
 def likelier_interpolation(data: Observations, problem: Problem, best: Explanation) -> Observations:
-    """Interpolate the record by curves where a delay then explains the data better than with straight lines.
+    """Interpolate the input by curves, if a delay then explains the data better than with straight lines.
 
     A stage that reverses within half a second moves along a curve between samples an eighth of a second apart. With
-    straight lines, its reversals are sharper than the delayed ones that were measured, and a well-damped resonance
-    would explain the rounding.
+    straight lines, the interpolated reversals are sharper than the measured, delayed ones, and a well-damped resonance
+    would seem to explain the rounding.
 
     Parameters
     ----------
     data : Observations
         Measurement and model.
     problem : Problem
-        The observation model in which `best` was found.
+        Observation model with which `best` was found.
     best : Explanation
-        What was found; nothing but it is refitted, with a delay in the place of a resonance.
+        The explanation found; only this is refitted, with a delay instead of a resonance.
 
     Returns
     -------
     Observations
-        `data` itself where nothing is late or straight lines do as well.
+        `data` itself if there is no delay or straight lines fit as well.
     """
     fixed = any(name in data.chain.fixed for name in delays())
     if data.chain.curved or not (fixed or _like_delays() & set(best.names)):
@@ -66,7 +66,7 @@ def _like_delays() -> frozenset[str]:
 
 
 def _delay_s(best: Explanation) -> float:
-    """Delay of an explanation, or the delay that another of its effects imitates (s)."""
+    """Delay of an explanation, or the delay that corresponds to another of its effects (s)."""
     effects = [effect for name, effect in catalogue().items() if name in best.names and effect.delay_s is not None]
     for effect in sorted(effects, key=lambda effect: not is_delay(effect)):
         assert effect.delay_s is not None  # noqa: S101 - chosen so above

@@ -25,17 +25,19 @@ from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
 
 OF_NOISE = 0.1
-"""Share of the noise that a function of time may be off before it is driven again behind what was found."""
+"""Error of a dynamic model's remainder, as a share of the noise, above which it is recomputed with the effects
+found."""
 DOUBTFUL = 2.0
-"""Standard uncertainties beyond which a number of the drawing is doubtful."""
+"""Standard uncertainties beyond which a refitted dimension of the drawing is doubtful."""
 FORM_SHARE_OF_RIGS = 0.25
-"""Share of what an effect explains that its form may leave over where repeats tell the noise: the reversal of real
-stages differs by 19 to 24 % from place to place (ISO 230-2 tables, among them those of `real/rigs`), and readings at
-rest repeat so well that this shows."""
+"""Share of an explained part that its formula may leave as residual if repeats determine the noise: the reversal of
+real stages differs by 19 to 24 % from place to place (ISO 230-2 tables, among them those of `real/rigs`), and readings
+at rest repeat well enough to show this."""
 SHORT = 100
-"""Samples below which nothing is set aside before something was explained."""
+"""Number of samples below which no row is excluded before an effect is found."""
 OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
-"""Limits on the residual of the best explanation, and on the raw one, where effects still stand out themselves."""
+"""Outlier limits, in standard deviations, for the residual of the best explanation, and for the residual before any
+effect is found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,27 +47,28 @@ class Observations:
     Parameters
     ----------
     table, model
-        As they were read.
+        Table and model as read.
     chain : MeasuringChain
-        The model over the smoothed input.
+        Measuring chain with the smoothed input.
     stacked_mm : ndarray of float, shape (m,)
-        Measured gap, then midline where there is one.
+        Measured gap, then midline if measured.
     recorded : RecordedInput
-        What is known of the input.
+        Properties of the recorded input.
     effects : dict
         Effects that the data can show.
     excluded : dict
-        The others, with the reason.
+        Effects that the data cannot show, with the reason.
     distrusted : ndarray of bool, shape (n,)
-        Rows that say nothing about the gripper: set instead of measured, or beside a fault of the simulation.
+        Rows without information on the gripper: values that were set instead of measured, or next to a fault in the
+        simulation.
     notes : tuple of str
-        What a reader must know.
+        Remarks that a reader must know.
     refit : DrawingRefit
-        What the drawing's uncertain numbers do to the prediction.
+        Effect of the drawing's uncertain dimensions on the prediction.
     clock : ndarray of float, shape (m, p), or None
-        What the uncertain offset between the clocks of input and pictures does to it.
+        Change of the prediction by the uncertain offset between the clocks of input and pictures.
     function : FunctionModel or None
-        The model that is driven in time, of which `model` is the answer at rest.
+        Dynamic model, of which `model` is the static response.
     """
 
     table: MeasuredTable
@@ -105,7 +108,7 @@ class Observations:
         return (*own, *clock, *drawing)
 
     def behind(self, effect: object) -> int:
-        """Number of columns that follow those of one of the random effects."""
+        """Number of columns that follow those of a given random effect."""
         order = [one for one, _ in self.random_effects_mm]
         return sum(columns.shape[1] for _, columns in self.random_effects_mm[order.index(effect) + 1 :])
 
@@ -168,7 +171,7 @@ class Observations:
         )
 
     def measured_pure_errors(self, aside: list[Flags]) -> list[PureError] | None:
-        """Repeatability of each channel from readings at rest; None where too little repeats."""
+        """Repeatability of each channel from readings at rest; None if there are too few repeats."""
         history = self.chain.history
         if self.repeats is None or history.time_s is None:
             return None
@@ -182,9 +185,9 @@ class Observations:
         return kept if len(kept) == len(found) else None
 
     def with_overshoots(self) -> "Observations":
-        """Return the observations with an overshoot wherever two readings of one target show a reversal.
+        """Return the observations with an overshoot wherever two readings at one target indicate a reversal.
 
-        Else unchanged.
+        Without such readings they are returned unchanged.
         """
         if not turning_readings(self.table).size:
             return self
@@ -197,7 +200,7 @@ class Observations:
         return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
 
     def redrawn(self, problem: Problem, explanation: Explanation) -> "Observations":
-        """Refit the drawing's uncertain dimensions for an explanation, and use them in all further predictions."""
+        """Refit the drawing's uncertain dimensions for an explanation, and use them in all later predictions."""
         drawn = self.model.base
         if not (self.refit.moved and isinstance(drawn, PhysicalModel)):
             return self
@@ -208,9 +211,9 @@ class Observations:
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
     def driven_again(self, explanation: Explanation, noise_mm: float) -> "Observations | None":
-        """Recompute a function of time along the path of an explanation.
+        """Recompute a dynamic model along the path of an explanation.
 
-        None where that changes nothing significant.
+        None is returned if that changes nothing significantly.
         """
         if self.function is None or self.chain.dynamics is None:
             return None
@@ -219,7 +222,7 @@ class Observations:
         return replace(self, chain=chain) if float(np.sqrt(np.mean(changed**2))) > OF_NOISE * noise_mm else None
 
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
-        """Whether the tangent, at other dimensions, predicted this prediction to within the noise."""
+        """Whether the linearisation at other dimensions predicts this prediction within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
         bent -= drawn.refit.columns @ (
             np.array(list(self.refit.moved.values())) - np.array(list(drawn.refit.moved.values()))
@@ -228,7 +231,7 @@ class Observations:
         return float(missed @ missed) < BENT
 
     def refitted(self) -> tuple[str, ...]:
-        """Sentences on which dimensions of the drawing were refitted, and to what."""
+        """Sentences that say which dimensions of the drawing were refitted, and to which values."""
         drawn = self.model.base
         if not isinstance(drawn, PhysicalModel):
             return ()

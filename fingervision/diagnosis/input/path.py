@@ -1,4 +1,4 @@
-"""Path of the input: rows without a gap, readings taken at rest, and commands that hold until they jump."""
+"""Path of the input: rows without a gap, readings at rest, and commands that are held until they jump."""
 
 from dataclasses import replace
 
@@ -9,29 +9,30 @@ from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.measured_table import MeasuredTable
 
 AT_REST_S = 5.0
-"""Rows this far apart are separate readings: ISO 230-2 lets a stage stand for some seconds at each target, while
-cameras and data loggers that follow a motion record it at least every few seconds."""
+"""Time between rows from which on they count as separate readings at rest: in ISO 230-2 a stage rests for some seconds
+at each target, while cameras and data loggers record a motion at least every few seconds."""
 AT_REST_REVISITED_S = 1.0
-"""The same where the rows come back to exactly the same inputs: these are set-points and no samples of a motion."""
+"""The same time if rows return to exactly equal inputs: these are set-points, not samples of a motion."""
 REVISITED_SHARE = 0.5
-"""Share of the rows whose exact input stands in another row too, above which a record is one of set-points."""
+"""Share of rows with an input that also occurs in another row, above which the record consists of set-points."""
 OVERSHOOT = 0.5
-"""Overshoot beyond an outermost target, over the distance of its neighbour: any larger than the play is as good."""
+"""Overshoot beyond an outermost target, as a share of the distance to its neighbour: any value larger than the play has
+the same effect."""
 ARRIVED = 0.5
-"""Share of the time between two readings after which the stage has arrived at the later one's input."""
+"""Share of the time between two readings after which the stage has arrived at the later reading's input."""
 FINE_STEPS = 8
-"""Points of the path a sample after a command's jump, which takes one of them: so finely a delay places it."""
+"""Points of the path per sample after a command's jump: the resolution with which a delay places the jump."""
 FINE_S = 1.5
-"""Time after a jump for which the path is so fine: longer than the longest delay of the catalogue."""
+"""Time after a jump for which the path is so dense: longer than the longest delay of the catalogue."""
 
 
 def readings_at_rest(table: MeasuredTable) -> Flags:
-    """Whether the stage moved, arrived and waited before each row was read, instead of being read in motion.
+    """Whether the stage moved, arrived and rested before each row was read, instead of being read in motion.
 
     Returns
     -------
     ndarray of bool, shape (m,)
-        For each row of the path; False at the first row of each run.
+        One value for each row of the path; False for the first row of each run.
     """
     input_mm, time_s, runs = recorded(table)
     out = np.zeros(input_mm.size, dtype=bool)
@@ -52,7 +53,7 @@ def recorded(table: MeasuredTable) -> tuple[Array, Array | None, tuple[slice, ..
 
 
 def _revisits(input_mm: Array, runs: tuple[slice, ...]) -> bool:
-    """Whether most rows return to an earlier input of the stage; a row that only waits does not count."""
+    """Whether most rows return to an earlier input of the stage; rows in which the stage only waits do not count."""
     visits = np.concatenate([input_mm[run][np.flatnonzero(np.diff(input_mm[run], prepend=np.inf))] for run in runs])
     _, counts = np.unique(visits, return_counts=True)
     return float(np.sum(counts[counts > 1])) > REVISITED_SHARE * visits.size
@@ -61,8 +62,8 @@ def _revisits(input_mm: Array, runs: tuple[slice, ...]) -> bool:
 def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
     """Rows of the path that were read at rest at the previous row's input, where the stage reverses.
 
-    ISO 230-2 cycles read the outermost target twice: in between the stage overshoots it and returns from the other
-    side.
+    In ISO 230-2 cycles the outermost target is read twice: between the readings the stage overshoots the target and
+    returns from the other side.
     """
     input_mm, _, runs = recorded(table)
     rest = readings_at_rest(table)
@@ -79,25 +80,25 @@ def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
 def input_path(
     table: MeasuredTable, history: History, along_mm: Array, *, commanded: bool, overshoots: bool = False
 ) -> InputPath | None:
-    """Build the path that effects with memory follow.
+    """Build the path on which effects with memory depend.
 
     Parameters
     ----------
     table : MeasuredTable
-        The rows.
+        The measured table.
     history : History
-        Of the measured rows.
+        History of the measured rows.
     along_mm : ndarray of float, shape (m,)
         Smoothed input of every recorded row.
     commanded : bool
         Whether the input is a command that keeps its value until it jumps.
     overshoots : bool
-        Whether the stage ran over beyond its targets where it turned between two readings of the same one.
+        Whether the stage went beyond its targets where it reversed between two readings of the same target.
 
     Returns
     -------
     InputPath or None
-        None where the measured rows say it all.
+        None if the measured rows contain the whole path.
     """
     _, time_s, runs = recorded(table)
     if time_s is None:
@@ -145,7 +146,7 @@ def input_path(
 
 
 def dwell_s(table: MeasuredTable) -> float:
-    """Shortest time for which the stage was at rest before a reading (s); 0 where any row was read in motion."""
+    """Shortest time for which the stage was at rest before a reading (s); 0 if any row was read in motion."""
     _, time_s, runs = recorded(table)
     rest = readings_at_rest(table)
     firsts = np.array([run.start for run in runs])

@@ -24,8 +24,8 @@ from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
 UNIT_SHARES = (0.1, 3.0)
-"""An input that covers such a share of the model's range once its unit is changed was given in that unit: runs cover a
-tenth of the range at least, and within one unit none covers three hundred times of it."""
+"""Shares of the model's range, after a change of unit, between which the input was apparently given in that unit: runs
+cover at least a tenth of the range, and in the right unit none covers three hundred times it."""
 
 
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
@@ -34,7 +34,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     Raises
     ------
     DataError
-        The model does not cover the inputs, or the inputs are in another unit.
+        If the model does not cover the inputs, or the inputs are in another unit.
     """
     model, function = at_rest_beside(table, model)
     _refuse_other_inputs(table.input_mm, model.input_range_mm)
@@ -86,7 +86,7 @@ def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None
 
 
 def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:
-    """State what the effects may know about the runs."""
+    """Collect what effects may use: input, times and runs."""
     rest = model.base.respond(np.zeros(1))
     zero_mm = float(rest.gap_mm[0])
     opening_mm = model.base.respond(table.input_mm).gap_mm - zero_mm
@@ -124,7 +124,7 @@ def _seen(table: MeasuredTable, chain: MeasuringChain) -> tuple[MeasuringChain, 
 
 
 def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
-    """Number the visits of each target where most readings were taken at rest."""
+    """Number the visits of each target, if most readings were taken at rest."""
     if np.mean(readings_at_rest(table)) <= AT_REST_SHARE:
         return None
     rows = np.arange(table.input_mm.size) if table.path is None else table.path.rows
@@ -152,7 +152,7 @@ def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
 
 
 def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
-    """Fit the start states of the model's own effects in each run, because nobody stated them."""
+    """Fit the start states of the model's own effects in each run, because they are not stated."""
     catalogued = chain.effects
     for name in [name for name in chain.fixed if catalogued[name].start]:
         tried = [
@@ -164,9 +164,9 @@ def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
 
 
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
-    """Runs after a re-zeroing, recognised by their names.
+    """Whether each run follows a re-zeroing, recognised by its name.
 
-    Empty where all were, because no run shows the earlier zero.
+    The result is empty if all runs do, because then no run shows the earlier zero.
     """
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()

@@ -15,15 +15,15 @@ from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
 HELD_SAMPLES, SLOW_SAMPLES = 15, 5
-"""Samples over which a stage that stands, or turns back, stays on one encoder step or two."""
+"""Number of samples for which a stage at rest, and a stage that reverses, stays within one or two encoder steps."""
 STAYING = 0.2
-"""Leverage below which neighbours share so many samples that they share the error too."""
+"""Leverage below which neighbouring smoothed values have so many samples in common that their errors are equal."""
 STANDING_SHARE = 1e-3
-"""Share of the input's range within which a stage stands."""
+"""Share of the input's range within which a stage counts as at rest."""
 AT_REST_SHARE = 0.5
-"""Share of the rows that were read at rest above which no row tells anything about its neighbours' input."""
+"""Share of rows read at rest above which rows give no information on their neighbours' input."""
 SURELY = 3.0
-"""Standard errors by which the gap must follow the input's unrest before that is taken for motion."""
+"""Standard errors by which the gap must follow the input's fluctuations before these count as motion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,19 +33,19 @@ class RecordedInput:
     Parameters
     ----------
     smooth_mm : ndarray of float, shape (n,)
-        The measured rows' record, smoothed.
+        Smoothed input of the measured rows.
     along_mm : ndarray of float, shape (m,)
-        The same of every row that has an input.
+        Smoothed input of every row that has an input.
     sigma_mm, step_mm : float
-        Standard uncertainty of one recorded value, and the encoder's step; 0 where there is none.
+        Standard uncertainty of one recorded value, and the encoder's step; 0 if there is none.
     error_mm : ndarray of float, shape (n,)
-        What the error that is left does to the gap.
+        Effect of the remaining error on the gap.
     stays : ndarray of bool, shape (n,)
-        Where that error stays from sample to sample; elsewhere it is another one at each.
+        Where that error is the same from sample to sample; elsewhere it differs between samples.
     samples : float
-        Samples over which it stays.
+        Number of samples for which it is the same.
     is_motion : bool
-        Whether the record's unrest shows in the gap as well, and was left as it is.
+        Whether the fluctuations of the record are also visible in the gap, and were therefore not smoothed.
     commanded : bool
         Whether the record is a command that keeps its value until it jumps.
     """
@@ -62,14 +62,14 @@ class RecordedInput:
 
     @classmethod
     def exact(cls, table: MeasuredTable, *, is_motion: bool = False, commanded: bool = False) -> "RecordedInput":
-        """Take a table's record as it is, without smoothing."""
+        """Use a table's record as it is, without smoothing."""
         u, along_mm = table.input_mm, recorded(table)[0]
         still = np.zeros(u.size, dtype=bool)
         return cls(u, along_mm, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion, commanded)
 
     @classmethod
     def of(cls, table: MeasuredTable, model: CorrectedModel) -> "RecordedInput":
-        """Smooth a table's record, unless it consists of commands or set-points or the gap follows its fluctuations."""
+        """Smooth a table's record, unless it has commands or set-points, or the gap follows its fluctuations."""
         along_mm, time_s, runs = recorded(table)
         if time_s is None or np.mean(readings_at_rest(table)) > AT_REST_SHARE:
             return cls.exact(table)
@@ -99,7 +99,7 @@ class RecordedInput:
 
 
 def standing_still(history: History) -> tuple[slice, ...]:
-    """Stretches of at least `LEAST_RUN` samples in which the stage stands still, within the recorded input's error."""
+    """Stretches of at least `LEAST_RUN` samples in which the stage is at rest, within the recorded input's error."""
     reach = max(3.0 * history.input_sigma_mm, STANDING_SHARE * history.input_span_mm)
     found: list[slice] = []
     for run in history.runs:
@@ -121,7 +121,7 @@ def scatter_in_holds(history: History, residual_mm: Array) -> float:
     history : History
         Input and runs.
     residual_mm : ndarray of float, shape (n,)
-        Of one channel.
+        Residual of one channel.
     """
     total, degrees = 0.0, 0
     for run in history.runs:
@@ -135,7 +135,7 @@ def scatter_in_holds(history: History, residual_mm: Array) -> float:
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:
-    """Mark the samples around which the input stays within `reach_mm` for some samples; none if `reach_mm` is 0."""
+    """Mark samples around which the input stays within `reach_mm` for some samples; none if `reach_mm` is 0."""
     out = np.zeros(input_mm.size, dtype=bool)
     for run in runs:
         if reach_mm > 0.0 and run.stop - run.start > samples:

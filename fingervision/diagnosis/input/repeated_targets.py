@@ -11,23 +11,26 @@ from fingervision.domain.effect import Array, Flags
 Integers = NDArray[np.intp]
 
 FEWEST_TARGETS = 3
-"""Targets below which there is no axis to speak of: two positions are the ends of a step, and a range over them is one
+"""Least number of targets of an axis: two positions are the ends of a step, and a range over them is a single
 difference."""
 SPACING_RATIO = 10.0
-"""Distance between neighbouring targets over the distance between inputs at one target. A stage repeats a set-point to
-its in-position window, which is a small part of any spacing that somebody tests; samples of a motion lie evenly."""
+"""Least ratio of the distance between neighbouring targets to that between inputs at one target. A stage repeats a
+set-point to its in-position window, which is a small part of any tested spacing; samples of a motion are evenly
+spaced."""
 WIDEST = 0.2
-"""Range of the inputs at one target, of the distance to the next. Wider, and a reading could belong to either."""
+"""Largest range of the inputs at one target, as a share of the distance to the next; otherwise a reading could belong
+to either."""
 MOST_TARGETS = 200
-"""ISO 230-2 asks for 5 targets a metre; with 200, five cycles are 2000 rests. More places are samples of a motion, or
-the steps of an encoder that it ran over."""
+"""Largest number of targets: ISO 230-2 requires 5 per metre; with 200, five cycles have 2000 rests. More positions are
+samples of a motion, or steps of an encoder."""
 SHORTEST_REST_S = 0.3
-"""Median time from one visit to the next below which the stage was in motion: to move, arrive and stand takes a stage
-a few tenths of a second, and the standard asks for rest."""
+"""Median time between visits below which the stage was in motion: moving, arriving and stopping takes a stage a few
+tenths of a second, and the standard requires rest."""
 SETTLING_ROWS = 4
-"""Rows of one visit from which on its first half is taken for settling and left out."""
+"""Number of rows in a visit from which on the first half is left out as settling."""
 LEAST_SHARE = 0.5
-"""Share of the measured rows in repeated visits; below, the figures would speak for the smaller part of the table."""
+"""Least share of the measured rows that must be in repeated visits; otherwise the figures would describe the smaller
+part of the table."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,11 +42,11 @@ class RepeatedTargets:
     target_mm : ndarray of float, shape (m,)
         Mean input of the target's rows.
     direction : ndarray of int, shape (m,)
-        +1 approached from below, -1 from above, 0 not known, or still settling: not to be used.
+        +1 for an approach from below, -1 from above, 0 if unknown or still settling: such rows are not used.
     cycle : ndarray of int, shape (m,)
-        Number of the visit of that target from that side, from 0.
+        Number of the visit of this target from this side, from 0.
     notes : tuple of str
-        What was assumed, a sentence each.
+        Assumptions made, one sentence each.
     """
 
     target_mm: Array
@@ -63,7 +66,7 @@ class NoRepeatedTargets:
 class _Visit:
     """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after (None: none).
 
-    `places` are all of these rows, including those whose reading is missing.
+    `places` contains all of these rows, including those without a reading.
     """
 
     target: int
@@ -79,26 +82,27 @@ def repeated_targets(
 ) -> RepeatedTargets | NoRepeatedTargets:
     """Find targets, directions of approach and cycles in a path.
 
-    A visit's direction of approach is given by the last earlier row at another place, with or without a reading (an
-    overshoot, an approach). Two assumptions are made, and reported, where the table omits the rows. A pair of readings
-    at an end of the range, where all other targets have one, is a reversal with an overshoot between the two. A run
-    that begins at an end of the range, in such a table or in one whose runs all go one way, came from beyond that end.
+    The direction of approach of a visit follows from the last earlier row at another position, with or without a
+    reading (such as an overshoot or an approach). If the table lacks these rows, two assumptions are made and reported.
+    First, if a target at an end of the range has two successive readings where all other targets have one, the stage
+    reversed with an overshoot between the two. Second, a run that starts at an end of the range, in such a table or in
+    one whose runs all have the same direction, came from beyond that end.
 
     Parameters
     ----------
     input_mm : ndarray of float, shape (n,)
-        The path in the order of travel, runs one after the other.
+        Inputs of the path in order of time, run after run.
     measured : ndarray of bool, shape (n,)
-        Rows that have a reading; m of them.
+        Rows with a reading; m is their number.
     runs : sequence of slice
         Rows of each run.
     time_s : ndarray of float, shape (n,), or None
-        Times, which tell rests from a motion.
+        Times, by which rests are distinguished from motion.
 
     Returns
     -------
     RepeatedTargets or NoRepeatedTargets
-        The visits, in the order of the measured rows, or why there are none.
+        The visits, in the order of the measured rows, or the reason why there are none.
     """
     found = _targets(input_mm[measured])
     if isinstance(found, NoRepeatedTargets):
@@ -136,7 +140,7 @@ def repeated_targets(
 
 
 def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
-    """Targets in ascending order, and the distance within which an input counts as at its target."""
+    """Targets in ascending order, and the largest distance of an input that belongs to a target."""
     ordered = np.sort(inputs)
     if ordered.size < 4 or ordered[0] == ordered[-1]:
         return NoRepeatedTargets("there are fewer than four readings, or the input never changes")
@@ -193,7 +197,7 @@ def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[sli
 
 
 def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str, ...]]:
-    """Split the pairs of readings at the ends of the range, and assign a direction to runs that begin there."""
+    """Split pairs of readings at the ends of the range, and assign a direction to runs that start there."""
     last = centres.size - 1
     inner = [len(visit.places) for visit in visits if 0 < visit.target < last]
     usual = int(np.median(inner)) if inner else 0

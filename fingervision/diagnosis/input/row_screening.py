@@ -9,15 +9,16 @@ from fingervision.domain.model import Model
 from fingervision.models.table import TableModel
 
 SET_SHARE = 1e-5
-"""Nobody measures a gap to a hundred-thousandth of itself: such a row at input zero was set."""
+"""Relative difference from the model's rest gap below which a row at input zero counts as set, because no gap is
+measured with such accuracy."""
 OFF_LINE = 0.01
-"""Share of the simulated range; a table straight within half of it has a fault where it is off by more."""
+"""Share of the simulated range: a table that is straight within half of it has a fault where it deviates by more."""
 
 
 def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
-    """Mark the excluded rows, shape (n,), and give the reasons in sentences.
+    """Mark the excluded rows, shape (n,), and give the reasons as sentences.
 
-    Only tables without times are so small and hand-made.
+    Only tables without times are screened, because these are small and made by hand.
     """
     out = np.zeros(table.input_mm.size, dtype=bool)
     notes: list[str] = []

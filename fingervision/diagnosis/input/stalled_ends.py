@@ -1,4 +1,4 @@
-"""Ends of the range at which the reading stays constant while the command moves on: a stop or a contact."""
+"""Ends of the range at which the reading stays constant while the command moves on, by a stop or a contact."""
 
 from itertools import pairwise
 
@@ -9,15 +9,16 @@ from fingervision.domain.effect import Array
 from fingervision.effects import catalogue
 
 FEWEST_EQUAL = 6
-"""Equal readings at an end that are no accident of a few."""
+"""Least number of equal readings at an end that does not occur by chance."""
 LONGER = 3.0
-"""Times the longest stand elsewhere, in rows and in predicted motion: stairs of a dead band stand as well."""
+"""Ratio to the longest constant stretch elsewhere, in rows and in predicted motion, because the steps of a dead band
+are constant too."""
 LEAST_DIGITS = 5.0
-"""Digits of the reading by which the model moves on while the reading stands."""
+"""Digits of the reading by which the model must move while the reading is constant."""
 
 
 def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozenset[str]:
-    """Effects that would make the reading constant at an end of the range, where it is constant there.
+    """Effects that would make the reading constant at an end of the range where it is constant.
 
     Noise changes a reading from row to row; readings that are equal over many rows, while the model moves by many
     digits, have another cause.

@@ -1,4 +1,4 @@
-"""Noise of every channel, estimated from replicates, from stops of the stage, or from the residual's spectrum."""
+"""Noise of every channel, estimated from repeats, from stops of the stage, or from the residual's spectrum."""
 
 import numpy as np
 
@@ -10,15 +10,15 @@ from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
 from fingervision.domain.effect import Array, Flags, History
 
 FEWEST_STANDING = 60
-"""Samples in all during which the stage must stand for the noise to be taken from them."""
+"""Total number of samples at rest required to estimate the noise from them."""
 SHORT_RUN = 60
-"""Samples of the longest run below which its spectrum says too little about the noise."""
+"""Length of the longest run, in samples, below which its spectrum contains too little information on the noise."""
 
 
 def channel_noises(
     history: History, parts: list[Array], aside: list[Flags], floors: list[float], degrees: int, *, explained: bool
 ) -> tuple[Noise, ...]:
-    """Estimate every channel's noise; gap and midline share the noise of the same pictures.
+    """Estimate every channel's noise; gap and midline come from the same pictures and have related noise.
 
     Parameters
     ----------
@@ -27,11 +27,11 @@ def channel_noises(
     parts : list of ndarray of float, shape (n,)
         Residual of each channel.
     aside : list of ndarray of bool, shape (n,)
-        Rows of each channel that do not count.
+        Excluded rows of each channel.
     floors : list of float
-        Least noise of each channel: its last digit, or what was stated.
+        Smallest noise of each channel: the rounding of its last digit, or the stated uncertainty.
     degrees : int
-        Parameters that were fitted.
+        Number of fitted parameters.
     explained : bool
         Whether the residuals are those of an explanation.
     """
@@ -62,7 +62,7 @@ def channel_noises(
 
 
 def noises_of_repeats(errors: list[PureError], floors: list[float]) -> tuple[Noise, ...]:
-    """Use the scatter of repeats as the noise, because readings seconds apart are no samples of one fast process.
+    """Use the scatter of repeats as white noise, because readings seconds apart have independent errors.
 
     The relative standard uncertainty of the variance is sqrt(2 / degrees).
     """

@@ -9,18 +9,19 @@ from scipy.stats import hypergeom
 from fingervision.domain.effect import Array, Flags
 
 LEAST_SHARE = 0.1
-"""Of a residual's variance that is the picture's own at least."""
+"""Least share of a residual's variance that is due to the picture."""
 AFTER_A_STEP = 5
-"""Samples after a step of the input that are looked at: five in a row off are no outliers in any case."""
+"""Number of samples after a step of the input that are examined: five successive deviations are never outliers."""
 PLACES, ENDS = 20, (2, 3, 5, 8)
-"""Parts of the input's range that are looked at, and how many samples at either end of it: stops act there."""
+"""Number of parts of the input's range that are examined, and numbers of samples at either end of the range, where
+stops act."""
 BY_CHANCE = 2e-3
-"""How seldom as many gross errors may crowd in any one part by chance."""
+"""Probability below which an accumulation of gross errors in one part is not due to chance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of the white and the correlated part, and the correlation of neighbouring samples.
+    """Standard deviations of the white and the correlated part, and correlation of neighbouring samples.
 
     `slow_doubt` is the standard uncertainty of the logarithm of the power at low frequency.
     """
@@ -39,8 +40,9 @@ class Noise:
 def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
     """Mark outliers against a running median; shape (n,), True where a value is to be excluded.
 
-    Without times there is no order, and the median of all values replaces the running one. `sigmas` is the limit; None
-    excludes nothing: in a short record an effect that acts on a few samples looks like outliers until it is explained.
+    Without times the rows have no order, and the median of all values replaces the running median. `sigmas` is the
+    limit; None excludes nothing, because in a short record an effect that acts on a few samples looks like outliers
+    until it is explained.
     """
     out = np.zeros(residual.size, dtype=bool)
     if sigmas is None:
@@ -70,7 +72,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
 
 
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
-    """Where more samples are off than gross errors would explain, which occur at any input and any time."""
+    """Parts in which more samples deviate than gross errors, which occur at any input and any time, would explain."""
     there = np.zeros(out.size, dtype=bool)
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
@@ -104,9 +106,9 @@ def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) ->
     aside : ndarray of bool, shape (n,)
         Outliers.
     floor_mm : float
-        The measurement's own random part.
+        Random uncertainty of the measurement itself.
     degrees : int
-        Parameters that were fitted.
+        Number of fitted parameters.
     """
     kept = residual[~aside]
     spread = float(np.sqrt(np.sum((kept - np.median(kept)) ** 2) / max(1, kept.size - 1 - degrees)))
@@ -114,14 +116,14 @@ def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) ->
 
 
 def without_input(noise: Noise, input_mm: Array) -> Noise:
-    """Subtract the contribution of the input's random errors, which the residual contains too.
+    """Subtract the contribution of the input's random errors, which is also contained in the residual.
 
     Parameters
     ----------
     noise : Noise
-        As it was estimated from the residual.
+        Noise estimated from the residual.
     input_mm : ndarray of float, shape (n,)
-        What the error of each recorded input does to the gap; it counts beside the noise from now on.
+        Effect of each recorded input's error on the gap; it is accounted for separately from then on.
     """
     share = 1.0 - float(np.mean(input_mm**2)) / noise.total_mm**2
     scale = float(np.sqrt(max(share, LEAST_SHARE)))

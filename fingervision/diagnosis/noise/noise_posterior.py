@@ -19,19 +19,19 @@ def problems_of_drawn_noise(
 ) -> Iterator[Problem]:
     """Yield the problem with `count` random draws of its noise parameters.
 
-    Short runs determine neither level nor correlation well: both are drawn from their posterior, given the residual of
-    an explanation. For long records the power of the slow part is drawn.
+    Short runs determine neither level nor correlation of the noise well: both are drawn from their posterior, given the
+    residual of an explanation. For long records the power of the slow part is drawn.
 
     Parameters
     ----------
     data : Observations
         Measurement and model.
     problem : Problem
-        With the noise as it was estimated.
+        Estimation problem with the estimated noise.
     explanation : Explanation
-        What is taken out of the measurement to see its noise.
+        Explanation that is subtracted from the measurement to obtain the noise.
     count : int
-        Draws.
+        Number of draws.
     rng : numpy Generator
         For the draws.
     """

@@ -1,4 +1,4 @@
-"""Pure error: the scatter between visits of the same input from the same side (ISO 230-2; Box & Draper 1987)."""
+"""Pure error: scatter between visits of the same input from the same side (ISO 230-2; Box & Draper 1987)."""
 
 from dataclasses import dataclass
 
@@ -8,31 +8,31 @@ from numpy.typing import NDArray
 from fingervision.domain.effect import Array, Flags
 
 SAME_PLACE = 1e-6
-"""Share of the input's range within which two set-points are the same: the last digits of a file."""
+"""Distance, as a share of the input's range, within which two set-points are equal: rounding in a file."""
 FEWEST_DEGREES = 4
-"""Degrees of freedom below which a scatter is known to less than a factor of 1.4 and is not used."""
+"""Least degrees of freedom of a scatter; with fewer it is uncertain by more than a factor of 1.4."""
 TREND_SIGMAS = 2.33
-"""Standard deviations by which neighbouring visits must agree better than distant ones before the visits have a trend:
-one table in a hundred without one."""
+"""Standard deviations by which neighbouring visits must agree better than distant ones before a trend is assumed: by
+chance in one table in a hundred."""
 TREND_DEGREE = 3
-"""Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
-cycles."""
+"""Degree of the polynomial in time that removes a drift or a run-in from the repeats, sufficient for some cycles."""
 APART = 0.25
-"""Share of the scatter's power that may be left once places or sides drift apart, or runs have zeros of their own, for
-that to be believed: these are many coefficients for a few dozen repeats, and without them the noise is too large by a
-factor of 2 at most."""
+"""Largest remaining share of the scatter's power for which different drifts of positions or sides, or zeros of runs,
+are accepted as its cause: they have many coefficients for a few dozen repeats, and without them the noise is at most a
+factor of 2 too large."""
 OFF_GRID = 0.02
-"""Steps by which a difference may miss a multiple of the smallest one: the last digits that are written are rounded."""
+"""Distance, in grid steps, of a difference from a multiple of the smallest one that is attributed to rounding."""
 BY_ACCIDENT = 1e-3
-"""Probability that differences without a grid all come so near a multiple, below which they have one."""
+"""Probability of so close multiples by chance, below which the differences lie on a grid."""
 FEWEST_STEPS = 8
-"""Differences between neighbouring values from which a grid is told."""
+"""Least number of differences between neighbouring values from which a grid is determined."""
 LEVELS = 4096
-"""Of a reading whose digits do not show: 12 bits, as in the encoders of servos and in cheap converters."""
+"""Assumed number of levels of a reading without visible digits: 12 bits, as in servo encoders and inexpensive
+converters."""
 MOST_WANDERING = 0.95
-"""Correlation of consecutive readings, beyond which a reading noise that wanders is a drift."""
+"""Largest correlation of successive readings; above it, correlated reading noise is a drift."""
 ORDINARY_SIGMAS = 6.0
-"""Robust standard deviations beyond which a single visit is a gross error and no scatter."""
+"""Robust standard deviations beyond which a single visit is a gross error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +42,14 @@ class PureError:
     Parameters
     ----------
     sd_mm : float
-        Standard deviation of one reading, a trend taken out.
+        Standard deviation of one reading, after removal of a trend.
     degrees : int
         Degrees of freedom.
     trend_sigmas : float
-        By how many standard deviations visits that follow one another agree better than any two.
+        Significance, in standard deviations, of the better agreement of successive visits.
     correlation : float
-        Of what repeats leave in readings that follow one another, wherever they were taken: a reading noise that
-        wanders. 0 where it could be chance.
+        Correlation of the repeats' residuals in successive readings, at any position (correlated reading noise); 0 if
+        it could be chance.
     """
 
     sd_mm: float
@@ -64,22 +64,22 @@ class PureError:
 
 
 def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Number the places that were visited from the same side.
+    """Number the combinations of position and side of approach that were visited.
 
     Parameters
     ----------
     path_mm : ndarray of float, shape (m,)
-        Recorded input, rows without a gap included.
+        Recorded input, including rows without a gap.
     runs : tuple of slice
         Rows of the path in each run.
     rows : ndarray of int, shape (n,)
-        Those that were measured.
+        Indices of the measured rows.
 
     Returns
     -------
     ndarray of int, shape (n,)
-        The same number for visits of the same input from the same side; -1 where the side is not known, at the first
-        input of a run, and for a further reading of the visit before.
+        The same number for all visits of one input from one side; -1 if the side is not known (at the first input of a
+        run), and for further readings of the same visit.
     """
     near = SAME_PLACE * max(float(np.ptp(path_mm)), 1e-300)
     place = np.round(path_mm / near).astype(np.int64)
@@ -107,22 +107,22 @@ def pure_error(
     place_mm: Array | None = None,
     runs: tuple[slice, ...] = (),
 ) -> PureError | None:
-    """Estimate the scatter of repeats; None where too little repeats.
+    """Estimate the scatter of repeats; None if there are too few repeats.
 
     Parameters
     ----------
     values : ndarray of float, shape (n,)
-        Measured, or measured minus predicted.
+        Measured values, or measured minus predicted values.
     time_s : ndarray of float, shape (n,)
-        When each was read.
+        Time of each reading.
     label : ndarray of int, shape (n,)
-        As `visits` gives it.
+        Result of `visits`.
     aside : ndarray of bool, shape (n,)
-        Values that do not count.
+        Excluded values.
     place_mm : ndarray of float, shape (n,), or None
-        Recorded input of each, by which places may drift apart; None to leave that out.
+        Recorded input of each reading, if positions may drift differently; None to exclude that.
     runs : tuple of slice
-        Rows of each run, whose offsets are no scatter of readings; empty to leave that out.
+        Rows of each run, if offsets of runs are not part of the readings' scatter; empty to exclude that.
     """
     numbers, counts = np.unique(label[(label >= 0) & ~aside], return_counts=True)
     groups = [np.flatnonzero((label == number) & ~aside) for number in numbers[counts > 1]]
@@ -155,7 +155,7 @@ def pure_error(
 
 
 def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
-    """Subtract each run's own zero where it is most of the scatter; return also how many zeros were estimated."""
+    """Subtract each run's own zero if it causes most of the scatter; return also the number of zeros estimated."""
     if len(runs) < 2 or not groups:
         return values, 0
     number = np.zeros(values.size, dtype=np.intp)
@@ -175,11 +175,11 @@ def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tu
 
 
 def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
-    """Significance of the likeness of successive readings, in standard deviations, where it is a drift; else 0.
+    """Significance, in standard deviations, of a drift in successive readings; 0 if correlated noise is more probable.
 
-    A drift (a smooth curve in time) and correlated reading noise both make successive readings alike, wherever they
-    were taken. The more probable of the two is taken as the cause, each with the penalty of its parameters (Schwarz
-    1978): the log variance left by the curve, or by predicting each reading from the previous one.
+    A drift (a smooth curve in time) and correlated reading noise both make successive readings similar, whatever their
+    positions. The more probable of the two, by BIC (Schwarz 1978), is taken as the cause: the log residual variances of
+    the curve, and of predicting each reading from the previous one, are compared with penalties for the parameters.
     """
     share, sigmas = _follows_sigmas(rest, rows)
     if sigmas <= TREND_SIGMAS:
@@ -192,7 +192,7 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
 
 
 def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Subtract from the repeats' residuals a polynomial in time common to all groups, and one for each of `shares`."""
+    """Subtract a polynomial in time common to all groups from the repeats' residuals, and one for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     own_rows = np.concatenate(groups)
@@ -206,15 +206,16 @@ def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *
 
 
 def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of the repeats' residuals in successive rows; 0 where independent readings would show as much."""
+    """Correlation of the repeats' residuals in successive rows; 0 if independent readings could show as much."""
     share, sigmas = _follows_sigmas(rest, rows)
     return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
 
 
 def _follows_sigmas(rest: Array, rows: NDArray[np.intp]) -> tuple[float, float]:
-    """Correlation of the repeats' residuals in successive rows, and its value in standard deviations.
+    """Correlation of the repeats' residuals in successive rows, and its significance in standard deviations.
 
-    For k independent pairs its standard deviation is 1 / sqrt(k) (Bartlett 1946, doi:10.2307/2983611).
+    For k independent pairs, the standard deviation of the correlation is 1 / sqrt(k) (Bartlett 1946,
+    doi:10.2307/2983611).
     """
     ordered = rest[np.argsort(rows)]
     follows = np.diff(np.sort(rows)) == 1
@@ -245,9 +246,9 @@ def _trend_sigmas(groups: list[Array], pooled: float) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Spacing of the grid on which all values lie, as readings of few digits do; 0 without such a grid.
+    """Spacing of the grid on which all values lie, as for readings with few digits; 0 without such a grid.
 
-    From few distinct values no spacing can be estimated: a 12-bit reading over their range is assumed.
+    If there are too few distinct values to estimate a spacing, a 12-bit reading over their range is assumed.
     """
     steps = np.diff(np.unique(np.round(values, 10)))
     steps = steps[steps > 1e-9]

@@ -1,25 +1,25 @@
-"""Upper bound of the noise in a residual: slow changes are structure, or indistinguishable from it."""
+"""Upper bound of the noise in a residual: slow changes are structure, or indistinguishable from structure."""
 
 import numpy as np
 
 from fingervision.domain.effect import Array
 
 CORRELATED = 10.0
-"""Times the scatter from sample to sample that noise may have in all: an autoregression of 0.95 has six times it."""
+"""Largest ratio of noise to its scatter from sample to sample: for an autoregression of 0.95 it is six."""
 STRETCH = 20
-"""Samples of a stretch within which noise must show."""
+"""Length, in samples, of stretches in which noise must be visible."""
 WANDERING = 1.65
-"""Times the scatter within such stretches that noise may have in all: so much has an autoregression of 0.9 (simulated;
-one of 0.8 has 1.3 times it). With ten times the scatter from sample to sample alone, a third of a creep was noise."""
+"""Largest ratio of noise to its scatter within such stretches: that of an autoregression of 0.9 (simulated; 1.3 for
+0.8). With only the limit on the scatter from sample to sample, a third of a creep counted as noise."""
 
 
 def most_noise(residual_mm: Array, runs: tuple[slice, ...], digits_mm: float) -> float:
-    """Largest standard deviation that a residual's noise may have (mm); 0 where the runs are too short.
+    """Largest standard deviation that the noise of a residual may have (mm); 0 if the runs are too short.
 
     Parameters
     ----------
     residual_mm : ndarray of float, shape (n,)
-        What an explanation leaves.
+        Residual of an explanation.
     runs : tuple of slice
         Rows of each run.
     digits_mm : float
@@ -30,7 +30,7 @@ def most_noise(residual_mm: Array, runs: tuple[slice, ...], digits_mm: float) ->
 
 
 def _short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Standard deviation of white noise with the median third difference of a residual; 0 in runs of a few samples."""
+    """Standard deviation of white noise with the same median third difference; 0 for runs of a few samples."""
     differences = np.concatenate([np.diff(residual_mm[run], 3) for run in runs])
     # Third differences of white noise have 1 + 9 + 9 + 1 times its variance; 0.6745 is the normal median.
     return float(np.median(np.abs(differences))) / 0.6745 / float(np.sqrt(20.0)) if differences.size else 0.0

@@ -1,4 +1,4 @@
-"""The noise of short records: first-order autoregressions by restricted likelihood (Patterson & Thompson 1971)."""
+"""Noise of short records: first-order autoregressions by restricted likelihood (Patterson & Thompson 1971)."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
 
 WHITE = 0.5
-"""Prior share of white noise, where noise is drawn: frames that know nothing of each other are the ordinary case."""
+"""Prior probability of white noise, when noise parameters are drawn: frames are usually independent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,11 +18,11 @@ class _Likelihood:
     Parameters
     ----------
     grid : ndarray of float, shape (k,)
-        Correlations.
+        Correlations at which the likelihood is tabulated.
     cost : ndarray of float, shape (channels, k)
-        -2 log likelihood with the best level.
+        -2 log likelihood with the best level, for each channel and correlation.
     spread_mm : ndarray of float, shape (channels, k)
-        That level.
+        The best level.
     rows : ndarray of int, shape (channels,)
         Degrees of freedom.
     """
@@ -66,23 +66,23 @@ def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[
 def noise_of_short_runs(
     residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags], floors_mm: list[float], *, explained: bool
 ) -> tuple[Noise, ...]:
-    """Fit channels that share one correlation, each with its own level.
+    """Fit the noise of channels that have a common correlation, each with its own level.
 
-    The samples are too few for a spectrum. If they were treated as white noise, every slow effect would seem
-    significant. All channels come from the same pictures, so that one correlation serves them all: its posterior mean
-    under a flat prior. Before anything is explained, the channel with the smallest correlation determines it, because
-    an effect can only increase it.
+    The samples are too few for a spectrum. If their noise were treated as white, every slow effect would seem
+    significant. All channels come from the same pictures, so that they have a common correlation: its posterior mean
+    under a flat prior is used. Before an effect is found, the channel with the smallest correlation determines it,
+    because effects can only increase a correlation.
 
     Parameters
     ----------
     residuals_mm, aside : list of ndarray, shape (n,)
-        By channel.
+        Residual and excluded rows of each channel.
     runs : tuple of slice
-        Samples of each run; each has a straight line of its own taken out.
+        Samples of each run; a straight line is subtracted from each run.
     floors_mm : list of float
-        The measurement's own random part, by channel.
+        Random uncertainty of the measurement itself, for each channel.
     explained : bool
-        Whether effects have been taken out.
+        Whether effects have been subtracted.
     """
     known = _likelihood(residuals_mm, runs, aside)
     weight = np.exp(-0.5 * (known.cost - known.cost.min(axis=1, keepdims=True)))
@@ -99,9 +99,9 @@ def noise_of_short_runs(
 def drawn_noises(
     residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags], count: int, rng: np.random.Generator
 ) -> list[tuple[Noise, ...]]:
-    """Draw the noise of short runs from its posterior; one noise per channel, `count` times.
+    """Draw the noise of short runs from its posterior, `count` times; each draw has one noise per channel.
 
-    The channels share one correlation, which is zero with prior probability `WHITE`; the level follows the scaled
+    The channels have a common correlation, which is zero with prior probability `WHITE`; the level has the scaled
     inverse chi-square distribution of a variance.
     """
     known = _likelihood(residuals_mm, runs, aside)

@@ -6,17 +6,18 @@ from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
 
 SLOW, SLOW_EXPLAINED = 0.04, 0.02
-"""Cycles per sample below which structure of the gripper may hide, before and after something was explained."""
+"""Frequencies, in cycles per sample, below which unexplained structure may be present, before and after effects are
+found."""
 TAPERED = 1.94
-"""Neighbouring ordinates under Hann's taper share so much that this many count as one."""
+"""Number of neighbouring ordinates that count as one, because Hann's taper correlates them."""
 CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))
-"""Correlations of neighbouring samples that are tried, as fine as a record of 2500 samples tells them."""
+"""Correlations of neighbouring samples that are tried, as dense as a record of 2500 samples can distinguish."""
 SLOWEST = 2.0 * np.pi * np.array([0.01])
-"""Where a gripper's effects have their power: some turns in a hundred samples each."""
+"""Frequency at which the effects of a gripper have most of their power: about one period in a hundred samples."""
 LINE = 9.0
-"""A periodogram value this many times its expectation is a line, not noise."""
+"""Ratio of a periodogram value to its expectation above which it is a spectral line, not noise."""
 LEAST_RUN = 24
-"""Samples below which a run is left out."""
+"""Number of samples below which a run is left out."""
 
 
 def noise_by_spectrum(
@@ -28,20 +29,20 @@ def noise_by_spectrum(
     *,
     explained: bool,
 ) -> tuple[Noise, ...]:
-    """Fit channels that share the shape of one spectrum, each with its own level.
+    """Fit the noise of channels whose spectra have a common shape, each with its own level.
 
     Parameters
     ----------
     residuals_mm, aside : list of ndarray, shape (n,)
-        Measured minus predicted, and outliers, by channel.
+        Measured minus predicted values, and outliers, for each channel.
     runs : tuple of slice
         Samples of each run.
     rate_hz : float
-        Sample rate: nothing below 1 Hz is used where that is below `SLOW`.
+        Sample rate; frequencies below 1 Hz are not used, if `SLOW` is higher than that.
     floors_mm : list of float
-        The measurement's own random part, by channel.
+        Random uncertainty of the measurement itself, for each channel.
     explained : bool
-        Whether effects have been taken out.
+        Whether effects have been subtracted.
     """
     slow = min(1.0 / rate_hz, SLOW_EXPLAINED if explained else SLOW)
     angle = np.concatenate([_angles(run.stop - run.start, slow) for run in runs])
@@ -86,29 +87,29 @@ def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float)
 
 
 def _shape(angle: Array, share: float, phi: float) -> Array:
-    """Spectrum of unit variance, of which the fraction `share` is correlated by `phi` from sample to sample.
+    """Spectrum of unit variance, of which a share `share` has the correlation `phi` between neighbouring samples.
 
-    Shape (m,).
+    The result has shape (m,).
     """
     correlated = (1.0 - phi**2) / (1.0 + phi**2 - 2.0 * phi * np.cos(angle))
     return np.asarray(1.0 - share + share * correlated, dtype=np.float64)
 
 
 def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[list[float], float, float, float]:
-    """Weigh white noise, an autoregression, and both together against each other.
+    """Choose between white noise, an autoregression, and the sum of both.
 
-    A mixture that is fitted to white noise finds correlation below the frequencies that are used, and then overstates
-    the slow noise three times. The three kinds therefore have equal prior probabilities, and the posterior mean of the
-    most probable kind is returned.
+    If the sum is fitted to white noise, it can have a correlated part below the frequencies used, and then overstates
+    the slow noise by a factor of three. The three kinds of noise therefore have equal prior probabilities, and the
+    posterior mean of the most probable kind is returned.
 
     Returns
     -------
     variances : list of float
-        Of one sample, by channel.
+        Variance of one sample, for each channel.
     share, correlation : float
-        The correlated part's share of it, and the correlation of its neighbouring samples.
+        Share of the correlated part in the variance, and correlation of its neighbouring samples.
     slow_doubt : float
-        Standard uncertainty of the logarithm of the power at `SLOWEST`, over all kinds.
+        Standard uncertainty of the logarithm of the power at `SLOWEST`, over all kinds of noise.
     """
 
     def variance(power: Array, kept: Flags, form: Array) -> float:

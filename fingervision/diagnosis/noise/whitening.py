@@ -1,4 +1,4 @@
-"""Whitening: correlated noise of unequal variance converted to unit white noise, by a Kalman filter (Kalman 1960)."""
+"""Whitening: convert correlated noise of unequal variance to unit white noise, by a Kalman filter (Kalman 1960)."""
 
 from dataclasses import dataclass, field
 
@@ -9,45 +9,37 @@ from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.loops import loop
 
 SPREADS = np.concatenate([[0.0], np.geomspace(0.01, 1e4, 121)])
-"""Spreads of the runs that are tried, over the noise."""
+"""Spreads of the run offsets that are tried, relative to the noise."""
 MIDLINE_FREE_MM = 1e3
 """Prior spread of the midline's constant: large enough to be free."""
+GAINS = 5
+"""Numbers a sample that the filter needs (`whitening.c`)."""
 
-_filter = loop("whitening_innovations")
-
-
-def _innovations(
-    columns: Array, time: Array, white: Array, p1: float, lag1: float, h: Array, p2: float, lag2: float
-) -> tuple[Array, float]:
-    """Innovations of columns, shape (n, k), and the log determinant of their covariance."""
-    whole = np.ascontiguousarray(columns, dtype=np.float64)
-    time, white, h = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, white, h))
-    out = np.empty_like(whole)
-    return out, _filter(whole, time, white, p1, lag1, h, p2, lag2, out)
+_gains, _innovations = loop("whitening_gains"), loop("whitening_innovations")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Whitener:
-    """Covariance of the observations, with the operation of whitening; channels are stacked gap, midline, force.
+    """Covariance of the observations, and the whitening operation; channels are stacked as gap, midline, force.
 
     Parameters
     ----------
     history : History
         Runs and times.
     noises : tuple of Noise
-        One a channel.
+        One noise per channel.
     aside : ndarray of bool, shape (channels * n,)
-        Outliers: they count as not measured.
+        Outliers, which are treated as not measured.
     input_mm : ndarray of float, shape (n,)
-        Standard deviation that an error of the input which stays gives the gap; 0 where there is none.
+        Standard deviation of the gap due to an input error that is constant over samples; 0 if there is none.
     input_samples : float
-        Samples over which it stays.
+        Number of samples for which this error is constant.
     passing_mm : ndarray of float, shape (n,)
-        The same of errors that are another at each sample.
+        Standard deviation of the gap due to input errors that differ between samples.
     drawing : ndarray of float, shape (channels * n, p), or None
-        What one standard uncertainty of each uncertain number of the gripper's drawing does to the prediction.
+        Change of the prediction per standard uncertainty of each uncertain dimension of the drawing.
     runs_scatter_mm : float
-        By how much the runs may be offset against each other by chance at most, as a standard deviation.
+        Largest standard deviation of random offsets between runs.
     """
 
     history: History
@@ -58,54 +50,70 @@ class Whitener:
     passing_mm: Array
     drawing: Array | None = None
     runs_scatter_mm: float = np.inf
+    _filter: tuple[Array, Array, float] = field(init=False, repr=False)
 
-    def columns(self, columns: Array) -> tuple[Array, float]:
-        """Whiten columns of shape (channels * n, k), and return also the log determinant of the covariance."""
-        n = self.history.input_mm.size
-        clock = self.history.time_s
-        step = 1.0 if clock is None else max(self.history.sample_time_s, 1e-9)
-        time = np.arange(n, dtype=np.float64) if clock is None else clock / step
-        out, total = np.empty_like(columns), 0.0
+    def __post_init__(self) -> None:
+        """Compute the filter's gains, which no column changes: every prediction of a search is whitened by them."""
+        history = self.history
+        n, clock = history.input_mm.size, history.time_s
+        step = 1.0 if clock is None else max(history.sample_time_s, 1e-9)
+        time = np.arange(n, dtype=np.float64) if clock is None else np.asarray(clock / step, dtype=np.float64)
+        gains, total = np.empty((len(self.noises) * n, GAINS)), 0.0
         for channel, noise in enumerate(self.noises):
             white = noise.white_mm**2 + (self.passing_mm**2 if channel == 0 else np.zeros(n))
             part = slice(channel * n, (channel + 1) * n)
             white[self.aside[part]] = -1.0
-            lag1 = -np.log(max(noise.correlation, 1e-6))
-            share = self.input_mm if channel == 0 else np.zeros(n)
+            lag1 = -float(np.log(max(noise.correlation, 1e-6)))
+            share = self._shares(channel)
             lag2 = 50.0 if self.input_samples <= 1.0 else 2.0 / self.input_samples
-            for run in self.history.runs:
-                rows = slice(part.start + run.start, part.start + run.stop)
-                out[rows], logdet = _innovations(
-                    np.ascontiguousarray(columns[rows]),
-                    time[run],
-                    white[run],
-                    noise.correlated_mm**2,
-                    lag1,
-                    share[run],
-                    1.0,
-                    lag2,
-                )
-                total += logdet
-        return out, total
+            for run in history.runs:
+                own = gains[part][run]
+                total += _gains(time[run], white[run], noise.correlated_mm**2, lag1, share[run], 1.0, lag2, own)
+        shares = np.concatenate([self._shares(channel) for channel in range(len(self.noises))])
+        object.__setattr__(self, "_filter", (gains, np.asarray(shares, dtype=np.float64), total))
+
+    def _shares(self, channel: int) -> Array:
+        """What a lasting error of the input gives a channel (mm): the gap is the one that it reaches; shape (n,)."""
+        return np.asarray(self.input_mm if channel == 0 else np.zeros(self.input_mm.size), dtype=np.float64)
+
+    def columns(self, columns: Array) -> tuple[Array, float]:
+        """Whiten columns of shape (channels * n, k), and return also the log determinant of the covariance."""
+        gains, shares, total = self._filter
+        return _filtered(columns, gains, shares), total
+
+    def of_channel(self, columns: Array, channel: int) -> Array:
+        """Whiten columns that are zero outside one channel, from and to that channel's part of shape (n, k)."""
+        gains, shares, _ = self._filter
+        n = self.history.input_mm.size
+        part = slice(channel * n, (channel + 1) * n)
+        return _filtered(columns, gains[part], shares[part])
 
     def one(self, column: Array) -> Array:
         """Whiten one column of shape (channels * n,)."""
         return self.columns(column[:, None])[0][:, 0]
 
 
+def _filtered(columns: Array, gains: Array, shares: Array) -> Array:
+    """Innovations of columns, shape (m, k)."""
+    whole = np.ascontiguousarray(columns, dtype=np.float64)
+    out = np.empty_like(whole)
+    _innovations(whole, gains, shares, out)
+    return out
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RunOffsets:
     """Nuisance parameters of every explanation: re-zeroing between runs, constant of the midline, the drawing.
 
-    Re-zeroing is a zero-mean random effect per channel; the constant is free; an uncertain dimension of the drawing is
-    a random effect with its own uncertainty.
+    Re-zeroing is a zero-mean random effect per channel; the midline's constant is free; an uncertain dimension of the
+    drawing is a random effect with its stated uncertainty.
 
     Parameters
     ----------
     design : ndarray of float, shape (m, columns)
-        Whitened columns: one a run and channel, then the midline's constant, then the drawing's uncertain numbers.
+        Whitened columns: one per run and channel, then the midline's constant, then the drawing's uncertain dimensions.
     channels : int
-        Gap, then midline and force where they were measured.
+        Number of channels: gap, then midline and force if measured.
     runs : int
         Number of runs.
     midline : bool
@@ -113,7 +121,7 @@ class RunOffsets:
     scales_mm : tuple of float
         Noise of each channel.
     drawn : int
-        How many numbers of the drawing are uncertain.
+        Number of uncertain dimensions of the drawing.
     most_mm : float
         Largest spread of the runs' offsets that is considered.
     """
@@ -127,6 +135,18 @@ class RunOffsets:
     drawn: int = 0
     most_mm: float = np.inf
     _metrics: dict[tuple[float, ...], Array] = field(default_factory=dict, init=False, repr=False)
+    _by_spread: list[tuple[Array, Array, Array]] = field(default_factory=list, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Tabulate for each channel, over the spreads, what no residual changes.
+
+        The runs' weights, how much of the squared mean of each run an offset takes, and the penalty.
+        """
+        for channel, scale in enumerate(self.scales_mm):
+            z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
+            spread = np.minimum(scale * SPREADS, self.most_mm)[:, None] ** 2 * z
+            penalty = np.sum(np.log1p(spread), axis=1) + 2.0 * np.log1p(SPREADS**2)
+            self._by_spread.append((z, z * spread / (1.0 + spread), penalty))
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
@@ -148,7 +168,7 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G: r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads allowed."""
+        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads fitted."""
         known = self._metrics.get(sigma_mm)
         if known is not None:
             return known
@@ -161,20 +181,20 @@ class RunOffsets:
         return found
 
     def squared(self, whitened: Array, metric: Array) -> float:
-        """Squared length of a whitened column with the offsets of a metric allowed."""
+        """Squared length of a whitened column, with the offsets of a metric fitted."""
         shared = self.design.T @ whitened
         return float(whitened @ whitened - shared @ metric @ shared)
 
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
         """Estimate the spreads from a whitened residual by marginal likelihood.
 
-        A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) keeps two runs from turning every common
-        offset into scatter. With one run the spread is zero.
+        A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) prevents that, for two runs, every common
+        offset is attributed to scatter. With one run the spread is zero.
 
         Returns
         -------
         sigma_mm : tuple of float
-            One a channel.
+            Spread for each channel.
         penalty : float
             -2 log of determinant and prior, to be added to chi-square.
         """
@@ -190,9 +210,9 @@ class RunOffsets:
     def doubt(self, residual: Array) -> float:
         """-2 log of the ratio of a residual's probability over all spreads to that at the best spread.
 
-        It is added to a score.
+        The value is added to a score.
 
-        A few runs hardly determine the spread: parameters that act like an offset then have Student's tails.
+        A few runs hardly determine the spread; by this term, parameters that act like an offset have Student's tails.
         """
         if self.runs == 1:
             return 0.0
@@ -217,20 +237,16 @@ class RunOffsets:
         return tuple(out)
 
     def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
-        """Scale of each channel, and at all spreads the penalty and the fall of chi-square due to offsets."""
+        """Scale of each channel; for all spreads, the penalty and the reduction of chi-square due to offsets."""
         shares = self.design.T @ residual
         if self.drawn:
             # What the drawing's numbers explain is no scatter between runs.
             inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
             shares = shares - self.gram[:, -self.drawn :] @ np.linalg.solve(inner, shares[-self.drawn :])
         found = []
-        for channel in range(self.channels):
-            z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
+        for channel, (z, weight, penalty) in enumerate(self._by_spread):
             mean = shares[channel * self.runs : (channel + 1) * self.runs] / z
             if channel == 1 and self.midline:
                 mean = mean - np.sum(mean * z) / np.sum(z)
-            scale = self.scales_mm[channel]
-            spread = np.minimum(scale * SPREADS, self.most_mm)[:, None] ** 2 * z
-            gain = np.sum(mean**2 * z * spread / (1.0 + spread), axis=1)
-            found.append((scale, np.sum(np.log1p(spread), axis=1) + 2.0 * np.log1p(SPREADS**2), gain))
+            found.append((self.scales_mm[channel], penalty, weight @ mean**2))
         return found

@@ -1,1 +1,1 @@
-"""The result for readers: where measurement and simulation differ, figures, the page, the files."""
+"""Reports of a diagnosis: regions of disagreement, plots, the HTML page, and the files."""

@@ -1,4 +1,4 @@
-"""The files of a result: the page, the report, its figures, the corrected model, the next run."""
+"""Write the files of a diagnosis: the HTML page, the report, its plots, the corrected model, the next run."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -29,15 +29,15 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
     Parameters
     ----------
     out : Path
-        A folder that is there.
+        An existing folder.
     done : Diagnosis
-        The answer.
+        Result of the diagnosis.
     model : CorrectedModel
-        What was diagnosed, with the effects that it has already.
+        Model that was diagnosed, with the effects that it already includes.
     made : Provenance
-        Files, command and versions behind the answer.
+        Files, command and versions from which the result was obtained.
     table : Path
-        The measured table, beside which its recording is looked for.
+        Path of the measured table, next to which its recording is searched.
     """
     report = done.report
     write_model(out / MODEL, Path(model.base_path), corrected(done, model).effects, model.kind)

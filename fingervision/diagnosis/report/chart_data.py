@@ -1,4 +1,4 @@
-"""Data of the charts on a report's page, as JSON for the page's script."""
+"""Data of the charts on a report's HTML page, as JSON for the page's script."""
 
 import json
 
@@ -9,15 +9,15 @@ from fingervision.diagnosis.report.gap_curves import GapCurves
 from fingervision.domain.effect import Array, Flags
 
 MOST_ROWS = 3000
-"""Rows that a chart shows: more than a screen has columns, and few enough for a page of one megabyte."""
+"""Most rows in a chart: more than the columns of a screen, and few enough for an HTML page of one megabyte."""
 DASHES: tuple[list[int], ...] = ([6, 4], [], [8, 3, 2, 3], [2, 3])
-"""Dashes of the predictions, in their order: they are told apart without colour."""
+"""Dash patterns of the predictions, in their order, so that they are distinguishable without colour."""
 
 Chart = dict[str, object]
 
 
 def charts_of(curves: GapCurves, residual_mm: dict[str, Array]) -> list[Chart]:
-    """Compose the charts: gap and residual over the input, and over time where the runs share a clock.
+    """Compose the charts: gap and residual over the input, and over time if the runs have a common clock.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def charts_json(charts: list[Chart]) -> str:
 
 
 def _shown(x: Array) -> tuple[NDArray[np.intp], str]:
-    """Rows in ascending order of `x`, thinned evenly, with a remark where some are omitted."""
+    """Rows in ascending order of `x`, thinned evenly, with a remark if some are omitted."""
     step = max(1, -(-x.size // MOST_ROWS))
     rows = np.arange(0, x.size, step)
     return rows[np.argsort(x[rows], kind="stable")], "" if step == 1 else f" (each {step}th row)"

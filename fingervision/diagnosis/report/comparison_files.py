@@ -1,4 +1,4 @@
-"""The files of a comparison: one page, one table and one figure for all compared models."""
+"""Write the files of a comparison: one HTML page, one table and one plot for all compared models."""
 
 import json
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> di
     Parameters
     ----------
     found : mapping of str to Comparison
-        By the model's name, in the order in which they were given.
+        Comparison for each model, by its name, in the order in which they were given.
     made : Provenance
         Files, command and versions.
     """
@@ -36,7 +36,7 @@ def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> di
 
 
 def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path) -> dict[str, object]:
-    """Write page, figures and compare.json into an existing folder, and return the content of compare.json.
+    """Write HTML page, plots and compare.json into an existing folder, and return the content of compare.json.
 
     The recording from which the table `measured` was made is searched for beside it.
     """
@@ -56,7 +56,7 @@ def _curves(found: Mapping[str, Comparison]) -> GapCurves:
 
 
 def residuals_of(found: Mapping[str, Comparison]) -> Figure:
-    """Residuals of one model by channel; of several, the gap of each."""
+    """Plot the residuals: of a single model by channel; of several models, the gap's residual of each."""
     first = next(iter(found.values()))
     if len(found) == 1:
         return residual_figure(first.residual_mm, None, first.data.chain.history)

@@ -23,10 +23,11 @@ from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffec
 from fingervision.effects import catalogue
 
 MEMBERS_SEPARATED = 5
-"""Explanations, best first, that the next run is designed to separate: the time it takes grows with their square."""
+"""Number of explanations, best first, that the next run is designed to separate; the computing time grows with its
+square."""
 
 RUNNERS_UP = 8
-"""Single effects, best first, that a report lists beside its answer; the rest explain next to nothing."""
+"""Number of single effects, best first, that a report lists in addition to its result."""
 
 
 def diagnosis_report(
@@ -37,15 +38,15 @@ def diagnosis_report(
     Parameters
     ----------
     answered : Answer
-        What was found, and what stands.
+        Findings, and the remaining share of the disagreement.
     posterior : tuple of dict
-        Draws of the best explanation's parameters, for what the next run will show.
+        Posterior draws of the best explanation's parameters, for predicting the next run.
     mistake : Finding or None
-        What is wrong with the table itself.
+        Mistake found in the table itself.
     rng : numpy.random.Generator
-        Of the bootstrap.
+        Generator of the bootstrap.
     begin_s : float
-        When the diagnosis began, on the clock of `time.perf_counter`.
+        Start time of the diagnosis, on the clock of `time.perf_counter`.
     """
     data, found, stands = answered.data, answered.found, answered.stands
     best, mapped = found.best, data.position_map is not None
@@ -118,7 +119,7 @@ def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:
 
 
 def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
-    """Sentence that successive repeats are more alike than their scatter: a drift, or a run-in."""
+    """Sentence that successive repeats are more similar than their scatter, which indicates a drift or a run-in."""
     if errors is None or not errors[0].has_trend:
         return ()
     return (

@@ -1,4 +1,4 @@
-"""How an effect looks in a residual: an ideal linear gripper, opened, held and closed, with and without the effect."""
+"""Plot of an effect's residual: an ideal linear gripper is opened, held and closed, with and without the effect."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,7 +10,7 @@ from fingervision.effects import catalogue
 from fingervision.models.table import TableModel
 
 SHOWN_SHARE = 0.2
-"""Parameters are drawn at this share of their range, so that the shape is plain."""
+"""Size of the parameters in the plot, as a share of their range, so that the shape is clearly visible."""
 
 
 def effect_figure(name: str) -> Figure:

@@ -1,4 +1,4 @@
-"""The figures of a report as files: gap against input, gap over time and residuals, each as SVG and PDF."""
+"""The plots of a report as files: gap against input, gap over time and residuals, each as SVG and PDF."""
 
 from pathlib import Path
 
@@ -12,18 +12,18 @@ INPUT, TIME, RESIDUALS = "gap_against_input", "gap_over_time", "residuals"
 
 
 def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str) -> tuple[Path, ...]:
-    """Write the figures into a folder, replacing earlier ones.
+    """Write the plots into a folder, replacing earlier ones.
 
     Parameters
     ----------
     out : Path
-        A folder that is there.
+        An existing folder.
     curves : GapCurves
         Measurement and predictions.
     residuals : Figure
-        Measured minus predicted.
+        Plot of measured minus predicted values.
     title : str
-        Of the figures.
+        Title of the plots.
     """
     over_time = gap_over_time(curves, title)
     if over_time is None:

@@ -1,4 +1,4 @@
-"""Advise to measure the force, where it would separate explanations that the gap cannot."""
+"""Advise to measure the force, if it would separate explanations that the gap cannot separate."""
 
 from dataclasses import replace
 
@@ -9,18 +9,19 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.model import PhysicalModel
 
 SEEN = 0.002
-"""Of the largest force: what any force sensor repeats to, averaged over a run."""
+"""Detectable difference of force as a share of the largest force: the repeatability of any force sensor, averaged over
+a run."""
 
 
 def force_hint(data: Observations, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
-    """Name the explanations with equal gap that differ in force, where the force was not measured.
+    """Name explanations with equal gap but different force, if the force was not measured.
 
     Parameters
     ----------
     data : Observations
         Measurement and model.
     alternatives : tuple of Explanation
-        What the data cannot tell apart, the best first.
+        Explanations that the data cannot distinguish, best first.
     """
     if data.chain.history.force or len(alternatives) < 2 or not isinstance(data.model.base, PhysicalModel):
         return ()

@@ -1,4 +1,4 @@
-"""Frames at the reversals of a recording, with the measured edges drawn in."""
+"""Video frames at the reversals of a recording, with the measured edges drawn in."""
 
 import base64
 import csv
@@ -17,11 +17,11 @@ from fingervision.frames.source import open_source
 from fingervision.storage.summary_json import SUMMARY
 
 MOST_FRAMES = 6
-"""Frames of a strip: the start, and the first turning points."""
+"""Number of frames in the strip: at the start, and at the first reversals."""
 LOOKED_AT = 2000
-"""Frames of a recording that are decoded for it at most: a second or two of a report's time."""
+"""Most frames of a recording that are decoded for the strip, within a second or two."""
 TURN = 0.02
-"""Share of the input's range by which it must come back before a turning point counts: an encoder's jitter is less."""
+"""Least return motion of a reversal as a share of the input's range: an encoder's jitter is smaller."""
 WIDTH_PX, JPEG_QUALITY = 480, 80
 MARK = (64, 255, 96)
 
@@ -35,11 +35,11 @@ class Turn:
     frame : int
         Number of the frame.
     time_s, input_mm, gap_mm : float
-        As in the table; the time may be missing.
+        Values in the table; the time may be missing.
     points_px : tuple of (float, float)
         Left and right measuring point.
     jpeg : bytes
-        The frame with the measured distance drawn in; empty before it was decoded.
+        The frame with the measured distance drawn in; empty until it is decoded.
     """
 
     frame: int
@@ -51,7 +51,7 @@ class Turn:
 
 
 def strip_html(table: Path) -> str:
-    """HTML of the frames at the reversals of the recording behind a gaps.csv, or the reason why there is none."""
+    """HTML of the frames at the reversals in the recording of a gaps.csv, or the reason why there is none."""
     recording = _recording_of(table)
     if recording is None:
         return (
@@ -70,7 +70,7 @@ def strip_html(table: Path) -> str:
 
 
 def turning_rows(table: Path) -> tuple[Turn, ...]:
-    """Find the rows of a gaps.csv at which the input reversed, and the first row; none without the needed columns."""
+    """Find the rows of a gaps.csv at which the input reversed, and the first row; none if columns are missing."""
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     found: list[Turn] = []
@@ -100,7 +100,7 @@ def turning_rows(table: Path) -> tuple[Turn, ...]:
 
 
 def _recording_of(table: Path) -> Path | None:
-    """The file from which a gaps.csv was measured, recognised by its hash; None where it is not found nearby."""
+    """Path of the recording from which a gaps.csv was measured, identified by its hash; None if not found nearby."""
     try:
         recording = json.loads((table.parent / SUMMARY).read_bytes())["recording"]
         name, sha256 = recording["name"], recording["sha256"]

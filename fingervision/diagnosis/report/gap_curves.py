@@ -1,4 +1,4 @@
-"""Measured and predicted gaps for the figures of a report."""
+"""Measured and predicted gaps for the plots of a report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
 from fingervision.domain.effect import Array, Flags
 
 STANDS = 1e-4
-"""Share of the range within which the stage stands; its direction is then that of the move before."""
+"""Share of the range within which the stage counts as at rest; its direction is then that of the previous motion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,15 +22,15 @@ class GapCurves:
     input_mm, gap_mm : ndarray of float, shape (n,)
         Recorded input and measured gap.
     expanded_mm : ndarray of float, shape (n,)
-        Expanded uncertainty of each gap (k = 2), random part.
+        Expanded random uncertainty of each gap (k = 2).
     opens : ndarray of bool, shape (n,)
-        Rows to which the input rose.
+        Rows that were reached with increasing input.
     time_s : ndarray of float, shape (n,), or None
-        Time since the first row; None without a clock that the runs share.
+        Time since the first row; None if the runs have no common clock.
     runs : tuple of slice
         Rows of each run.
     predictions : mapping of str to ndarray of float, shape (n,)
-        Predicted gap, by the name that the legend gives it.
+        Predicted gap, by its name in the legend.
     """
 
     input_mm: Array

@@ -1,4 +1,4 @@
-"""Figures of gap against input, and of gap over time: measurement, simulation, corrected model."""
+"""Plots of gap against input, and of gap over time: measurement, simulation, corrected model."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,13 +10,13 @@ from fingervision.domain.effect import Array, Flags
 
 MEASURED = "#222222"
 LINES = (("#c0392b", "--"), ("#1f618d", "-"), ("#7d3c98", "-."), ("#117a65", ":"))
-"""Colour and dash of the first, second, ... prediction; told apart in black and white too."""
+"""Colour and line style of the predictions in their order, distinguishable in black and white too."""
 FEW_ROWS = 80
-"""Rows up to which each reading has a marker with its error bar; of more, the bars would be a band of ink."""
+"""Number of rows up to which each reading has a marker with an error bar; more error bars would merge."""
 
 
 def gap_against_input(curves: GapCurves, title: str) -> Figure:
-    """Draw the gap over the recorded input, opening and closing distinguished (Hricko & Havlik, 2015, figure 9)."""
+    """Plot the gap over the recorded input, opening and closing distinguished (Hricko & Havlik, 2015, figure 9)."""
     with plain_style():
         figure = Figure(figsize=(6.3, 4.2), layout="constrained")
         axes = figure.subplots()
@@ -36,7 +36,7 @@ def gap_against_input(curves: GapCurves, title: str) -> Figure:
 
 
 def gap_over_time(curves: GapCurves, title: str) -> Figure | None:
-    """Draw the gap over time; None where the runs share no clock."""
+    """Plot the gap over time; None if the runs have no common clock."""
     if curves.time_s is None:
         return None
     with plain_style():

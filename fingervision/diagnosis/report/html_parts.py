@@ -1,4 +1,4 @@
-"""Parts of a report's page: tables, lists, numbers that a program can read, charts that need no network."""
+"""Parts of a report's HTML page: tables, lists, machine-readable numbers, and charts that need no network."""
 
 import math
 from collections.abc import Sequence
@@ -17,31 +17,31 @@ HINT = "Drag to zoom, double-click to see all; with the keyboard: arrows read va
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Table of cells that are already HTML; wide tables scroll by themselves."""
+    """Table whose cells are already HTML; wide tables have their own scroll bar."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f'<div class="scroll" tabindex="0" role="group"><table><tr>{top}</tr>{body}</table></div>'
 
 
 def bullets(items: Sequence[str]) -> str:
-    """List of sentences; an empty list is stated in words."""
+    """List of sentences; for an empty list, a sentence says so."""
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>" if items else "<p>Nothing.</p>"
 
 
 def number(value: float | None, unit: str = "mm", digits: int = 4) -> str:
-    """A number for a reader, with its full value for a program (HTML's `data` element)."""
+    """Number for a reader, with its full value for programs (HTML's `data` element)."""
     if value is None:
         return "-"
     return f'<data value="{value!r}">{value:.{digits}g}</data> {escape(unit)}'.rstrip()
 
 
 def named(name: str) -> str:
-    """Write a name as a program knows it, which a narrow screen may break at its underscores."""
+    """Write an identifier so that it may break at its underscores on a narrow screen."""
     return escape(name).replace("_", "_<wbr>")
 
 
 def with_uncertainty(e: Estimate) -> list[str]:
-    """Value and expanded uncertainty, to a tenth of the standard uncertainty."""
+    """Value and expanded uncertainty, rounded to a tenth of the standard uncertainty."""
     if e.u is None:
         return [number(e.value, e.unit, 5), "at a bound"]
     places = max(0, 1 - math.floor(math.log10(e.u))) if e.u > 0.0 else 6
@@ -50,7 +50,7 @@ def with_uncertainty(e: Estimate) -> list[str]:
 
 
 def chart(found: Chart, words: str) -> str:
-    """Placeholder for a chart that the script draws, with the value under the cursor below it."""
+    """Placeholder for a chart that the script draws, with a line below it for the value under the cursor."""
     name = escape(str(found["id"]), quote=True)
     return (
         f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{escape(words, quote=True)}. '
@@ -59,7 +59,7 @@ def chart(found: Chart, words: str) -> str:
 
 
 def provenance_html(made: Provenance) -> str:
-    """HTML with the files, the command and the versions from which a result comes."""
+    """HTML with the files, the command and the versions from which a result was obtained."""
     files = table(
         ["used as", "file", "bytes", "SHA-256"],
         [
@@ -72,7 +72,7 @@ def provenance_html(made: Provenance) -> str:
 
 
 def page(title: str, heading: str, verdict: str, sections: Sequence[tuple[str, str]], charts: list[Chart]) -> str:
-    """Compose a whole page that contains styles, charts and data, so that it opens without a network."""
+    """Compose a whole HTML page that contains styles, charts and data, so that it opens without a network."""
     style = (CHARTS / "uPlot.min.css").read_text(encoding="utf-8") + (PAGE / "report.css").read_text(encoding="utf-8")
     library = (CHARTS / "uPlot.iife.min.js").read_text(encoding="utf-8")
     script = (PAGE / "charts.js").read_text(encoding="utf-8")

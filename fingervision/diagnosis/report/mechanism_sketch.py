@@ -1,7 +1,13 @@
-"""Sketch of the mechanism on the page: every body as predicted and as measured, with the difference magnified."""
+"""Sketch of the mechanism on the page: every body as predicted and as measured, with the difference magnified.
+
+A slider goes through the recording in time, run by run, or through the input's range where rows have no times.
+"""
 
 import json
+import re
 from collections.abc import Sequence
+from html import escape
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,28 +19,29 @@ from fingervision.models.place_answers import PlaceAnswers
 Array = NDArray[np.float64]
 
 STEPS = 15
-"""Positions of the slider: parts of the input's range, each the mean of its rows."""
+"""Positions of the slider over the input: parts of its range, each the mean of its rows."""
+TIME_STEPS, FEWEST_STEPS = 24, 4
+"""Positions over time, shared by all runs, and the fewest of a run: there and back at either end."""
 SHOWN = 0.05
-"""Of the mechanism's size: the largest difference as it is drawn."""
+"""Largest displayed difference, as a share of the mechanism's size."""
 CHORDS = 9
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 COLOURS = (("#7a8b99", 3.0), ("#c9a227", 6.0), ("#c1440e", np.inf))
-"""Of a body whose mean is off by up to so many standard deviations."""
+"""Colour of a body whose mean deviation is up to a given number of standard deviations."""
 
 
 def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
-    """Draw the bodies that have a pose; a slider goes through the input's range.
+    """Draw the bodies with a measured pose; a slider moves through the input's range.
 
     Parameters
     ----------
     evidence : BodyEvidence
-        What the channels said.
+        Results of comparing the measured channels with the drawing.
     answers : PlaceAnswers
-        The drawing.
+        Predictions of the drawing.
     """
-    u, kept = evidence.prediction.input_mm, evidence.findings.noise.kept
-    order = np.flatnonzero(kept)[np.argsort(u[kept], kind="stable")]
-    parts = [part for part in np.array_split(order, min(STEPS, order.size)) if part.size]
+    u = evidence.prediction.input_mm
+    parts, said_at = _parts(evidence)
     bodies = [body for body in answers.model.bodies if body.is_fixed or body.name in answers.moving_bodies]
     corners = {body.name: _corners(body) for body in bodies}
     every = np.concatenate(list(corners.values()), axis=1)
@@ -63,14 +70,16 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
             seen = [own[k] + magnified * float(means[step][k]) for k in range(3)]
             is_measured = body.name in measured
             shown.append({"predicted": own, "measured": seen if is_measured else None,
-                          "colour": _colour(float(sigma[step])), "sigma": round(float(sigma[step]), 1)})  # fmt: skip
-        frames.append({"input": round(at, 4), "bodies": shown})
+                          "colour": _colour(float(sigma[step])), "sigma": float(f"{sigma[step]:.3g}"),
+                          "off": _off_words(body.name, evidence, means[step])})  # fmt: skip
+        frames.append({"at": f"{said_at[step]}input {at:.4g} mm", "input": round(at, 4), "bodies": shown})
     shapes = []
     for kind in ("drawn", "predicted", "measured"):
         for number, body in enumerate(bodies):
             points = " ".join(f"{x:.3f},{y:.3f}" for x, y in corners[body.name].T)
             shapes.append(f'<polygon class="{kind}" id="{kind}-{number}" points="{points}"><title>{body.name}</title>'
                           "</polygon>")  # fmt: skip
+    hinges = _hinges(evidence, answers, size)
     margin = 0.12 * size
     box = f"{low[0] - margin:.2f} {-high[1] - margin:.2f} {high[0] - low[0] + 2 * margin:.2f} " + (
         f"{high[1] - low[1] + 2 * margin:.2f}"
@@ -79,8 +88,9 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
                        "names": [body.name for body in bodies]})  # fmt: skip
     said = (
         f"Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, its difference from the prediction "
-        f"magnified {magnified:.3g} times. Colour: how far a body's mean is off, up to 3 standard deviations grey, up "
-        "to 6 yellow, beyond red. Bodies that are held are not measured."
+        f"magnified {magnified:.3g} times. Colour: how far a body's mean is off in units of its standard uncertainty u "
+        "by the noise, up to 3 grey, up to 6 yellow, beyond red. Rings: hinges, heavy where one is in the answer. "
+        "Bodies that are held are not measured."
     )
     if unseen:
         said += f" Not measured: {', '.join(unseen)}."
@@ -89,17 +99,64 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
     return (
         f"<style>{_STYLE}</style>"
         f'<svg id="mechanism" viewBox="{box}" role="img" aria-label="The mechanism as predicted and as measured">'
-        f'<g transform="scale(1,-1)">{"".join(shapes)}</g></svg>'
-        f'<p><label>Input <input id="mechanism-at" type="range" min="0" max="{len(frames) - 1}" '
-        f'value="{len(frames) - 1}"></label> <output id="mechanism-said"></output></p><p class="hint">{said}</p>'
+        f'<g transform="scale(1,-1)">{"".join(shapes)}</g>{hinges}</svg>'
+        f'<p><label>{"Input" if evidence.time_s is None else "Time"} <input id="mechanism-at" type="range" min="0" '
+        f'max="{len(frames) - 1}" value="{_most_off(frames)}"></label><output id="mechanism-said" '
+        f'for="mechanism-at"></output></p><p class="hint">{said}</p>'
         f'<script type="application/json" id="mechanism-data">{data}</script><script>{_SCRIPT}</script>'
     )
 
 
-def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
-    """Mean of measured minus predicted pose of a body in every part of the range, shape (parts, 3).
+def _parts(evidence: BodyEvidence) -> tuple[list[NDArray[np.intp]], list[str]]:
+    """Rows of every position of the slider, and when that was, in words."""
+    u, noise = evidence.prediction.input_mm, evidence.findings.noise
+    if evidence.time_s is None:
+        order = np.flatnonzero(noise.kept)[np.argsort(u[noise.kept], kind="stable")]
+        parts = [part for part in np.array_split(order, min(STEPS, order.size)) if part.size]
+        return parts, [""] * len(parts)
+    found, words = list[NDArray[np.intp]](), list[str]()
+    each = max(TIME_STEPS // len(noise.runs), FEWEST_STEPS)
+    for number, run in enumerate(noise.runs):
+        rows = np.arange(run.start, run.stop)[noise.kept[run]]
+        for part in np.array_split(rows, min(each, max(rows.size, 1))):
+            if part.size:
+                found.append(part)
+                of_run = f"run {number + 1}, " if len(noise.runs) > 1 else ""
+                words.append(f"{of_run}{float(evidence.time_s[part].mean()):.4g} s, ")
+    return found, words
 
-    The second value is its largest significance.
+
+def _most_off(frames: Sequence[dict[str, Any]]) -> int:
+    """Position of the slider at which a body is farthest off: the page opens there."""
+    worst = [max((own["sigma"] for own in frame["bodies"] if own["measured"]), default=0.0) for frame in frames]
+    return int(np.argmax(worst))
+
+
+def _off_words(name: str, evidence: BodyEvidence, mean: Array) -> str:
+    """By how much a body is off where it was measured: `12 um, 0.62 mrad`."""
+    there = [f"{name}.{part}" in evidence.names for part in PARTS]
+    words = [f"{1e3 * float(np.hypot(*mean[:2])):.3g} um"] if there[0] or there[1] else []
+    return ", ".join([*words, *([f"{abs(float(mean[2])):.3g} mrad"] if there[2] else [])])
+
+
+def _hinges(evidence: BodyEvidence, answers: PlaceAnswers, size: float) -> str:
+    """Rings at the hinges as drawn, with their names; heavy where a hinge is in the answer."""
+    places = {member.candidate.place for member in evidence.findings.members}
+    told = " ".join(places) if not evidence.findings.structure else ""
+    shapes = []
+    for flexure in answers.mechanism.flexures:
+        (x, y), name = flexure.at_mm, escape(flexure.name)
+        kind = "hinge told" if re.search(rf"(?<!\w){re.escape(flexure.name)}(?!\w)", told) else "hinge"
+        shapes.append(f'<circle class="{kind}" cx="{x:.3f}" cy="{-y:.3f}" r="{0.012 * size:.3f}"/>')
+        shapes.append(f'<text x="{x + 0.02 * size:.3f}" y="{-y + 0.009 * size:.3f}" font-size="{0.026 * size:.3f}">'
+                      f"{name}</text>")  # fmt: skip
+    return "".join(shapes)
+
+
+def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
+    """Mean difference of a body's measured and predicted pose in every part of the range, shape (parts, 3).
+
+    The second result is the largest significance of these differences.
     """
     means, sigma = np.zeros((len(parts), 3)), np.zeros(len(parts))
     for k, part in enumerate(PARTS):
@@ -131,7 +188,11 @@ _STYLE = """
 #mechanism .drawn { stroke: #bbb; stroke-width: 1 }
 #mechanism .predicted { stroke: currentColor; stroke-width: 1.2; stroke-dasharray: 5 4 }
 #mechanism .measured { fill-opacity: .45; stroke-width: 1.4 }
-#mechanism-at { width: min(60%, 30rem); vertical-align: middle }
+#mechanism .hinge { fill: none; stroke: currentColor; stroke-width: 1; vector-effect: non-scaling-stroke }
+#mechanism .told { stroke: #c1440e; stroke-width: 3.5 }
+#mechanism text { fill: currentColor; stroke: none }
+#mechanism-at { width: min(75%, 40rem); vertical-align: middle }
+#mechanism-said { display: block; min-height: 3em }
 """
 _SCRIPT = """
 (() => {
@@ -149,9 +210,10 @@ _SCRIPT = """
       if (!body.measured) return;
       place(shape, body.measured, data.centres[k]);
       shape.style.fill = shape.style.stroke = body.colour;
-      if (body.sigma > 3) off.push(`${data.names[k]} ${body.sigma} \\u03c3`);
+      if (body.sigma > 3) off.push(`${data.names[k]} ${body.off} off (${body.sigma} u)`);
     });
-    said.textContent = `${frame.input} mm` + (off.length ? `: ${off.join(", ")}` : ": nothing off beyond 3 \\u03c3");
+    said.textContent = `${frame.at}: ` + (off.length ? off.join("; ") : "no body is off by more than 3 u");
+    slider.setAttribute("aria-valuetext", said.textContent);
   };
   slider.addEventListener("input", show);
   show();

@@ -1,9 +1,9 @@
 """Positioning accuracy and repeatability of an axis from repeated visits of targets, as ISO 230-2:2014 defines them.
 
 Published reports deviate from the standard in three ways, which the tests check with readings of real stages. `forward`
-may mean the approach from above, so that the reversal has the other sign. R may be max(R_up, R_down), whereas the
-standard's R is bidirectional and includes the reversal. E may be that of one direction only. All of these are among the
-figures here: compare R with R_up and R_down, E with E_up and E_down.
+may mean the approach from above, so that the reversal has the opposite sign. The stated R may be max(R_up, R_down),
+whereas the standard's R is bidirectional and includes the reversal. The stated E may be that of one direction only. All
+of these quantities are computed here: compare R with R_up and R_down, E with E_up and E_down.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,25 +37,26 @@ def positioning_accuracy(
     Parameters
     ----------
     target_mm : ndarray of float, shape (n,)
-        Target of each reading; readings of one target carry exactly the same number.
+        Target of each reading; all readings of a target must have exactly the same number.
     deviation_mm : ndarray of float, shape (n,)
         Measured position minus target (or measured minus simulated gap).
     direction : ndarray of int, shape (n,)
-        +1 approached from below, -1 from above, 0 not known: left out.
+        +1 for an approach from below, -1 from above, 0 if unknown (such readings are left out).
     cycle : ndarray of int, shape (n,)
-        Visit of that target from that side; readings of one visit are averaged first. The reversal's uncertainty is
-        taken from the differences of like-numbered visits, so that a drift from cycle to cycle does not enlarge it.
+        Number of the visit of that target from that side; the readings of one visit are averaged first. The reversal's
+        uncertainty is computed from the differences of visits with equal numbers, so that a drift from cycle to cycle
+        does not enlarge it.
 
     Returns
     -------
     PositioningAccuracy
-        Bidirectional figures over the targets approached from both sides, the others over all targets of that side;
-        R and A over those with two visits and more.
+        Bidirectional quantities over the targets approached from both sides, the others over all targets of that side;
+        R and A over those with at least two visits.
 
     Raises
     ------
     ValueError
-        Arrays of different length, numbers that are not finite, directions other than +1, -1 and 0.
+        If the arrays differ in length, numbers are not finite, or directions are other than +1, -1 and 0.
 
     Examples
     --------
@@ -118,7 +119,7 @@ def _checked(*given: ArrayLike) -> tuple[Array, Array, Integers, Integers]:
 
 
 def _by_visit(deviation: Array, number: Integers, chosen: NDArray[np.bool_]) -> dict[int, float]:
-    """Mean deviation of each visit among the selected readings."""
+    """Mean deviation of each visit, over the selected readings."""
     return {int(visit): float(np.mean(deviation[chosen & (number == visit)])) for visit in np.unique(number[chosen])}
 
 
@@ -130,7 +131,7 @@ def _visits(readings: dict[int, float]) -> Visits | None:
 
 
 def _target(place: float, up: dict[int, float], down: dict[int, float]) -> Target:
-    """Statistics of a target; the reversal's uncertainty from visits of equal number, or from both scatters."""
+    """Statistics of a target; the reversal's uncertainty is from visits of equal number, or from both scatters."""
     above, below = _visits(down), _visits(up)
     if above is None or below is None:
         return Target(place, below, above, None, None)
@@ -184,7 +185,7 @@ def _figure(
     fewest: int = 2,
     scatter: bool = False,
 ) -> Figure:
-    """Compute a figure over the targets with sufficient readings, or give the reason why they are too few."""
+    """Compute a quantity over the targets with sufficient readings, or give the reason why there are too few."""
     words, targets = sides[0].words, sides[0].mean.size
     if scatter:
         kept = np.logical_and.reduce([side.scattered for side in sides])
@@ -202,7 +203,7 @@ def _figure(
 
 
 def _reversals(targets: Sequence[Target], by_cycle: Sequence[Sequence[float]]) -> dict[str, Figure]:
-    """Reversal B and its mean; the mean's uncertainty from the scatter of the cycles' means where there are two."""
+    """Reversal B and its mean, whose uncertainty is from the scatter of the cycles' means if there are two or more."""
     known = [t for t in targets if t.reversal_mm is not None]
     if not known:
         reason = "no target was approached from both sides"

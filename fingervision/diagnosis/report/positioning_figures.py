@@ -1,4 +1,4 @@
-"""Figures of positioning accuracy: symbols and definitions of ISO 230-2:2014, and their data classes.
+"""Quantities of positioning accuracy: symbols and definitions of ISO 230-2:2014, and their data classes.
 
 The arrows of the standard are written `up` (target approached from below, the input increasing) and `down` (from
 above).
@@ -16,11 +16,13 @@ from scipy.special import stdtrit
 
 UP, DOWN = 1, -1
 COVERAGE = 2.0
-"""Standard deviations on each side of a mean: the coverage factor of ISO 230-2 (R_up = 4 s)."""
+"""Coverage factor of ISO 230-2: standard deviations on each side of a mean (R_up = 4 s)."""
 FEWEST_TARGETS = 5
-"""Targets that ISO 230-2 asks for on a linear axis up to 2 m; fewer are computed, and said."""
+"""Number of targets that ISO 230-2 requires on a linear axis up to 2 m; with fewer, the quantities are computed with a
+remark."""
 FEWEST_CYCLES = 5
-"""Approaches of each target from each side that ISO 230-2 asks for (clause 5.3.2); fewer are computed, and said."""
+"""Number of approaches of each target from each side that ISO 230-2 requires (clause 5.3.2); with fewer, the quantities
+are computed with a remark."""
 
 _U, _D = "approached from below", "approached from above"
 DEFINITIONS: Mapping[str, str] = {
@@ -42,7 +44,7 @@ DEFINITIONS: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Visits:
-    """Readings at one target from one side: number, mean deviation, standard deviation (None where n is 1)."""
+    """Readings at one target from one side: number, mean deviation, standard deviation (None for one reading)."""
 
     n: int
     mean_mm: float
@@ -53,7 +55,7 @@ class Visits:
 class Target:
     """A target with its readings from either side.
 
-    Reversal B_i = up - down with its uncertainty and degrees of freedom.
+    The reversal is B_i = up - down, with its uncertainty and degrees of freedom.
     """
 
     target_mm: float
@@ -66,7 +68,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of the axis: value and standard uncertainty where known, or the reason why there is no value.
+    """A quantity of the axis: value with standard uncertainty if known, or the reason why there is no value.
 
     With five cycles an uncertainty has four degrees of freedom: a 95 % interval extends by 2.8 times the uncertainty to
     either side, not 2.
@@ -89,14 +91,14 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class PositioningAccuracy:
-    """All figures of an axis by symbol, the targets from which they are computed, and remarks."""
+    """All quantities of an axis by symbol, the targets from which they are computed, and remarks."""
 
     targets: tuple[Target, ...]
     figures: Mapping[str, Figure]
     notes: tuple[str, ...]
 
     def value_mm(self, symbol: str) -> float:
-        """Value of a figure that exists (mm); asking for one without a value is a programming error."""
+        """Value of a quantity that exists (mm); requesting one without a value is a programming error."""
         value = self.figures[symbol].value_mm
         if value is None:
             message = f"{symbol} has no value: {self.figures[symbol].reason}."

@@ -1,4 +1,4 @@
-"""Positioning figures of a measured table compared with its model, as given in report.json and report.html."""
+"""Positioning accuracy of a measured table compared with its model, as given in report.json and report.html."""
 
 from html import escape
 
@@ -20,14 +20,14 @@ from fingervision.domain.effect import Array
 
 
 def positioning_of_data(data: Observations, answer: Settings) -> PositioningReport | NoRepeatedTargets:
-    """Positioning figures of a measured table compared with its model and a diagnosis, or why there are none.
+    """Positioning accuracy for a measured table, its model and a diagnosis, or the reason why there is none.
 
     Parameters
     ----------
     data : Observations
         Measurement and model.
     answer : Settings
-        Everything that was found: the effects with their parameters and start states, and the curve of a map.
+        Everything that was found: effects with parameters and start states, and the curve of a map.
     """
     table, rows = data.table, data.table.input_mm.size
 
@@ -46,14 +46,14 @@ def positioning_of_data(data: Observations, answer: Settings) -> PositioningRepo
 
 
 def positioning_section(found: PositioningReport | NoRepeatedTargets) -> dict[str, object]:
-    """Section `iso230` of report.json; `figures` is null, with the reason, where no targets are repeated."""
+    """Section `iso230` of report.json; `figures` is null, with the reason, if no targets are repeated."""
     if isinstance(found, NoRepeatedTargets):
         return {"standard": STANDARD, "figures": None, "reason": found.reason}
     return positioning_document(found)
 
 
 def positioning_html(found: PositioningReport | NoRepeatedTargets) -> str | None:
-    """Section of report.html: sentences, table, notes; None where no targets are repeated."""
+    """Section of report.html with sentences, table and notes; None if no targets are repeated."""
     if isinstance(found, NoRepeatedTargets):
         return None
     head, rows = positioning_rows(found)

@@ -1,4 +1,4 @@
-"""Positioning figures of a measured table compared with its model and the result of a diagnosis, in one call."""
+"""Positioning accuracy of a measured table compared with its model and the result of a diagnosis, in one call."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -9,14 +9,15 @@ from fingervision.diagnosis.report.positioning_report import PositioningReport, 
 from fingervision.domain.effect import Array, Flags, Values
 
 STAGE_SLOPE = 0.05
-"""Largest difference of the model's slope from one to one at which its gap is the position of an axis. Scales of stages
-are off by parts in a thousand; a gripper amplifies several times, and position minus target means nothing there."""
+"""Largest difference of the model's slope from one for which the gap counts as the position of an axis. Scales of
+stages are off by parts in a thousand; a gripper amplifies by several times, so that position minus target has no
+meaning."""
 LINE = 1e-9
-"""Departure of a model from the straight line, of its range, below which it is the line: the rounding of its digits."""
+"""Deviation of a model from the straight line, as a share of its range, below which it counts as the line: rounding."""
 MODEL = "the model"
-"""Name under which the model's own departure from the targets (a map of position errors) has its share."""
+"""Name under which the share of the model's own deviation from the targets (a map of position errors) is reported."""
 TARGET, SIMULATION = "target", "model"
-"""What deviations are taken from."""
+"""References from which deviations are measured."""
 
 
 def positioning_of_table(
@@ -28,28 +29,29 @@ def positioning_of_table(
     predict_mm: Callable[[Mapping[str, Values]], Array],
     answer: Mapping[str, Values],
 ) -> PositioningReport | NoRepeatedTargets:
-    """Compute the positioning figures where the table has repeated targets.
+    """Compute the positioning accuracy, if the table has repeated targets.
 
     If the model's gap follows the input one to one, as on a stage, a deviation is measured gap minus recorded input, as
-    in an ISO 230-2 report. The share of the model's prediction is then reported beside those of the effects. Otherwise
-    a deviation is measured minus simulated gap. A constant added to all deviations (a rest gap) changes no figure.
+    in an ISO 230-2 report. The share of the model's prediction is then reported together with those of the effects.
+    Otherwise a deviation is measured minus simulated gap. A constant added to all deviations (such as a rest gap)
+    changes none of the quantities.
 
     Parameters
     ----------
     input_mm : ndarray of float, shape (n,)
-        The path in the order of travel, rows without a reading among them.
+        Inputs of the path in order of time, including rows without a reading.
     measured : ndarray of bool, shape (n,)
-        Rows that have a reading; m of them.
+        Rows with a reading; m is their number.
     runs : sequence of slice
         Rows of each run.
     time_s : ndarray of float, shape (n,), or None
         Times.
     gap_mm : ndarray of float, shape (m,)
-        Readings.
+        Measured gaps.
     predict_mm : callable
-        Predicted gap of the m readings for the effects that act, by their parameters.
+        Predicted gap at the m readings, for given effects and their parameters.
     answer : mapping of str to mapping of str to float
-        Effects of the answer and their parameters.
+        Effects found, with their parameters.
     """
     visits = repeated_targets(input_mm, measured, runs, time_s)
     if isinstance(visits, NoRepeatedTargets):

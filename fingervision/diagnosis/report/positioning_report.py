@@ -1,4 +1,4 @@
-"""Positioning figures of a diagnosis: as measured, with the named effects corrected, and the share of each effect."""
+"""Positioning accuracy in a diagnosis: as measured, corrected for the named effects, and the share of each effect."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,22 +13,22 @@ from fingervision.domain.effect import Array, Values
 
 @dataclass(frozen=True, slots=True)
 class PositioningReport:
-    """Positioning figures before and after the correction, and with the predicted change of each effect subtracted.
+    """Positioning accuracy as measured, after the correction, and with the predicted change of each effect subtracted.
 
     Parameters
     ----------
     measured : PositioningAccuracy
-        Of measured minus simulated, or minus target.
+        Quantities of measured minus simulated values, or of measured minus target values.
     after : PositioningAccuracy or None
-        Of what remains after the whole answer; None where nothing was named.
+        Quantities of the residual after all named effects; None if none was named.
     without : mapping of str to PositioningAccuracy
-        By effect, of the measured deviations minus that effect's predicted change.
+        By effect, quantities of the measured deviations minus that effect's predicted change.
     assumed : tuple of str
-        What was assumed of the targets and their sides of approach.
+        Assumptions on the targets and their sides of approach.
     reference : str
-        What deviations were taken from: `target` or `model`.
+        Reference of the deviations: `target` or `model`.
     slope_sign : int
-        +1 where the gap rises with the input, -1 where it falls: play makes the reversal of the other sign.
+        +1 if the gap rises with the input, -1 if it falls: play then causes a reversal of opposite sign.
     """
 
     measured: PositioningAccuracy
@@ -39,9 +39,9 @@ class PositioningReport:
     slope_sign: int = 1
 
     def share_mm(self, effect: str, symbol: str) -> float | None:
-        """Figure as measured minus figure without the effect (mm); negative where the effect hides a part of it.
+        """Quantity as measured minus the quantity without the effect (mm); negative if the effect hides a part of it.
 
-        Figures are ranges and maxima, so that shares need not add up to the figure; those of B_mean do.
+        Most quantities are ranges or maxima, so that the shares need not add up to the quantity; those of B_mean do.
         """
         whole, rest = self.measured.figures[symbol].value_mm, self.without[effect].figures[symbol].value_mm
         return None if whole is None or rest is None else whole - rest
@@ -56,14 +56,14 @@ class PositioningReport:
 def effect_changes(
     predict_mm: Callable[[Mapping[str, Values]], Array], answer: Mapping[str, Values]
 ) -> dict[str, Array]:
-    """Change of the prediction by each named effect, with the others present.
+    """Change of the prediction by each named effect, with the other effects present.
 
     Parameters
     ----------
     predict_mm : callable
         Predicted gap of the measured rows, shape (m,), for the parameters of the effects that act.
     answer : mapping of str to mapping of str to float
-        Effects of the answer and their parameters.
+        Effects found, with their parameters.
     """
     whole = predict_mm(answer)
     return {
@@ -80,23 +80,23 @@ def positioning_report(
     reference: str = "target",
     slope_sign: int = 1,
 ) -> PositioningReport:
-    """Compute the figures as measured, corrected, and without each effect.
+    """Compute the quantities as measured, corrected, and without each effect.
 
     Parameters
     ----------
     visits : RepeatedTargets
         Target, side and cycle of the m measured rows.
     measured_mm : ndarray of float, shape (m,)
-        Position minus target, or measured gap minus that of the model without the answer's effects.
+        Position minus target, or measured gap minus that of the model without the effects found.
     after_mm : ndarray of float, shape (m,), or None
-        Measured gap minus that of the model with all of the answer's effects.
+        Measured gap minus that of the model with all effects found.
     changes_mm : mapping of str to ndarray of float, shape (m,), or None
-        By effect, the change of the gap that it predicts: with all effects minus with all others, so that an effect
-        that acts through another is counted where both stand.
+        By effect, the change of the predicted gap: prediction with all effects minus prediction with all others, so
+        that an effect that acts through another is counted for both.
     reference : str
-        What deviations are taken from: `target` or `model`.
+        Reference of the deviations: `target` or `model`.
     slope_sign : int
-        +1 where the gap rises with the input, -1 where it falls.
+        +1 if the gap rises with the input, -1 if it falls.
     """
 
     def figures(deviation_mm: Array) -> PositioningAccuracy:

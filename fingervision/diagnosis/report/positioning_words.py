@@ -5,10 +5,10 @@ from fingervision.diagnosis.report.positioning_report import PositioningReport
 
 STANDARD = "ISO 230-2:2014"
 TOLD = 0.05
-"""Smallest share of a figure that is told in words, of the figure: the standard deviation of five readings is itself
-known to a third only, and the list stays readable. All shares stand in the table and in report.json."""
+"""Smallest share of a quantity that is mentioned in sentences: the standard deviation of five readings is itself known
+only to a third, and the list stays readable. All shares are in the table and in report.json."""
 SENTENCES = ("B_mean", "R", "E", "M", "A")
-"""Figures that get a sentence; where there is one direction only, those of that direction."""
+"""Quantities that are described by a sentence; if there is one direction only, those of that direction."""
 NAMES = {
     "B_mean": "Mean reversal",
     "B": "Largest reversal",
@@ -29,7 +29,7 @@ SIDES = {"up": "approached from below", "down": "approached from above"}
 
 
 def positioning_document(report: PositioningReport) -> dict[str, object]:
-    """Section `iso230` of report.json: every figure with unit and definition, its residual, and shares by effect."""
+    """Section `iso230` of report.json: every quantity with unit, definition, residual, and shares of the effects."""
     figures = {}
     for symbol, figure in report.measured.figures.items():
         after = None if report.after is None else report.after.figures[symbol].value_mm
@@ -84,13 +84,13 @@ def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[st
 
 
 def positioning_notes(report: PositioningReport) -> tuple[str, ...]:
-    """Notes: definition of deviations and shares, assumptions on the cycle, and what the standard would need."""
+    """Notes: definition of deviations and shares, assumptions on the cycle, and what the standard would require."""
     shares = (SHARES,) if report.without else ()
     return (REFERENCES[report.reference], *shares, *report.assumed, *report.measured.notes)
 
 
 def positioning_words(report: PositioningReport) -> tuple[str, ...]:
-    """Describe each main figure in a sentence: its value, the share of each effect, and the residual."""
+    """Describe each main quantity in a sentence: its value, the share of each effect, and the residual."""
     out = []
     for plain in SENTENCES:
         symbols = [plain]
@@ -126,7 +126,7 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
 
 
 def _side_words(figure: Figure, slope_sign: int) -> str:
-    """Sentence on which approach gives smaller readings, and whether play explains it; empty within the uncertainty."""
+    """Sentence on which approach gives smaller readings, and whether play explains it; empty if not significant."""
     value, interval = figure.value_mm or 0.0, figure.interval_mm
     if not value or (interval is not None and abs(value) <= interval):
         return ""

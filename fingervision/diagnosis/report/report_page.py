@@ -1,4 +1,4 @@
-"""report.html: the whole result on one self-contained page."""
+"""report.html: the whole result on one self-contained HTML page."""
 
 import base64
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ SIMULATION, CORRECTED = "simulation", "corrected model"
 
 
 def curves_of(diagnosis: Diagnosis) -> GapCurves:
-    """Curves of measurement, simulation and, where effects were named, the corrected model."""
+    """Curves of measurement, simulation and, if effects were named, the corrected model."""
     data = diagnosis.data
     predictions = {SIMULATION: data.stacked_mm - diagnosis.before_mm}
     if diagnosis.report.effects:
@@ -130,10 +130,10 @@ def _mechanisms(report: DiagnosisReport) -> str:
     known = catalogue()
     return "".join(
         f"<h3>{escape(effect.name)}</h3><p>{escape(known[effect.name].words.capitalize())}: "
-        f"<code>{escape(known[effect.name].formula)}</code> ({escape(known[effect.name].source)}). In measured minus "
-        f"simulated it looks so: {escape(known[effect.name].residual)}.</p>"
+        f"<code>{escape(known[effect.name].formula)}</code> ({escape(known[effect.name].source)}). Its "
+        f"residual (measured minus simulated): {escape(known[effect.name].residual)}.</p>"
         + _picture(
-            png_bytes(effect_figure(effect.name)), f"{effect.name} alone, on a made-up gripper that opens and closes"
+            png_bytes(effect_figure(effect.name)), f"{effect.name} alone, in a simulated gripper that opens and closes"
         )
         for effect in report.effects
         if effect.name in known

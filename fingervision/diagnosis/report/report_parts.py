@@ -16,7 +16,7 @@ class ReportPart(Protocol):
     TITLE: str
 
     def html(self, diagnosis: Diagnosis) -> str | None:
-        """Return the section's content as HTML that loads nothing; None where the section is empty."""
+        """Return the section's content as HTML that loads nothing from elsewhere; None if the section is empty."""
         ...
 
 
@@ -35,7 +35,7 @@ REGISTRY: Registry[ReportPart] = Registry("fingervision.report_parts", "report p
 
 
 def added_sections(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Title and content of every added section; one that fails is left out and reported."""
+    """Title and content of every added section; a section that fails is left out and reported."""
     sections = []
     for entry in REGISTRY.entries():
         try:

@@ -1,4 +1,4 @@
-"""A residual split into its channels, and the regions where it cannot be noise."""
+"""Split a residual into its channels, and find the regions where it is more than noise."""
 
 import numpy as np
 

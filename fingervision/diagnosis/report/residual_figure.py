@@ -1,4 +1,4 @@
-"""Figure of the residuals before and after the correction, over the input and over time."""
+"""Plot of the residuals before and after the correction, over the input and over time."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,12 +16,12 @@ NAMES = {
 
 
 def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, history: History) -> Figure:
-    """Draw measured minus predicted, one row per channel, over the input and (where there are times) over time.
+    """Plot measured minus predicted values, one row per channel, over the input and (if there are times) over time.
 
     Parameters
     ----------
     before, after : dict of ndarray of float, shape (n,)
-        By channel, in mm; `after` is None where nothing was added.
+        Residuals in mm, by channel; `after` is None if no effect was added.
     history : History
         Input and times.
     """

@@ -1,4 +1,4 @@
-"""Find where measurement and model disagree: regions whose residual cannot be noise, each described once."""
+"""Find where measurement and model disagree: regions whose residual is more than noise, each described once."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -10,18 +10,21 @@ from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.report import Place
 
 BINS = 16
-"""Parts of each variable's range: regions are found to a sixteenth of it, then their ends are moved within parts."""
+"""Number of parts of each variable's range: regions are found in these parts, then their ends are refined within
+parts."""
 ENDS = 200
-"""Ends of a region that are tried on either side."""
+"""Number of ends of a region tried on either side."""
 DRAWS = 200
 QUANTILE = 0.99
-"""Draws of noise and quantile of their maximum: one table of noise in a hundred is told a place."""
+"""Number of draws of noise, and quantile of their maximum: a region is reported in one table of noise in a hundred."""
 MOST = 8
-"""Places told; what is left after these is too little to point at."""
+"""Most regions reported; the residual after these is too small to be localised."""
 SMALL = 0.05
-"""Significance of a place beside the first one's, below which it is a seam that the first one left."""
+"""Significance relative to that of the first region below which a region is an artefact of the first one's
+subtraction."""
 NEAR = 0.85
-"""Places this near to the sharpest in significance are as sharp: the plainest of them is told."""
+"""Significance relative to the largest above which regions count as equally significant: the simplest of them is
+reported."""
 SHARES = {
     "gap": {"gap": 1.0, "left": -0.5, "right": 0.5},
     "midline": {"midline": 1.0, "left": 1.0, "right": 1.0},
@@ -29,12 +32,12 @@ SHARES = {
     "right": {"right": 1.0, "gap": 1.0, "midline": 0.5},
     "force": {"force": 1.0},
 }
-"""What a shift of one channel is in the others, plainest channel first."""
+"""Effect of a shift of one channel on the others, simplest channel first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axis:
-    """A variable over which the residual is examined: name, unit, values, and the samples in parts along it."""
+    """A variable over which the residual is examined: name, unit, values, and the samples in each part of its range."""
 
     name: str
     unit: str
@@ -61,7 +64,7 @@ class Axis:
 
 
 def _scan(score: Array) -> tuple[Array, Array, Array]:
-    """Largest absolute sum over a stretch, in standard deviations, and that stretch; shapes (...,) from (..., n)."""
+    """Largest absolute sum over a contiguous stretch, in standard deviations, and the stretch; (...,) from (..., n)."""
     n = score.shape[-1]
     total = np.concatenate([np.zeros((*score.shape[:-1], 1)), np.cumsum(score, axis=-1)], axis=-1)
     first, end = np.triu_indices(n + 1, 1)
@@ -94,7 +97,7 @@ def _axes(history: History, aside: Flags) -> list[Axis]:
 
 
 def _rounded(value: float, axis: Axis) -> float:
-    """Give a place on an axis to a ten-thousandth of its range: what smoothing leaves of a zero is no place."""
+    """Round a position on an axis to a ten-thousandth of the range; smaller values are remainders of smoothing."""
     decimals = 4 - int(np.floor(np.log10(float(np.ptp(axis.values)))))
     return round(value, decimals) + 0.0
 
@@ -114,7 +117,7 @@ def _words(place: Place, axis: Axis, everywhere: bool, runs: str) -> str:
 
 
 def _standard_deviations(noises: Mapping[str, Noise]) -> dict[str, float]:
-    """Standard deviation per channel of one sample in a mean over many; correlated noise averages out less."""
+    """Standard deviation per channel of one sample within a mean of many; correlated noise averages out less."""
     out = {}
     for channel, noise in noises.items():
         stretch = (1.0 + noise.correlation) / (1.0 - noise.correlation)
@@ -131,23 +134,24 @@ def where(
     aside: Flags,
     rng: np.random.Generator,
 ) -> tuple[Place, ...]:
-    """Find the regions over input (both directions, opening, closing), time and speed whose residual cannot be noise.
+    """Find the regions over input, time and speed whose residual is more than noise.
 
-    A disagreement is visible in several channels and over several variables. It is reported where it is most
-    significant, then subtracted from all channels, and the rest is searched again.
+    The input is examined in both directions together, and for opening and closing separately. A disagreement is visible
+    in several channels and over several variables. It is reported where it is most significant, then subtracted from
+    all channels, and the remainder is searched again.
 
     Parameters
     ----------
     residual_mm : dict of ndarray of float, shape (n,)
         Measured minus predicted, by channel.
     noises : dict of Noise
-        Of gap and, where they were measured, midline and force.
+        Noise of the gap and, if measured, of midline and force.
     history : History
         Input and times.
     aside : ndarray of bool, shape (n,)
         Outliers.
     rng : numpy Generator
-        For the threshold of the maximum over all stretches.
+        Generator for the threshold of the maximum over all stretches.
     """
     axes = _axes(history, aside)
     sd = _standard_deviations(noises)

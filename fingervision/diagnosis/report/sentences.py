@@ -1,4 +1,4 @@
-"""The result in sentences: what the model lacks, what remains, which rows were excluded."""
+"""The result as sentences: what the model lacks, what remains unexplained, which rows were excluded."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from fingervision.domain.effect import Array
 from fingervision.domain.report import Disagreement, NamedEffect, Verdict
 
 COVERAGE_FACTOR = 2.0
-"""Standard uncertainties in an expanded one: about 95 % for a normal distribution (JCGM 100:2008, 6.2)."""
+"""Coverage factor of an expanded uncertainty: about 95 % for a normal distribution (JCGM 100:2008, 6.2)."""
 ODD_SIGMAS = 2.5
-"""In a table of a few rows a person wants to know of any row this far off, even where it was not set aside."""
+"""Deviation in standard deviations above which a row of a short table is mentioned, even if it was not excluded."""
 FEW_ROWS = 60
-"""Rows up to which that holds."""
+"""Number of rows up to which a table counts as short."""
 
 
 def phrase(effect: NamedEffect) -> str:
@@ -69,7 +69,7 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
 
 
 def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, ...]:
-    """Sentence with the number of excluded rows, and in a short table which rows are off."""
+    """Sentence with the number of excluded rows; for a short table, with the rows that deviate."""
     n = data.chain.history.input_mm.size
     aside = np.flatnonzero(problem.whitener.aside[:n])
     out = [f"{aside.size} of {n} samples were set aside as outliers."] if aside.size else []
@@ -93,7 +93,7 @@ def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
 
 
 def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
-    """Sentence where the recorded input's error is the larger part of the noise."""
+    """Sentence if the recorded input's error is the larger part of the noise."""
     error = float(np.median(data.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
         return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)

@@ -1,4 +1,4 @@
-"""Figures as files for a paper: SVG and PDF, identical for identical data; PNG for a page."""
+"""Plots as files for a paper: SVG and PDF, identical for identical data; PNG for an HTML page."""
 
 import io
 from contextlib import AbstractContextManager
@@ -12,7 +12,7 @@ PNG_DPI = 110
 
 
 def plain_style() -> AbstractContextManager[None]:
-    """Apply the common style of a report's figures; text stays text, so that it can be searched and edited."""
+    """Apply the common style of a report's plots; text is stored as text, so that it can be searched and edited."""
     style: dict[str, object] = {
         "font.size": 9,
         "axes.titlesize": 10,
@@ -26,7 +26,7 @@ def plain_style() -> AbstractContextManager[None]:
 
 
 def write_vector(figure: Figure, stem: Path) -> tuple[Path, ...]:
-    """Write a figure as SVG and as PDF; `stem` is the path without its suffix."""
+    """Write a plot as SVG and as PDF; `stem` is the path without its suffix."""
     written = []
     for kind in FORMATS:
         path = stem.with_name(f"{stem.name}.{kind}")
@@ -38,7 +38,7 @@ def write_vector(figure: Figure, stem: Path) -> tuple[Path, ...]:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """Encode a figure as PNG."""
+    """Encode a plot as PNG."""
     buffer = io.BytesIO()
     with plain_style():
         figure.savefig(buffer, format="png", dpi=PNG_DPI)

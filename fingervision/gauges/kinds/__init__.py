@@ -1,4 +1,4 @@
-"""Kinds of gauges, one per file: `KEYS`, `QUANTITIES` and `read(section)`, which returns a `Spec`."""
+"""Kinds of gauges, one per module, each with `KEYS`, `QUANTITIES` and `read(section)`, which returns a `Spec`."""
 
 import importlib
 import pkgutil
@@ -11,7 +11,7 @@ from fingervision.storage.toml_section import Section
 
 
 class Follower(Protocol):
-    """Measures one gauge in the frames of one recording, in order; it stores the last position of the object."""
+    """Measures one gauge in the frames of one recording, in order, and stores the object's last position."""
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
@@ -19,7 +19,7 @@ class Follower(Protocol):
 
 
 class Spec(Protocol):
-    """The settings of one gauge, from its keys; frozen."""
+    """The settings of one gauge; immutable."""
 
     @property
     def middle_px(self) -> tuple[float, float]:
@@ -27,7 +27,7 @@ class Spec(Protocol):
         ...
 
     def follower(self) -> Follower:
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         ...
 
 
@@ -38,7 +38,7 @@ class Kind(Protocol):
     QUANTITIES: tuple[tuple[str, str], ...]
 
     def read(self, section: Section) -> Spec:
-        """Read the keys of one gauge; an error states which value is not allowed."""
+        """Read the settings of one gauge; an error states which value is not allowed."""
         ...
 
 
@@ -48,7 +48,7 @@ def kinds() -> tuple[str, ...]:
 
 
 def kind_named(name: str) -> Kind:
-    """Find a kind."""
+    """Return the module of a kind of gauge by its name."""
     found: Any = importlib.import_module(f"{__name__}.{name}")
     kind: Kind = found
     return kind
@@ -57,7 +57,7 @@ def kind_named(name: str) -> Kind:
 def measured_together(followers: Sequence[Follower], picture: Picture) -> list[Reading]:
     """Measure several gauges in one frame.
 
-    A kind whose followers have `measured_with` measures all of its gauges in one call.
+    If the followers of a kind have the method `measured_with`, all gauges of this kind are measured in one call.
     """
     readings: dict[int, Reading] = {}
     for number, follower in enumerate(followers):

@@ -54,12 +54,12 @@ class CircleSpec:
     polarity: int
 
     def follower(self) -> "FollowedCircle":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedCircle(self)
 
 
 def read(section: Section) -> CircleSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     return CircleSpec(
         common_keys.middle(section),
         section.number("diameter_px", low=SMALLEST_PX, high=LARGEST_PX),
@@ -69,7 +69,7 @@ def read(section: Section) -> CircleSpec:
 
 
 class FollowedCircle:
-    """Measures one disc or hole in the frames of one recording."""
+    """Tracks one disc or hole through the frames of one recording."""
 
     def __init__(self, spec: CircleSpec) -> None:
         self._spec = spec
@@ -153,7 +153,7 @@ class FollowedCircle:
         return None
 
     def _start(self, picture: Picture) -> tuple[float, float, float, float] | tuple[GaugeStatus, str]:
-        """Rough centre and radius in the next frame, and their uncertainty."""
+        """Rough centre and radius in the next frame, with the uncertainties of centre and radius."""
         x, y, radius = self._at
         tried = TRIED if self._known is None else (1.0,)
         by = max(1, int(radius / SEARCH_RADIUS_PX))
@@ -191,7 +191,7 @@ class FollowedCircle:
 
 
 def _disc(radius: float) -> NDArray[np.float32]:
-    """Template of a disc with soft edge and its surroundings."""
+    """Template of a disc with a soft edge and its surroundings."""
     half = ceil(radius * (1.0 + SURROUNDINGS)) + 1
     y, x = np.mgrid[-half : half + 1, -half : half + 1]
     disc = np.clip(radius + 0.5 - np.hypot(x, y), 0.0, 1.0).astype(np.float32)
@@ -199,7 +199,7 @@ def _disc(radius: float) -> NDArray[np.float32]:
 
 
 def _displaced_px(picture: Picture, found: Circle) -> float:
-    """Uncertainty of centre and radius from the codec, where each of two sides of the outline has its own error."""
+    """Uncertainty of centre and radius due to codec errors that are common to the pixels on one side of the outline."""
     half = found.radius_px + reach_px(found.blur_px)
     # The fit's levels are not kept; an outline of this contrast in the middle of the scale stands for it.
     inside = 0.5 * (picture.top - found.contrast)
@@ -207,7 +207,7 @@ def _displaced_px(picture: Picture, found: Circle) -> float:
 
 
 def _u_response(picture: Picture, found: Circle) -> float:
-    """Uncertainty of the outline from the unknown camera response."""
+    """Uncertainty of the outline's position due to an unknown camera response."""
     other = picture.settings.other_response
     if other is None:
         return 0.0

@@ -17,20 +17,20 @@ QUANTITIES = (("position", "length"),)
 
 @dataclass(frozen=True, slots=True)
 class EdgeSpec(EdgeKeys):
-    """Settings of an edge gauge; its direction is that in which the position is measured."""
+    """Settings of an edge gauge; `direction_rad` is the direction in which the position is measured."""
 
     def follower(self) -> "FollowedEdge":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedEdge(self)
 
 
 def read(section: Section) -> EdgeSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     return EdgeSpec(*edge_keys(section, "direction_deg"))
 
 
 class FollowedEdge:
-    """Measures one edge in the frames of one recording."""
+    """Tracks one edge through the frames of one recording."""
 
     def __init__(self, spec: EdgeSpec) -> None:
         axes = Axes(*spec.middle_px, spec.direction_rad)

@@ -1,4 +1,4 @@
-"""The gap between two fingers in a region, measured as `measure` does in the whole picture."""
+"""The gap between two fingers in a region, measured in the same way as `measure` does in the whole picture."""
 
 from dataclasses import dataclass, replace
 from math import ceil
@@ -28,18 +28,18 @@ class GapSpec:
     height_px: float
 
     def follower(self) -> "FollowedGap":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedGap(self)
 
 
 def read(section: Section) -> GapSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     width, height = (section.number(key, low=SMALLEST_PX, high=common_keys.LONGEST_PX) for key in KEYS[2:])
     return GapSpec(common_keys.middle(section), width, height)
 
 
 class FollowedGap:
-    """Measures one gap in the frames of one recording; the region follows the midline of the fingers."""
+    """Measures one gap in the frames of one recording; the region moves with the midline of the fingers."""
 
     def __init__(self, spec: GapSpec) -> None:
         self._spec = spec
@@ -69,7 +69,7 @@ class FollowedGap:
         return Reading(GaugeStatus.OK, (quantity,), (Mark((first, second)),), zone)
 
     def _region(self, picture: Picture) -> Region | None:
-        """The present region, cut to the picture."""
+        """The present region, clipped to the picture."""
         spec, (width, height) = self._spec, picture.size_px
         left = round(spec.middle_px[0] - 0.5 * (spec.width_px - 1.0)) + self._moved[0]
         top = round(spec.middle_px[1] - 0.5 * (spec.height_px - 1.0)) + self._moved[1]

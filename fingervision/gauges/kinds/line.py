@@ -20,23 +20,23 @@ TURN_AT = 0.2
 
 @dataclass(frozen=True, slots=True)
 class LineSpec(EdgeKeys):
-    """Settings of a line gauge; its direction is that of the line itself."""
+    """Settings of a line gauge; `direction_rad` is the direction of the line itself."""
 
     def follower(self) -> "FollowedLine":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedLine(self)
 
 
 def read(section: Section) -> LineSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     return LineSpec(*edge_keys(section, "angle_deg"))
 
 
 class FollowedLine:
-    """Measures one line in the frames of one recording.
+    """Tracks one line through the frames of one recording.
 
-    `position` is counted across the line as it was drawn, through the gauge's centre, so that it has the same direction
-    in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
+    `position` is measured from the gauge's centre, perpendicular to the direction given in the gauge's settings, so
+    that its direction is the same in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
     """
 
     def __init__(self, spec: LineSpec) -> None:
@@ -84,7 +84,7 @@ class FollowedLine:
 
 
 def _crossing(fixed: Axes, axes: Axes, position_px: float, slope: float) -> tuple[float, float]:
-    """Position where the line crosses the axis t of the fixed gauge."""
+    """Point where the line crosses the axis t of the gauge as given in its settings."""
     x, y = axes.point(position_px)
     along_x, along_y = (
         cos(axes.direction_rad) * slope - sin(axes.direction_rad),

@@ -44,12 +44,12 @@ class MarkerSpec:
     reach_px: float
 
     def follower(self) -> "FollowedMarker":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedMarker(self)
 
 
 def read(section: Section) -> MarkerSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     return MarkerSpec(
         common_keys.middle(section),
         section.number("size_px", low=SMALLEST_PX, high=LARGEST_PX),
@@ -59,7 +59,7 @@ def read(section: Section) -> MarkerSpec:
 
 
 class FollowedMarker:
-    """Measures one mark in the frames of one recording."""
+    """Tracks one mark through the frames of one recording."""
 
     def __init__(self, spec: MarkerSpec) -> None:
         self._spec = spec
@@ -114,7 +114,7 @@ class FollowedMarker:
         return place, found.covariance
 
     def _near(self, picture: Picture) -> list[tuple[float, float]] | tuple[GaugeStatus, str]:
-        """Initial estimates of the centre."""
+        """Initial estimates of the mark's centre, or the reason why there are none."""
         x, y = self._at
         if self._template is None:
             step = max(NEAR * self._spec.size_px * 0.7, 1.0)
@@ -171,7 +171,7 @@ class FollowedMarker:
         return found.quarter_turn < -LEAST_QUARTER
 
     def _taken(self, picture: Picture, place: tuple[float, float]) -> tuple[GaugeStatus, str] | None:
-        """Store a template of the mark, unless a similar mark is within reach."""
+        """Store a template of the mark; return the reason if a similar mark is within reach."""
         half = self._half + ceil(GUARD * self._spec.reach_px) + BEYOND_PX
         x, y = round(place[0]), round(place[1])
         own, _ = picture.part(x - self._half, y - self._half, 2 * self._half + 1, 2 * self._half + 1)

@@ -38,12 +38,12 @@ class PairSpec:
     polarities: tuple[int, int]
 
     def follower(self) -> "FollowedPair":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedPair(self)
 
 
 def read(section: Section) -> PairSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     return PairSpec(
         common_keys.middle(section),
         common_keys.angle(section, "direction_deg"),
@@ -55,7 +55,7 @@ def read(section: Section) -> PairSpec:
 
 
 class FollowedPair:
-    """Measures two edges in the frames of one recording; edges near each other are fitted together."""
+    """Tracks two edges through the frames of one recording; edges near each other are fitted together."""
 
     def __init__(self, spec: PairSpec) -> None:
         axes = Axes(*spec.middle_px, spec.direction_rad)

@@ -36,11 +36,11 @@ GUARD, MOST_TIMES = 1.5, 4.0
 TURN_AT = 0.1
 # A patch that is less sure than this (pixels) shows too little to be measured.
 LEAST_SURE_PX = 0.3
-# What aliasing leaves beside noise, of texture that loses so much of its gradients' power by the smoothing (two thirds
-# of photographs through optics of 0.7 px, 0.8 to 0.85 without any); coarser texture, blurred by 1 px and more, has
-# none. RMS over phases: 0.002 to 0.008 px of photographed gravel, grass and bricks (`tests.benchmarks.gauges --only
-# photographs`).
-ALIASED_PX, FROM_FINE, TO_FINE = 0.006, 0.4, 0.75
+# What aliasing leaves beside noise, of texture that loses so much of its gradients' power along an axis by the
+# smoothing (two thirds of photographs through optics of 0.7 px, 0.8 to 0.9 without any); coarser texture, blurred by
+# 1 px and more, has none. RMS over phases and 24 places beside the noise: 0.003 to 0.005 px of photographed gravel,
+# grass and bricks through such optics, 0.012 px of gravel without any (`tests.benchmarks.gauges --only photographs`).
+ALIASED_PX, FROM_FINE, TO_FINE = 0.012, 0.5, 0.85
 # Contrast below a grey level a pixel is rounding.
 LEAST_SPREAD = 1.0
 
@@ -57,18 +57,18 @@ class PatchSpec:
     reach_px: float
 
     def follower(self) -> "FollowedPatch":
-        """Begin a recording."""
+        """Return a new follower, for the first frame of a recording."""
         return FollowedPatch(self)
 
 
 def read(section: Section) -> PatchSpec:
-    """Read the keys of one gauge."""
+    """Read the settings of one gauge."""
     width, height = (section.number(key, low=SMALLEST_PX, high=LARGEST_PX) for key in ("width_px", "height_px"))
     return PatchSpec(common_keys.middle(section), width, height, common_keys.reach(section))
 
 
 class FollowedPatch:
-    """Measures one patch in the frames of one recording."""
+    """Tracks one patch through the frames of one recording."""
 
     def __init__(self, spec: PatchSpec) -> None:
         self._spec = spec
@@ -77,7 +77,7 @@ class FollowedPatch:
         self._around: Floats | None = None
         self._template: Template | None = None
         self._template_turn = 0.0
-        self._least_correlation, self._aliased_px = LEAST_CORRELATION, 0.0
+        self._least_correlation, self._aliased_px = LEAST_CORRELATION, (0.0, 0.0)
         self._refused: Reading | None = None
         self._at = (*spec.middle_px, 0.0)
         self._times = 1.0
@@ -88,7 +88,7 @@ class FollowedPatch:
 
     @staticmethod
     def measured_with(followers: Sequence["FollowedPatch"], picture: Picture) -> list[Reading]:
-        """Measure several patches in the next frame; those of one size are registered together."""
+        """Measure several patches in the next frame; patches of the same size are registered together."""
         readings: dict[int, Reading] = {}
         waiting: dict[tuple[int, ...], list[tuple[int, Floats, tuple[int, int], NDArray[np.float64]]]] = {}
         for number, follower in enumerate(followers):
@@ -124,7 +124,7 @@ class FollowedPatch:
         return Mark(tuple((x + cos(turn) * u - sin(turn) * v, y + sin(turn) * u + cos(turn) * v) for u, v in corners))
 
     def _never(self, status: GaugeStatus, words: str) -> Reading:
-        """Record that the first frame has no texture to register against: no frame of this recording gives a number."""
+        """Record that the first frame has no texture to register against, so that no frame can give a value."""
         self._refused = Reading(status, zone=self._zone(), words=words)
         return self._refused
 
@@ -133,7 +133,7 @@ class FollowedPatch:
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
-        """Take the reference from the first readable frame; a later one would change the zero."""
+        """Take the reference from the first readable frame; a later one would change the zero of displacement."""
         if self._refused is not None:
             return self._refused
         (a, b), (x, y) = self.half, self._spec.middle_px
@@ -156,7 +156,7 @@ class FollowedPatch:
         if not template.best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX]).is_alone:
             return self._never(GaugeStatus.AMBIGUOUS, "its pattern repeats within 1.5 reach_px: lower reach_px")
         self._least_correlation = max(LEAST_CORRELATION, chance)
-        self._aliased_px = ALIASED_PX * min(max((reference.fine - FROM_FINE) / (TO_FINE - FROM_FINE), 0.0), 1.0)
+        self._aliased_px = _aliased_px(reference)
         self.reference = reference
         self._around, self._template = part, template
         self._at = (float(column), float(row), 0.0)
@@ -164,7 +164,7 @@ class FollowedPatch:
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
-        """Locate the patch roughly: the part of the picture in which to register it, and the initial estimate."""
+        """Locate the patch roughly: return the part of the picture to register it in, and an initial estimate."""
         a, b = self.half
         x, y, turn = self._at
         reach = ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
@@ -208,7 +208,7 @@ class FollowedPatch:
     def taken(
         self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
     ) -> Reading:
-        """Accept or reject the registration's result, and store it."""
+        """Accept or reject the result of the registration, and store an accepted one."""
         x, y, turn = place
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
@@ -222,7 +222,7 @@ class FollowedPatch:
         off_x, off_y = from_x - round(from_x), from_y - round(from_y)
         to = (x + cos(turn) * off_x - sin(turn) * off_y, y + sin(turn) * off_x + cos(turn) * off_y)
         u_x, u_y, u_turn = (sqrt(float(covariance[i, i])) for i in range(3))
-        u_x, u_y = hypot(u_x, self._aliased_px), hypot(u_y, self._aliased_px)
+        u_x, u_y = hypot(u_x, self._aliased_px[0]), hypot(u_y, self._aliased_px[1])
         quantities = (
             Shift((from_x, from_y), to, 0.0, u_x),
             Shift((from_x, from_y), to, 0.5 * np.pi, u_y),
@@ -231,10 +231,22 @@ class FollowedPatch:
         return Reading(GaugeStatus.OK, quantities, (Mark(((from_x, from_y), to)), Mark((to,)), self._zone()), None)
 
 
-def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:
-    """Light in a rectangle.
+def _aliased_px(reference: PatchReference) -> tuple[float, float]:
+    """Standard uncertainties along x and y by texture that is too fine for the pixels.
 
-    Beyond the picture's border it is reflected, which affects only the tails of the interpolation.
+    What it leaves in the picture is as large as the stronger gradients, and displaces the patch more along the axis of
+    the weaker ones.
+    """
+    own = [ALIASED_PX * min(max((fine - FROM_FINE) / (TO_FINE - FROM_FINE), 0.0), 1.0) for fine in reference.fine]
+    power = [max(float(reference.hessian[k, k]), 1e-30) for k in range(2)]
+    along_x, along_y = (max(own[j] * sqrt(power[j] / power[k]) for j in range(2)) for k in range(2))
+    return along_x, along_y
+
+
+def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:
+    """Light in a rectangle of the picture.
+
+    Beyond the picture's border the light is mirrored, which affects only the tails of the interpolation.
     """
     levels, (left, top) = picture.part(x, y, width, height)
     part = levels.astype(np.float32)

@@ -1,4 +1,4 @@
-"""Findings, one limit of a set-up per file; each file has `find(sample) -> Finding`.
+"""Findings, one limit of a set-up per module; each module has `find(sample) -> Finding`.
 
-A new finding is one new file (`inspection.catalogue` collects them).
+A new finding is added by a new module, which `inspection.catalogue` collects.
 """

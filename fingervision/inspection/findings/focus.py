@@ -1,4 +1,4 @@
-"""Focus: edges that the optics blur have a larger uncertainty."""
+"""Focus: edges blurred by the optics have a larger uncertainty."""
 
 from fingervision.domain.status import Status
 from fingervision.inspection.finding import Finding, refusing, weighed, without
@@ -10,7 +10,7 @@ FORMULA = "sqrt(u^2 - u'^2), u' the random uncertainty with edges of sigma 1.3 p
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare the blur of the edges, without motion, to that of a lens in focus."""
+    """Compare the blur of the edges, without motion blur, with that of a lens in focus."""
     blurred = (Status.BLURRED, Status.NO_FINGERS) if sample.is_lost_in_blur else (Status.BLURRED,)
     refused = None if sample.is_smeared else refusing(sample, "focus", blurred, REMEDY)
     if refused is not None or not sample.looks:

@@ -1,4 +1,4 @@
-"""Gamma: the camera's transfer curve, where it is assumed instead of measured."""
+"""Gamma: an assumed, not measured, transfer curve of the camera."""
 
 from fingervision.inspection.finding import Finding, weighed
 from fingervision.inspection.sample import SURELY, Sample
@@ -11,7 +11,7 @@ FORMULA = "probability of the other response, by the edges' own shape, times the
 
 
 def find(sample: Sample) -> Finding | None:
-    """Judge from the shape of the edges with which response they were stored."""
+    """Judge from the shape of the edges which camera response was applied to the stored levels."""
     seen = sample.response
     if not seen.other:
         words = f"The camera's response is known ({seen.assumed})."

@@ -21,7 +21,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare noise to contrast, and fit the edges with light that slopes on either side."""
+    """Compare the noise with the contrast, and fit the edges with a slope of the light on either side."""
     if not sample.looks:
         return _lost(sample)
     bright = plateaus(sample).bright
@@ -49,7 +49,7 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _lost(sample: Sample) -> Finding | None:
-    """Finding of frames without a number because nothing in them exceeds the noise."""
+    """Finding for frames without a measured gap because nothing in them exceeds the noise."""
     if not sample.is_lost_in_noise:
         return None
     words = "No frame gave a number, and what is in view hardly rises above the noise."
@@ -57,7 +57,7 @@ def _lost(sample: Sample) -> Finding | None:
 
 
 def uneven_light_px(sample: Sample) -> float:
-    """How far sloping light beside both inner edges moves the gap (pixels)."""
+    """Change of the gap caused by sloping light beside the inner edges (pixels)."""
     seen = [(look.upright, look.edges) for look in sample.looks]
     levels = int(np.iinfo(seen[0][0].dtype).max) + 1
     light = sample.settings.response.table(sample.top_level, levels)

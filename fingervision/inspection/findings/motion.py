@@ -17,7 +17,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare the blur of the flanks to that of the tips: motion across the fingers blurs only the flanks."""
+    """Compare the blur of the flanks with that of the tips: motion across the fingers blurs only the flanks."""
     refused = refusing(sample, "motion", (Status.BLURRED,), REMEDY) if sample.is_smeared else None
     if not sample.looks or (refused is not None and refused.share_refused > MOSTLY_REFUSED):
         return refused

@@ -14,7 +14,7 @@ FORMULA = "u_shift_px: how far what stands beside the edges may have moved them 
 
 
 def find(sample: Sample) -> Finding | None:
-    """Report what the measurement found beside the edges."""
+    """Report the disturbances that the measurement found beside the edges."""
     if not sample.looks:
         return None
     cost_px = sample.u_shift_px if sample.shows_surroundings and sample.blockiness < HEAVY else 0.0

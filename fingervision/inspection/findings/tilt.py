@@ -1,4 +1,4 @@
-"""Tilt: a camera turned against the fingers, about its optical axis or out of the plane."""
+"""Tilt: a camera rotated relative to the fingers, about its optical axis or out of the plane."""
 
 from math import atan, cos, degrees, hypot, radians, sqrt
 from typing import NamedTuple
@@ -34,7 +34,7 @@ ALIKE = 3.0
 
 
 def find(sample: Sample) -> Finding | None:
-    """Estimate the turn from the inner edges, and the tilt from the fingers' widths."""
+    """Estimate the rotation in the plane from the inner edges, and the tilt from the fingers' widths."""
     if not sample.looks:
         return None
     turns = [turn_deg(look) for look in sample.looks]
@@ -56,9 +56,9 @@ def find(sample: Sample) -> Finding | None:
 
 
 def turn_deg(look: Look) -> float:
-    """Mean direction of both inner flanks against the picture's axis (degrees).
+    """Mean direction of the two inner flanks relative to the picture's axis (degrees).
 
-    A symmetric spread of the fingers cancels.
+    If the fingers spread symmetrically, their directions cancel in the mean.
     """
     slopes = []
     for side in range(2):
@@ -71,7 +71,7 @@ def turn_deg(look: Look) -> float:
 
 
 def _slant_px(look: Look, turn: float) -> float:
-    """Distance of the two measuring points minus the gap at right angles to the turned edges (pixels)."""
+    """Distance of the two measuring points minus the gap perpendicular to the rotated edges (pixels)."""
     m = look.outcome
     dx, dy = m.right.x_px - m.left.x_px, m.right.y_px - m.left.y_px
     across, along = (dx, dy) if m.direction.is_vertical else (dy, dx)
@@ -82,12 +82,13 @@ def _slant_px(look: Look, turn: float) -> float:
 
 
 def corner_px(look: Look, below_px: float) -> float:
-    """How far the turn moves one measuring point along a round corner (pixels).
+    """Displacement of one measuring point along a round corner because the camera is rotated (pixels).
 
-    In a turned picture, one finger's outer corner is its highest point: its inner edge is then measured higher up the
-    fillet than the other finger's. On a circle of radius R an edge of slope m lies R (1 - m / sqrt(1 + m^2)) below the
-    top, which is the measuring height for the finger with the inner corner on top, and R (1 - 1 / sqrt(1 + m^2)) inside
-    its flank.
+    In a rotated picture, the highest point of one finger is its outer corner, so that its inner edge is measured higher
+    up on the fillet than that of the other finger, whose highest point is the inner corner. On a fillet of radius R,
+    the point with slope m lies R (1 - m / sqrt(1 + m^2)) below the top and R (1 - 1 / sqrt(1 + m^2)) inside the flank.
+    The first formula and the measuring height of the finger with the inner corner on top give R; the second gives the
+    displacement.
     """
     slopes = sorted(abs(m) for m in (look.outcome.left.slope, look.outcome.right.slope))
     radius_px = below_px / (1.0 - slopes[0] / hypot(1.0, slopes[0]))
@@ -95,9 +96,9 @@ def corner_px(look: Look, below_px: float) -> float:
 
 
 def tilt_deg(sample: Sample) -> float | None:
-    """Angle at which the camera looks from the side, from the ratio of the fingers' widths.
+    """Angle at which the camera looks from the side, from the ratio of the fingers' widths (degrees).
 
-    None where it is unknown.
+    None is returned if the widths are not known.
     """
     ratios, spreads, apart = [], [], []
     for look in sample.looks:
@@ -118,7 +119,7 @@ def tilt_deg(sample: Sample) -> float | None:
 
 
 class _Breadth(NamedTuple):
-    """Width of a finger (pixels), its standard uncertainty, and the position of its middle across the fingers."""
+    """Width of a finger (pixels), its standard uncertainty, and the position of its centre across the fingers."""
 
     px: float
     u_px: float
@@ -126,10 +127,11 @@ class _Breadth(NamedTuple):
 
 
 def _breadth(look: Look, side: int) -> _Breadth | None:
-    """Width of a finger whose two flanks are visible.
+    """Width of a finger, if both of its flanks are visible.
 
-    Errors common to the rows of one flank (a pattern on the background, the fit's phase error) are the same in every
-    frame. The scatter of the rows of one frame is therefore taken as if few of them were independent.
+    Errors common to neighbouring rows of a flank (a pattern on the background, the fit's phase error) are the same in
+    every frame. Only few of a frame's rows are therefore treated as independent when the uncertainty is derived from
+    their scatter.
     """
     edges = look.edges
     lines, variance = [], 0.0

@@ -1,4 +1,4 @@
-"""Vibration: a camera or stand that shakes, found by registration of the background against the first frame."""
+"""Vibration: a shaking camera or stand, detected by registration of the background against the first frame."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ SIGMAS = 3.0
 
 
 def find(sample: Sample) -> Finding | None:
-    """Estimate the vibration from the background, or where that has no texture from both fingers together."""
+    """Estimate the vibration from the background or, if it has no texture, from the common motion of the fingers."""
     if not sample.looks:
         return None
     ground = sample.ground
@@ -41,7 +41,7 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _common_jitter(sample: Sample) -> tuple[float, float] | None:
-    """Jitter common to both fingers, from second differences of their midline, and the measurement's own noise."""
+    """Jitter common to both fingers, from second differences of their midline, and the noise of the midline."""
     track = sample.track
     if len(track) < FEWEST:
         return None

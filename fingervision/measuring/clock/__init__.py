@@ -1,1 +1,1 @@
-"""One clock for the recording and the stage's log: the offset between them, found from the motion that both record."""
+"""Offset between the clocks of a recording and of the stage's log, found from the motion that both record."""

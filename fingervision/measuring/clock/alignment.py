@@ -19,11 +19,12 @@ from fingervision.measuring.clock.rivals import QUICK_PLAYS, fitted, only, unref
 from fingervision.measuring.clock.stated_offset import stated
 
 OUTLIER_SIGMAS = 6.0
-"""Beyond so many (robust) standard deviations a frame's gap is taken for wrong and left out of the fit."""
+"""Robust standard deviations beyond which a frame's gap counts as wrong and is left out of the fit."""
 CREEP_GAIN = 14.0
-"""Chi-square of two more parameters that chance reaches once in a thousand recordings."""
+"""Chi-square gain of the two additional parameters of creep that occurs by chance once in a thousand recordings."""
 REFINEMENTS = 3
-"""Times that noise and fit are estimated in turn; the third changes an uncertainty by less than a tenth."""
+"""Rounds in which noise and fit are estimated alternately; the third round changes an uncertainty by less than a
+tenth."""
 
 
 def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> ClockOffset | NoClockOffset:
@@ -32,9 +33,9 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     Parameters
     ----------
     time_s, gap_mm : ndarray of float, shape (n,)
-        Frames with a gap, on the recording's clock, in order.
+        Times and gaps of the frames that have a gap, on the recording's clock, in order.
     drive : DriveHistory
-        Log on its own clock.
+        The log, on its own clock.
 
     Returns
     -------
@@ -77,16 +78,16 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
-    """Allow the gap to creep, where that explains it better than chance would."""
+    """Include creep of the gap in the model, if it improves the fit by more than chance would."""
     creeping = replace(motion, creeps=True)
     slow = fit(creeping, found.at, free_play=found.at.play_mm > 0.0)
     return (creeping, slow) if (found.squares - slow.squares) / slow.variance_mm2 > CREEP_GAIN else (motion, found)
 
 
 def _information(motion: Motion, found: Fit) -> float:
-    """Log likelihood ratio against a constant gap.
+    """Logarithm of the likelihood ratio of the fitted motion to a constant gap.
 
-    It grows with the number of frames that are explained equally well.
+    For the same quality of fit it increases with the number of frames.
     """
     around = motion.gap_mm - motion.gap_mm.mean()
     return float(motion.time_s.size * np.log(max(float(around @ around), 1e-30) / max(found.squares, 1e-30)))

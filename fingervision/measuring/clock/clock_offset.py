@@ -1,4 +1,4 @@
-"""The relation of the clocks of a recording and a log, or the reason why none was found."""
+"""Relation between the clocks of a recording and of a log, or the reason why it could not be determined."""
 
 from dataclasses import dataclass
 
@@ -9,24 +9,24 @@ from fingervision.domain.effect import Array
 
 @dataclass(frozen=True, slots=True)
 class ClockOffset:
-    """One clock for both records: recording's time = log's time + offset_s + rate (log's time - reference_s).
+    """Relation of two clocks: recording's time = log's time + offset_s + rate (log's time - reference_s).
 
     Parameters
     ----------
     offset_s, u_offset_s : float
-        At the log's first row, with its standard uncertainty.
+        Offset at the log's first row, with its standard uncertainty.
     rate, u_rate : float
-        How much faster the recording's clock runs than the log's, relative.
+        Relative excess of the recording's clock rate over the log's, with its standard uncertainty.
     reference_s : float
         The log's first time.
     u_time_s : float
-        Standard uncertainty of the common clock over the frames that have an input, as RMS.
+        Standard uncertainty of the relation of the two clocks, as RMS over the frames that have an input.
     play_mm, u_play_mm : float
-        Play that was fitted alongside.
+        Play, fitted together with the offset, with its standard uncertainty.
     explained_share : float
-        Of the gap's variance by the log.
+        Share of the gap's variance that the log explains.
     notes : tuple of str
-        What a reader must know, a sentence each.
+        Remarks that a reader must know, one sentence each.
     """
 
     offset_s: float
@@ -41,24 +41,24 @@ class ClockOffset:
     notes: tuple[str, ...] = ()
 
     def log_time_s(self, time_s: float) -> float:
-        """Give the log's time at an instant of the recording."""
+        """Convert a time of the recording to the log's clock."""
         return self.reference_s + (time_s - self.reference_s - self.offset_s) / (1.0 + self.rate)
 
     def recording_time_s(self, log_time_s: Array) -> Array:
-        """Give the recording's times at times of the log; shape (n,)."""
+        """Convert times of the log to the recording's clock; shape (n,)."""
         return np.asarray(log_time_s + self.offset_s + self.rate * (log_time_s - self.reference_s))
 
 
 @dataclass(frozen=True, slots=True)
 class NoClockOffset:
-    """Why no offset can be told.
+    """Reason why the clock offset cannot be determined.
 
     Parameters
     ----------
     words : str
-        What was found, in a sentence that says what to do.
+        Sentence that says what was found and what to do.
     candidates_s : tuple of float
-        Offsets among which the motion does not decide; empty where there is another reason.
+        Offsets between which the motion does not decide; empty if there is another reason.
     """
 
     words: str

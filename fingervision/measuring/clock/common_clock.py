@@ -1,4 +1,4 @@
-"""Assign the drive to a finished table of gaps on one clock, once the offset between their clocks is found."""
+"""Add the drive's state to a finished table of gaps, once the offset between their clocks is known."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +17,7 @@ NOTHING_STATED: Mapping[str, Any] = MappingProxyType({"drive_offset": None, "u_d
 
 
 def clock_of(series: GapSeries, drive: DriveHistory) -> ClockOffset | NoClockOffset:
-    """Find the offset of the drive's clock from all frames with a gap and a time."""
+    """Find the offset of the drive's clock, from all frames with a gap and a time."""
     times = series.times_s()
     if times is None:
         return NoClockOffset("the recording has no times: give --rate-hz, or a times.csv beside the images.")
@@ -25,12 +25,12 @@ def clock_of(series: GapSeries, drive: DriveHistory) -> ClockOffset | NoClockOff
 
 
 def join_drive(table: Path, drive: DriveHistory, clock: ClockOffset) -> bool:
-    """Write the drive's state at each frame into a table of gaps; return whether any frame got one.
+    """Write the drive's state at each frame into a table of gaps; return whether any frame received one.
 
     Raises
     ------
     OutputError
-        The table cannot be written again; the old one is still there.
+        If the table cannot be rewritten; the old one is then still there.
     """
     joined: list[bool] = []
 
@@ -44,7 +44,7 @@ def join_drive(table: Path, drive: DriveHistory, clock: ClockOffset) -> bool:
 
 
 def in_words(clock: ClockOffset | NoClockOffset | None, given_s: float | None) -> dict[str, Any]:
-    """Entry of the offset for the summary's settings: found, given, or neither."""
+    """Describe the offset (found, given, or neither) for the settings in the summary."""
     if isinstance(clock, ClockOffset):
         return {
             "drive_offset": "found",
@@ -70,7 +70,7 @@ def in_words(clock: ClockOffset | NoClockOffset | None, given_s: float | None) -
 
 
 def sentence(clock: ClockOffset) -> str:
-    """Sentence with the offset and its expanded uncertainty."""
+    """Sentence that states the offset and its expanded uncertainty."""
     return (
         f"Clock offset: {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion; it "
         "was added to the drive's times. A lag that is the same at all times is part of it."
@@ -78,7 +78,7 @@ def sentence(clock: ClockOffset) -> str:
 
 
 def refusal(found: NoClockOffset, where: str) -> DataError:
-    """Sentence why the rows have no input; `where` names the table of gaps (`in measured/run/gaps.csv`)."""
+    """Error that says why the rows have no input; `where` names the table of gaps (`in measured/run/gaps.csv`)."""
     return DataError(
         f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are "
         f"{where}, without an input; --drive-offset-s S states the offset (0 where both share a clock)."

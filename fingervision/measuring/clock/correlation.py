@@ -1,4 +1,4 @@
-"""Candidate offsets between a recording and a stage's log: correlation at every offset at which they overlap."""
+"""Candidate clock offsets, from the correlation of gap and input at every offset at which the records overlap."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,18 +10,21 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 
 MOST_POINTS = 16_384
-"""Points of the common grid: at 30 frames a second nine minutes; longer recordings get a coarser grid."""
+"""Largest number of points of the common time grid: nine minutes at 30 frames a second; longer recordings get a coarser
+grid."""
 LARGEST_RATE = 1.5e-3
-"""Relative difference of the clocks that is looked for: a clock is seldom off by 0.1 %, crystals by a tenth of that."""
+"""Largest relative difference of the clocks that is searched: clocks seldom differ by 0.1 %, crystals by a tenth of
+that."""
 LEAST_SHARE = 0.5
-"""Share of the motion of either record that must lie in the overlap: less than half is no common motion."""
+"""Least share of the motion of either record that must lie in the overlap."""
 LEAST_OVERLAP = 0.5
-"""Share of the shorter record's time that must lie in the overlap. A play almost as wide as the stroke leaves a motion
-so unlike the log that a short stretch at the records' ends fits better than the truth."""
+"""Least share of the shorter record's duration that must lie in the overlap. With a play almost as wide as the stroke,
+the gap's motion is so unlike the log that a short stretch at the records' ends may fit better than the true overlap."""
 MOST_CANDIDATES = 12
-"""Peaks of the correlation that are fitted: of a periodic motion the neighbours of the highest stand among them."""
+"""Largest number of correlation peaks that are fitted; for a periodic motion this includes the neighbours of the
+highest peak."""
 NEAR_BEST = 0.5
-"""Correlation squared, of the best's, below which a peak is not worth a fit."""
+"""Squared correlation, relative to that of the best peak, below which a peak is not fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +34,11 @@ class Candidate:
     Parameters
     ----------
     offset_s : float
-        Recording's time minus log's time, in the middle of the recording.
+        Recording's time minus log's time, at the middle of the recording.
     rate : float
-        Growth of that offset over the recording's time.
+        Growth of that offset per time of the recording.
     correlation : float
-        Pearson's, over the overlap; negative where the gap closes as the input grows.
+        Pearson's correlation over the overlap; negative if the gap closes as the input increases.
     """
 
     offset_s: float
@@ -44,19 +47,19 @@ class Candidate:
 
 
 def candidates(time_s: Array, gap_mm: Array, drive: DriveHistory) -> list[Candidate]:
-    """Correlate gap and input at every offset and rate at which they share at least half of their motion.
+    """Correlate gap and input at every offset and rate for which the records share at least half of their motion.
 
     Parameters
     ----------
     time_s, gap_mm : ndarray of float, shape (n,)
-        Recording.
+        Times and gaps of the recording.
     drive : DriveHistory
-        Log on its own clock.
+        The log, on its own clock.
 
     Returns
     -------
     list of Candidate
-        Peaks, highest first; empty where nothing moves in common.
+        Peaks of the correlation, highest first; empty if there is no common motion.
     """
     span_s = float(time_s[-1] - time_s[0])
     log_span_s = float(drive.time_s[-1] - drive.time_s[0])
@@ -93,14 +96,14 @@ def candidates(time_s: Array, gap_mm: Array, drive: DriveHistory) -> list[Candid
 
 
 def _near(grid_s: Array, time_s: Array, reach_s: float) -> Array:
-    """1 where a sample lies within reach of a grid point, else 0."""
+    """1 for grid points with a sample within `reach_s`, else 0."""
     after = np.clip(np.searchsorted(time_s, grid_s), 1, time_s.size - 1)
     distance_s = np.minimum(np.abs(grid_s - time_s[after - 1]), np.abs(time_s[after] - grid_s))
     return np.asarray(distance_s <= reach_s, dtype=np.float64)
 
 
 def _known(grid_s: Array, log_s: Array, drive: DriveHistory) -> Array:
-    """1 where the log has an input: not between two runs."""
+    """1 for grid points at which the log has an input (not between two runs), else 0."""
     known = np.ones_like(grid_s)
     if drive.run is not None:
         for k, (before, after) in enumerate(pairwise(drive.run)):
@@ -110,7 +113,7 @@ def _known(grid_s: Array, log_s: Array, drive: DriveHistory) -> Array:
 
 
 def _overlap_correlation(gap: Array, seen: Array, inputs: Array, known: Array) -> Array:
-    """Pearson's correlation at every lag of the log against the recording; 0 where they share too little motion."""
+    """Pearson's correlation at every lag of the log against the recording; 0 where they have little common motion."""
     size = gap.size + inputs.size - 1
     length = next_fast_len(size, real=True)
     weight_gap, weight_input = float(seen.sum()), float(known.sum())
@@ -152,7 +155,7 @@ def _peaks(correlation: Array) -> list[int]:
 
 
 def _parabola(correlation: Array, peak: int, lags: Array) -> float:
-    """Position of the vertex of the parabola through a peak and its neighbours."""
+    """Position of the vertex of the parabola through a correlation peak and its two neighbours."""
     if peak == 0 or peak == correlation.size - 1:
         return float(lags[peak])
     left, top, right = np.abs(correlation[peak - 1 : peak + 2])
@@ -161,7 +164,7 @@ def _parabola(correlation: Array, peak: int, lags: Array) -> float:
 
 
 def _apart(found: list[Candidate], least_s: float) -> list[Candidate]:
-    """Keep the best of candidates with the same offset at neighbouring rates; `found` is sorted, best first."""
+    """Keep only the best of candidates with the same offset at neighbouring rates; `found` is sorted, best first."""
     kept: list[Candidate] = []
     for one in found:
         if len(kept) == MOST_CANDIDATES or one.correlation**2 < NEAR_BEST * kept[0].correlation ** 2 if kept else False:

@@ -1,4 +1,4 @@
-"""Joint fit of offset and rate of two clocks, play, initial state and scale, by variable projection."""
+"""Joint fit of clock offset, clock rate, play, initial state of the play, and scale, by variable projection."""
 
 from dataclasses import dataclass, replace
 
@@ -8,27 +8,28 @@ from fingervision.domain.effect import Array
 from fingervision.measuring.clock.motion_model import CREEP_S, Alignment, Motion
 
 OFFSET_PRIOR_S, PLAY_PRIOR_MM = 1e3, 1e3
-"""Standard deviations, so large that they say nothing: where nothing moves the normal matrix stays regular."""
+"""Standard deviations of uninformative priors, which keep the normal matrix regular if nothing moves."""
 RATE_PRIOR = 6e-4
-"""Standard deviation of the clocks' relative rate before anything is seen: that of anything between -0.1 and 0.1 %."""
+"""Prior standard deviation of the clocks' relative rate: that of a uniform distribution from -0.1 to 0.1 %."""
 START_PRIOR = 0.58
-"""Standard deviation of the play's start state: anything between -1 and 1 is as likely."""
+"""Prior standard deviation of the play's initial state: that of a uniform distribution from -1 to 1."""
 BEND_PRIOR = 0.1
-"""Standard deviation of the change of slope of gap against input at a knot, over the slope: large deflection of a
-flexure gripper bends it by a few per cent in all; more would let any smooth one-way motion be shifted at will.
-Where the data know better, as where the fingers meet, they outweigh it."""
+"""Prior standard deviation of the relative change of slope (gap against input) at a knot. Large deflection changes the
+slope of a flexure gripper by a few per cent in all; a weaker prior would allow any smooth one-way motion to be shifted
+in time. Strong evidence, such as the kink where the fingers meet, outweighs the prior."""
 CREEP_PRIOR = 0.02
-"""Standard deviation of a creep's share of the motion at each time constant: metals creep by 0.1 % of a strain, printed
-polymers by one to five per cent in a decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
+"""Prior standard deviation of the creep's share of the motion at each time constant: metals creep by 0.1 % of a strain,
+printed polymers by one to five per cent per decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
 STEPS = 12
-"""Gauss-Newton steps at most; from the correlation's peak three to five suffice."""
+"""Most Gauss-Newton steps; from a peak of the correlation three to five suffice."""
 CLUSTERS = 24
-"""Stretches of the recording whose pulls are taken for independent: their scatter is known to a fifth, and a stretch of
-an ordinary recording holds a move or two."""
+"""Stretches of the recording whose contributions to the parameters are taken as independent: 24 of them determine the
+scatter to a fifth, and each still contains a move or two of an ordinary recording."""
 SETTLED = 1e-3
-"""Step, in standard uncertainties, below which a search has settled."""
+"""Step, in standard uncertainties, below which the iteration has converged."""
 OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
-"""Steps of the derivatives: small beside a frame, a clock's rate, the state's range and an encoder's step (mm)."""
+"""Step sizes of the numerical derivatives: small compared with a frame's duration, a clock's rate, the range of the
+play's state and an encoder's step (mm)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,17 +39,17 @@ class Fit:
     Parameters
     ----------
     at : Alignment
-        Estimates.
+        Estimated offset, rate, play and initial state.
     squares : float
-        Whitened residual's sum of squares with the priors' part, in mm^2.
+        Sum of squares of the whitened residuals, including the priors' terms, in mm^2.
     degrees : int
         Degrees of freedom.
     normal : ndarray of float, shape (3, 3) or (4, 4)
-        Normal matrix of offset, rate, start (and play) over the residual's variance.
+        Normal matrix of offset, rate, initial state (and play), divided by the residual variance.
     residual_mm : ndarray of float, shape (n,)
-        Gap minus prediction, not whitened.
+        Gap minus its prediction, not whitened.
     scale : float
-        Change of gap over the log's half range, in mm; negative where the gap closes as the input grows.
+        Change of the gap over half the log's range, in mm; negative if the gap closes as the input increases.
     """
 
     at: Alignment
@@ -60,7 +61,7 @@ class Fit:
 
     @property
     def variance_mm2(self) -> float:
-        """Variance of the whitened residual."""
+        """Variance of the whitened residuals."""
         return self.squares / self.degrees
 
 
@@ -70,11 +71,11 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
     Parameters
     ----------
     motion : Motion
-        Frames and log.
+        The frames and the log.
     start : Alignment
-        Where to begin.
+        Initial estimate.
     free_play : bool
-        Whether the play is fitted too; else it stays.
+        Whether the play is fitted too; otherwise it keeps its initial value.
 
     Notes
     -----
@@ -111,16 +112,17 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
 
 
 def squares_at(motion: Motion, at: Alignment) -> float:
-    """Sum of squares that scale, bend and creep leave at an alignment, in mm^2."""
+    """Sum of squares at given offset, rate and play, after scale, bends and creep were fitted, in mm^2."""
     return _solve(motion, at).squares
 
 
 def inflation(motion: Motion, at: Alignment) -> Array:
     """Ratio of the variance of offset, rate and play to its value for independent residuals.
 
-    An error of the input persists while the stage stands, or until it reverses, and the model of the motion is never
-    exact. The residuals' contributions to the parameters are therefore summed over stretches of the recording, and the
-    variance follows from the scatter of these sums (White 1980, doi:10.2307/1912934, for clusters).
+    An error of the input persists while the stage is at rest, or until it reverses, and the model of the motion is
+    never exact; the residuals are therefore correlated. The residuals' contributions to the parameters are summed over
+    stretches of the recording, and the variance follows from the scatter of these sums (White 1980,
+    doi:10.2307/1912934, applied to clusters).
     """
     solved = _solve(motion, at)
     rows = solved.white.size - solved.weights.size + 2
@@ -138,10 +140,10 @@ def inflation(motion: Motion, at: Alignment) -> Array:
 
 
 def shift_by_creep(motion: Motion, found: Fit) -> Array:
-    """Change of offset, rate and play if the gap may creep after the input; shape (3,), zero where it may already.
+    """Change of offset, rate and play if creep is added to the model; shape (3,), zero if it is already included.
 
-    In a slow motion a creep too small to be told is a delay of its share times its time constant, and takes the place
-    of play as well.
+    In slow motion, creep too small to be detected acts as a delay equal to (creep fraction x time constant), and can
+    also be mistaken for play.
     """
     at = found.at if motion.creeps else fit(replace(motion, creeps=True), found.at, free_play=found.at.play_mm > 0.0).at
     return _change(at, found.at)
@@ -152,11 +154,12 @@ def _change(to: Alignment, since: Alignment) -> Array:
 
 
 def shift_by_turns(motion: Motion, found: Fit) -> Array:
-    """Change of offset, rate and play (s, 1, mm) if all reversals of the log went further by their uncertainty.
+    """Change of offset, rate and play (s, 1, mm), shape (3,), if the log's reversals lay farther out.
 
-    Shape (3,).
+    Every reversal is moved outwards by its uncertainty.
 
-    At constant speed of the stage, only the duration of the gap's stop at a reversal shows the play.
+    If the stage moves at constant speed, only the duration for which the gap stops at a reversal contains information
+    on the play.
     """
     path = motion.path
     drive = replace(path.drive, input_mm=path.turned_mm)
@@ -169,7 +172,7 @@ def _prior(size: int) -> Array:
 
 
 def _information(motion: Motion, at: Alignment, solved: "_Solved", *, free_play: bool) -> tuple[Array, Array]:
-    """Normal matrix divided by the residual's variance, priors included, and the Jacobian."""
+    """Normal matrix (divided by the residual variance, priors included), and the Jacobian."""
     jacobian = _jacobian(motion, at, solved, free_play=free_play)
     variance = solved.squares / max(solved.degrees, 1)
     return jacobian.T @ jacobian / variance + _prior(jacobian.shape[1]), jacobian
@@ -211,7 +214,7 @@ def _solve(motion: Motion, at: Alignment) -> _Solved:
 
 
 def _jacobian(motion: Motion, at: Alignment, solved: _Solved, *, free_play: bool) -> Array:
-    """Derivatives of the whitened prediction, after projection on scale and bends; shape (m + knots, 3 or 4)."""
+    """Derivatives of the whitened prediction, projected off scale and bends; shape (m + knots, 3 or 4)."""
     columns = []
     for name, step in (
         ("offset_s", OFFSET_STEP_S),

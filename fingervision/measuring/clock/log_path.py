@@ -14,40 +14,42 @@ from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
 FINER = 6
-"""Points that a row becomes: the sag of a chord falls with its square, to a thirtieth."""
+"""Points of the path per row of the log: the sagitta of a chord falls with the square, to a thirtieth."""
 FEWEST = 5
-"""Rows that draw a curve, and of which fourth differences are taken."""
+"""Least number of rows for a curve, and for fourth differences."""
 CORNER = 0.07
-"""Standard deviation of an interpolated input over the fourth differences at both ends of its interval. A corner of the
-motion anywhere between two rows leaves 0.105 of the change of step as RMS (integral of x^2 (1 - x)^2, times 1/3), which
-is 0.07 of the fourth differences that it makes; noise of the rows comes out within a tenth of itself."""
+"""Ratio of the standard deviation of an interpolated input to the fourth differences at the two ends of its interval. A
+corner of the motion anywhere between two rows causes an RMS error of 0.105 times the change of step (integral of x^2 (1
+- x)^2, times 1/3), which is 0.07 times the fourth differences that it causes; for noise of the rows the estimate is
+within a tenth of the noise."""
 
 SHARP = 5.0
-"""Change of the step in an interval over that beside it, and over a row's uncertainty, from which on it is a corner."""
+"""Change of the step in an interval, relative to that beside it and to a row's uncertainty, from which on it counts as
+a corner."""
 CORNER_ROWS = 3
-"""Rows on either side of a corner that its smoothing spoils."""
+"""Rows on either side of a corner that smoothing distorts."""
 LONG_ROWS = 4 * CORNER_ROWS
-"""Rows of a stretch whose ends may be left out of the look at its rounding errors."""
+"""Number of rows from which on the ends of a stretch are left out when its rounding errors are examined."""
 AVERAGED = 0.5
-"""Leverage below which a row is the mean of several, and shares its error with its neighbours."""
+"""Leverage below which a smoothed row is the mean of several rows, and has a common error with its neighbours."""
 TURN_SIGMAS, LEAST_TURN = 6.0, 0.01
-"""Standard deviations of a row, and share of the log's range, by which a motion must come back for it to be a turn."""
+"""Least return motion of a reversal, in standard deviations of a row, and as a share of the log's range."""
 STANDS = 0.1
-"""Step over its neighbour's below which the stage stands: noise of a log is seldom more."""
+"""Step, relative to its neighbour's, below which the stage is at rest; the noise of a log is seldom larger."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """Stretches of the log, each of which may have one common error.
+    """Stretches of the log, each with one error that is common to its rows.
 
     Parameters
     ----------
     begin_s : ndarray of float, shape (g - 1,)
-        Times at which the second stretch begins, and the further ones.
+        Start times of the second and the later stretches.
     u_mm : ndarray of float, shape (g,)
-        Standard uncertainty of each one's error.
+        Standard uncertainty of each stretch's common error.
     halts : ndarray of bool, shape (g,)
-        Whether it is a halt or a turn, whose place a play remembers.
+        Whether the stretch is a halt or a reversal, whose position determines the state of the play.
     """
 
     begin_s: Array
@@ -57,22 +59,22 @@ class SharedErrors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogPath:
-    """Path of the input through the log's rows.
+    """Path of the input, interpolated between the rows of the log.
 
     Parameters
     ----------
     drive : DriveHistory
-        Points so close that straight lines between them will do.
+        Points of the path, so dense that straight lines between them suffice.
     u_mm : ndarray of float, shape (n,)
-        Standard uncertainty at each of them of what lies between rows.
+        Standard uncertainty of the input at each point: random error, and interpolation between rows.
     shared : SharedErrors
-        What neighbours are off by alike.
+        Errors that are common to neighbouring rows.
     turned_mm : ndarray of float, shape (n,)
-        Input with all turns pushed out by their uncertainty.
+        Input with all reversals moved outwards by their uncertainty.
     rows : DriveHistory
-        The log as it is.
+        The log itself.
     step_mm : float
-        Its encoder's step; 0 where none is seen.
+        Step of the encoder; 0 if none is visible in the log.
     """
 
     drive: DriveHistory
@@ -84,12 +86,12 @@ class LogPath:
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
-        """Smooth the rows as far as their error is random, and draw Akima's curve through them.
+        """Smooth the rows of the log as far as their error is random, and interpolate them by Akima's curve.
 
-        Akima's curve preserves corners.
+        Akima's interpolation is chosen because it preserves corners.
 
-        Without smoothing, the play would follow every peak of a noisy record, and would seem to lead by two standard
-        deviations of the noise.
+        Without smoothing, the model of play would respond to every noise peak, as if the input had gone further by
+        about two standard deviations of the noise.
         """
         names = log.run or ("",) * log.time_s.size
         lengths = [len(list(group)) for _, group in groupby(names)]
@@ -120,16 +122,16 @@ def _shared_errors(
 ) -> tuple[SharedErrors, Array]:
     """Split an encoder's rounding error into a part common to neighbouring rows and a random part.
 
-    Rounding errors do not average out like noise. A stage at rest lies anywhere within a step. A stage that moves by
-    whole steps from row to row is rounded equally in each row. Of a slower stage only the crossings of lines are
-    informative. The path may be shifted as long as every row stays within half a step of it; where the rounding errors
-    cover the whole step, no such shift is possible. At the beginning and the end of a stroke, motion within one step is
-    invisible.
+    Rounding errors do not average out like noise. A stage at rest may be anywhere within a step of the encoder. If a
+    stage moves by whole steps from row to row, the rounding error is the same in each row. For a slower stage, only the
+    crossings of the encoder's lines are informative. The path may be shifted as long as every row stays within half a
+    step of it; if the rounding errors cover the whole step, no such shift is possible. At the beginning and the end of
+    a stroke, motion within one step is invisible.
 
     Returns
     -------
     shared, u_mm : SharedErrors, ndarray of float, shape (n,)
-        The second is what scatters, for the rows.
+        The common errors, and the random standard uncertainty of each row.
     """
     rounding_mm = step_mm / float(np.sqrt(12.0))
     direction = np.where(np.abs(np.diff(smooth_mm)) <= still_mm, 0, np.sign(np.diff(smooth_mm))).astype(int)
@@ -203,7 +205,7 @@ def _piece(time_s: Array, input_mm: Array, u_mm: Array) -> tuple[Array, Array, A
 
 
 def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """Intervals in which two straight lines meet, and the point where they do: a reversal lies between two rows."""
+    """Intervals in which two straight lines meet, and the point where they do, such as a reversal between two rows."""
     k = np.arange(2, time_s.size - 3)
     bend, beside = second[k] + second[k + 1], second[k - 1] + second[k + 2]
     speed = np.diff(input_mm) / np.diff(time_s)
@@ -219,9 +221,10 @@ def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tupl
 
 
 def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
-    """Step from row to row below which the stage is at rest; 0 where it never moves (mm).
+    """Step from row to row below which the stage is at rest; 0 if it never moves (mm).
 
-    In a record smoothed over k rows, the scatter from one row to the next is 1/k of its own scatter.
+    In a record smoothed over k rows, differences between neighbouring rows scatter by 1/k of the scatter of a smoothed
+    row.
     """
     steps = np.abs(np.diff(input_mm))
     scatter = sigma_mm * np.minimum(leverage[:-1], leverage[1:]) ** 1.5
@@ -230,9 +233,10 @@ def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
 
 
 def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
-    """Set the stage to one position while it is at rest, and keep the path to it from overshooting it.
+    """Replace positions at rest by one position, and keep the path next to a rest from overshooting it.
 
-    Smoothing makes corners overshoot by some standard deviations of a row, and a play remembers each overshoot.
+    Smoothing makes corners overshoot by some standard deviations of a row, and the modelled play is changed by each
+    overshoot.
     """
     still = _standing_step(input_mm, sigma_mm, leverage)
     if still == 0.0:
@@ -255,10 +259,10 @@ def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
 
 
 def _curve(time_s: Array, input_mm: Array, fine_s: Array, interval: NDArray[np.intp]) -> Array:
-    """Draw Akima's curve; next to an interval in which the stage is at rest it stays between its rows.
+    """Akima's curve through the rows; next to an interval at rest, the curve stays within the range of the rows.
 
-    A stage that arrives and stops has not been beyond its position of rest, and the play depends on the extreme
-    position.
+    A stage that arrives and stops has not been beyond its position of rest; an overshoot of the curve would falsify the
+    play, which depends on the extreme position.
     """
     curve = np.asarray(Akima1DInterpolator(time_s, input_mm)(fine_s), dtype=np.float64)
     steps = np.abs(np.diff(input_mm))

@@ -7,7 +7,7 @@ from fingervision.domain.effect import Array
 
 
 def turns(input_mm: Array, least_mm: float) -> NDArray[np.intp]:
-    """Find the extremes from which a motion returns by `least_mm` or more; shape (k,), in order."""
+    """Indices of the extremes from which a motion returns by `least_mm` or more; shape (k,), in order."""
     values = input_mm.tolist()
     found: list[int] = []
     high = low = 0
@@ -31,17 +31,18 @@ def turns(input_mm: Array, least_mm: float) -> NDArray[np.intp]:
 
 
 def turned(input_mm: Array, u_mm: Array, least_mm: float) -> Array:
-    """Move every reversal outwards by the RMS of their uncertainty, and points within `least_mm` of it by less.
+    """Move every reversal outwards by the RMS uncertainty of the reversals; points near it are moved by less.
 
-    Smoothing, interpolation between rows and an encoder's rounding flatten all reversals in the same way, and the play
-    depends on how far they went. Their errors therefore do not average out, however many reversals there are.
+    Smoothing, interpolation between rows and an encoder's rounding flatten all reversals in the same way, and the
+    fitted play depends on the extreme positions. The errors of the reversals therefore do not average out, however many
+    there are. Points within `least_mm` of a reversal are moved by less than the reversal itself.
 
     Parameters
     ----------
     input_mm, u_mm : ndarray of float, shape (n,)
-        Motion and its standard uncertainty.
+        The motion and its standard uncertainty.
     least_mm : float
-        By which a motion must come back for it to be a turn.
+        Least return motion of a reversal.
 
     Returns
     -------

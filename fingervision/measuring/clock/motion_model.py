@@ -1,4 +1,4 @@
-"""Model of the gap from a stage's log: play, another clock, a line with bends, creep and noise."""
+"""Model of the gap from a stage's log: play, clock offset and rate, a line with bends, creep and noise."""
 
 from dataclasses import dataclass, field
 
@@ -12,29 +12,29 @@ from fingervision.effects.play_operator import play
 from fingervision.measuring.clock.log_path import LogPath
 
 CREEP_S = (0.5, 5.0)
-"""Time constants of a creep, a decade apart: what is faster than the first looks like a delay, and is part of it; what
-is slower than the second hardly follows the motion."""
+"""Time constants of creep, a decade apart: faster creep looks like a delay and is included in it; slower creep hardly
+follows the motion."""
 CREEP_STEP = 0.1
-"""Step of the grid on which creep is computed, over the shortest time constant: off by 1e-3 of the lag."""
+"""Step of the time grid for creep, as a share of the shortest time constant: the error is 1e-3 of the lag."""
 MOST_KNOTS, FRAMES_A_KNOT = 11, 20
-"""Knots of gap against input at most, and frames that each must rest on: the kink of a contact spoils a twelfth of the
-range, which the gate for wrong frames then leaves out."""
+"""Most knots of gap against input, and least number of frames per knot: the kink of a contact distorts a twelfth of the
+range, where frames are then left out as outliers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """Where one record lies on the other, with the play between them.
+    """Offset and rate between the clocks of two records, and the play between the two motions.
 
     Parameters
     ----------
     offset_s : float
         Recording's time minus log's time at `Motion.middle_s`.
     rate : float
-        Growth of that offset over the recording's time.
+        Growth of that offset per time of the recording.
     play_mm : float
         Full width of the play.
     start : float
-        State of the play at the log's first sample, in half widths.
+        State of the play at the log's first sample, in units of half the play's width.
     """
 
     offset_s: float
@@ -50,15 +50,15 @@ class Noise:
     Parameters
     ----------
     terms : ndarray of float, shape (p,)
-        Of an autoregression; empty for white noise.
+        Coefficients of an autoregression; empty for white noise.
     weights : ndarray of float, shape (n - p,)
-        Of the whitened rows: below 1 where the input is known badly; empty where all weigh the same.
+        Weights of the whitened rows: below 1 for rows with an uncertain input; empty if all are equal.
     starts : ndarray of int, shape (g,)
-        First whitened row of each stretch in which the input is off by one and the same error; empty where none is.
+        First whitened row of each stretch in which the input has one common error; empty if there is none.
     unit : ndarray of float, shape (n - p,)
-        That error's course in the whitened rows, of length 1 within each stretch.
+        Effect of a common error on the whitened rows, normalised to length 1 within each stretch.
     shrink : ndarray of float, shape (g,)
-        Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
+        Share of a stretch's projection on `unit` that is removed, 1 - 1 / sqrt(1 + variance ratio).
     """
 
     terms: Array
@@ -73,20 +73,20 @@ WHITE = Noise(np.empty(0), np.empty(0))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Frames that lie within the log, and the log.
+    """The frames that lie within the log's time, and the log.
 
     Parameters
     ----------
     time_s, gap_mm : ndarray of float, shape (n,)
-        Frames.
+        Times and gaps of the frames.
     path : LogPath
-        Log.
+        Path of the input.
     middle_s : float
         Recording's time at which the offset is stated.
     noise : Noise
-        From frame to frame.
+        Noise from frame to frame.
     creeps : bool
-        Whether the gap may creep after the input.
+        Whether the model includes creep of the gap.
     """
 
     time_s: Array
@@ -98,7 +98,7 @@ class Motion:
 
     @property
     def drive(self) -> DriveHistory:
-        """The log, finely interpolated."""
+        """The log, densely interpolated."""
         return self.path.drive
 
     def log_time_s(self, at: Alignment) -> Array:
@@ -106,11 +106,12 @@ class Motion:
         return np.asarray(self.time_s - at.offset_s - at.rate * (self.time_s - self.middle_s))
 
     def _behind_play(self, at: Alignment) -> tuple[Array, Array]:
-        """Input after the play at the frames, and at the log's points.
+        """Output of the play at the frames, and at the log's points.
 
-        Exact for a log that is linear between its points.
+        The result is exact for a log that is linear between its points.
 
-        Between two samples the input is monotone, so that the play operator is one clip of its state at the earlier.
+        Between two samples the input is monotonic, so that the play operator clips the state at the earlier sample
+        once.
         """
         log_s = self.log_time_s(at)
         inputs = np.interp(log_s, self.drive.time_s, self.drive.input_mm)
@@ -122,11 +123,11 @@ class Motion:
         return np.asarray(np.clip(states[before], inputs - half, inputs + half)), states
 
     def design(self, at: Alignment) -> Array:
-        """Columns of the gap: 1, z, max(0, z - z_k) and creep, with z the input after the play over the log's range.
+        """Regressors of the gap: 1, z, max(0, z - z_k) and creep, with z the play's output relative to the log's range.
 
-        Gap against input is a line that may bend at every knot: a gripper's curve, and the kink where fingers meet. The
-        column of a creep is its lag behind the input, one for each time constant. The result has shape (n, 2 + knots [+
-        2]).
+        The gap is a piecewise linear function of the input that may bend at every knot z_k; it represents a gripper's
+        curve, and the kink where the fingers meet. Creep has one column per time constant: the lag behind the input.
+        The result has shape (n, 2 + knots [+ 2]).
         """
         low, high = float(self.drive.input_mm.min()), float(self.drive.input_mm.max())
         half = 0.5 * max(high - low, 1e-12)
@@ -138,7 +139,7 @@ class Motion:
         return np.column_stack([np.ones_like(z), z, np.maximum(z[:, None] - knots, 0.0), *lags])
 
     def _lagging(self, at: Alignment, states: Array, tau_s: float) -> Array:
-        """Exponential mean of the past of `states` with a given time constant, at the frames; shape (n,)."""
+        """Exponentially weighted mean of the past of `states`, for a given time constant, at the frames; shape (n,)."""
         times_s = self.drive.time_s
         step_s = CREEP_STEP * min(CREEP_S)
         grid_s = times_s[0] + step_s * np.arange(int((times_s[-1] - times_s[0]) / step_s) + 2)
@@ -150,10 +151,10 @@ class Motion:
         return np.asarray(np.interp(self.log_time_s(at), grid_s, mean))
 
     def whitened(self, columns: Array) -> Array:
-        """Take the autoregression out along time, and the error that a stretch shares.
+        """Remove the autoregression along time, and the errors that are common within stretches, from columns.
 
-        The first frames, which have no past, are left out. The shared error's variance is taken out by the symmetric
-        root of the inverse covariance, a matrix of rank one beside the unit matrix.
+        The first frames, which have no past, are left out. A common error is whitened by the symmetric square root of
+        the inverse covariance matrix, which is the unit matrix plus a matrix of rank one.
         """
         noise = self.noise
         terms = noise.terms

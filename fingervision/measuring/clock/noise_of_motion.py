@@ -1,4 +1,4 @@
-"""Noise of the gap around a fitted motion: its autocorrelation, and its growth where the input is uncertain."""
+"""Noise of the gap about a fitted motion: its autocorrelation, and its increase where the input is uncertain."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,25 +9,26 @@ from fingervision.measuring.clock.joint_fit import Fit
 from fingervision.measuring.clock.motion_model import Motion, Noise
 
 MOST_ORDER = 4
-"""Order at most: an autoregression with white noise beside it is told well enough by four terms."""
+"""Highest order: an autoregression plus white noise is approximated well enough by four terms."""
 FRAMES_AN_ORDER = 25
-"""Frames that each term must rest on."""
+"""Least number of frames per term."""
 LARGEST_ROOT = 0.98
-"""Sum of the terms' sizes above which a residual is as good as a random walk; there they are scaled back."""
+"""Limit of the sum of the terms' absolute values: above it a residual is practically a random walk, and the terms are
+scaled down."""
 
 
 def autoregression(residual_mm: Array) -> Array:
-    """Fit an autoregression by Burg's method, with its order by Akaike's criterion with Hurvich's correction.
+    """Fit an autoregression by Burg's method; the order follows from Akaike's criterion with Hurvich's correction.
 
     Parameters
     ----------
     residual_mm : ndarray of float, shape (n,)
-        Residual along time.
+        Residuals in order of time.
 
     Returns
     -------
     ndarray of float, shape (p,)
-        y_t = sum of a_k y_(t-k) + white noise; empty for white noise.
+        Coefficients a_k of y_t = sum of a_k y_(t-k) + white noise; empty for white noise.
     """
     n = residual_mm.size
     forward = backward = residual_mm - residual_mm.mean()
@@ -53,19 +54,22 @@ def autoregression(residual_mm: Array) -> Array:
 MEDIAN_CHI_SQUARE = 0.4549
 """Median of chi-square with one degree of freedom."""
 TRIED = 60
-"""Variances that are tried, over five decades: a fifth apart, as well as a hundred frames tell it."""
+"""Number of variances tried, over five decades: neighbours differ by a fifth, the uncertainty of a variance from a
+hundred frames."""
 CORRELATED = 0.15
-"""Share of its variance that noise correlated by 0.7 from frame to frame shows in second differences: their variance is
-6 - 8 rho + 2 rho^2 times that of the noise, 1.4 of 6 at rho 0.7 and 0.8 of 6 at 0.8."""
+"""Lower bound of the ratio of the variance in second differences to 6 times the noise variance: for noise with
+correlation rho from frame to frame, second differences have 6 - 8 rho + 2 rho^2 times the noise variance, which is 1.4
+of 6 for rho = 0.7 and 0.8 of 6 for rho = 0.8."""
 CLIPPED = 9.0
-"""Squares of normalised residuals count up to here: three standard deviations, beyond which a frame may be wrong."""
+"""Limit of squared normalised residuals: three standard deviations, beyond which a frame may be wrong."""
 
 
 def noise_of(motion: Motion, found: Fit) -> Noise:
     """Estimate the noise from the residuals of a fit.
 
-    The variance of a frame is the variance of the measured gap, equal in all frames, plus the squared effect of the
-    input's uncertainty between two rows of the log. The first is estimated by maximum likelihood of the residuals.
+    The variance of a frame's residual is that of the measured gap, equal for all frames, plus the squared effect of the
+    input's uncertainty between two rows of the log. The variance of the measured gap is estimated by maximum likelihood
+    from the residuals.
     """
     log_s = motion.log_time_s(found.at)
     after = np.clip(np.searchsorted(motion.drive.time_s, log_s), 0, motion.path.u_mm.size - 1)
@@ -94,13 +98,14 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
 
 
 SEEN_SHARED = 0.5
-"""Of the residual's spread: a shared error that is smaller is lost in it, and taking means would whiten the noise."""
+"""Least common error, relative to the residual's spread: smaller ones cannot be detected, and subtracting means would
+whiten the noise."""
 
 
 def _stretch_of(motion: Motion, found: Fit, log_s: Array) -> NDArray[np.intp]:
-    """Stretch of the log whose error each frame has: while a play is crossed, that of the previous stop.
+    """Index of the stretch of the log whose error applies to each frame; shape (n,), never decreasing.
 
-    Shape (n,), never decreasing.
+    While the motion crosses the play, the gap has the error of the preceding stop.
     """
     shared, drive, at = motion.path.shared, motion.drive, found.at
     own = np.searchsorted(shared.begin_s, log_s, side="right")
@@ -119,11 +124,12 @@ def _stretch_of(motion: Motion, found: Fit, log_s: Array) -> NDArray[np.intp]:
 
 
 FEWEST_SHARED = 8
-"""Frames of a stretch whose mean may be taken out before the rest is noise: fewer would lose their scatter."""
+"""Least number of frames in a stretch whose mean is subtracted before the noise is estimated; fewer would lose their
+scatter."""
 
 
 def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Array) -> tuple[Array, float]:
-    """Residual minus the mean of each stretch that may have a common error, and the variance that this removes."""
+    """Residuals minus the mean of each stretch that may have a common error, and the variance's correction factor."""
     out = residual_mm.copy()
     means = 0
     spread_mm = 1.4826 * float(np.median(np.abs(residual_mm)))
@@ -136,9 +142,9 @@ def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Ar
 
 
 def _even_variance(squares: Array, input_mm2: Array) -> float:
-    """Maximum-likelihood variance in addition to `input_mm2`; outlying frames are clipped.
+    """Maximum-likelihood variance that must be added to `input_mm2`; outlying frames are clipped.
 
-    Frames with a well-known input determine it; a median over all frames would miss them where they are fewer.
+    Frames with a well-known input determine this variance; a median over all frames would fail if they are a minority.
     """
     high = max(float(np.median(squares)) / MEDIAN_CHI_SQUARE, 1e-18)
     tried = high * np.geomspace(1e-4, 4.0, TRIED)
@@ -148,7 +154,7 @@ def _even_variance(squares: Array, input_mm2: Array) -> float:
 
 
 def _least_variance(residual_mm: Array) -> float:
-    """Lower bound of the frames' own variance, from second differences, in which slow errors cancel."""
+    """Lower bound of the gap's own variance, from second differences, in which slow errors cancel."""
     if residual_mm.size < FEWEST_SHARED:
         return 0.0
     spread_mm = float(np.median(np.abs(np.diff(residual_mm, 2)))) / float(np.sqrt(MEDIAN_CHI_SQUARE))

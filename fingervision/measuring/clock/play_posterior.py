@@ -1,4 +1,4 @@
-"""Offset and rate of two clocks, marginalised over every play that the motion allows."""
+"""Clock offset and rate, marginalised over all values of the play that the motion allows."""
 
 from dataclasses import dataclass, replace
 
@@ -9,36 +9,39 @@ from fingervision.measuring.clock.joint_fit import Fit, fit, squares_at
 from fingervision.measuring.clock.motion_model import Alignment, Motion
 
 PLAY_PRIOR_MM = 0.1
-"""Scale of the half-Cauchy prior of the play: that of worn or geared stages; ten times as much stays possible."""
+"""Scale of the half-Cauchy prior of the play: that of worn or geared stages; ten times as much remains possible."""
 MOST_PLAY_MM = 0.5
 """Largest play, as in the catalogue of effects."""
 MOST_OF_STROKE = 0.9
-"""Largest play over the stroke: of a wider one nearly nothing moves."""
+"""Largest play relative to the stroke: with a wider play the gap hardly moves."""
 FIRST_PLAYS = (0.0, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
-"""Plays that are tried first, over the largest: a factor of two apart, each within the reach of the next."""
+"""Initial values of the play relative to the largest play: a factor of two apart, so that each fit converges to the
+nearest minimum."""
 BESIDE_S, BESIDE_STEP_S = 2.0, 0.1
-"""Offsets that are tried beside a correlation's peak: halts of a staircase are seldom longer than 2 s, and moves that
-take less than 0.1 s have a narrow peak of their own."""
+"""Range and step of the offsets tried beside a correlation peak: halts of a staircase motion seldom last longer than 2
+s, and moves that take less than 0.1 s have a narrow minimum of their own."""
 OUT_OF_REACH = 14.0
-"""Twice the logarithm of the likelihood ratio at which a play no longer counts: a weight of one in a thousand."""
+"""Twice the logarithm of the likelihood ratio above which a value of the play is neglected: a weight of one in a
+thousand."""
 NODES = 15
-"""Plays over which is integrated: a normal posterior cut at 3.7 standard deviations is integrated to 1e-4."""
+"""Number of play values in the integration: a normal posterior truncated at 3.7 standard deviations is integrated to
+1e-4."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
-    """Offset and rate with their uncertainty, marginalised over the play.
+    """Posterior of offset and rate, marginalised over the play.
 
     Parameters
     ----------
     best : Fit
-        The most likely play's.
+        Fit with the most likely play.
     offset_s, rate : float
-        Means; the offset in the middle of the frames.
+        Posterior means; the offset is that at the middle of the frames.
     covariance : ndarray of float, shape (2, 2)
-        Of both.
+        Posterior covariance of offset and rate.
     play_mm, u_play_mm : float
-        Mean and standard deviation of the play.
+        Posterior mean and standard deviation of the play.
     """
 
     best: Fit
@@ -52,8 +55,8 @@ class Posterior:
 def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIRST_PLAYS) -> Fit:
     """Fit from several starting values of the play and keep the best; `plays` are fractions of the largest play.
 
-    Play and offset are correlated along narrow valleys, in which a search at a fixed play stops beside the minimum. The
-    best two fits, and the starting point, are therefore continued with the play free.
+    The sum of squares has narrow valleys in which play and offset are correlated; a search at a fixed play stops beside
+    the minimum. The best two fits, and the starting point, are therefore continued with the play free.
     """
     longest_mm = _longest_mm(motion)
     held = [fit(motion, replace(start, play_mm=share * longest_mm), free_play=False) for share in plays]
@@ -64,9 +67,10 @@ def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIR
 
 
 def beside(motion: Motion, found: Fit, plays: tuple[float, ...]) -> Fit:
-    """Look for a lower place at offsets nearby, and follow it: a fit only finds the valley in which it begins.
+    """Search for a lower minimum at offsets nearby, because a fit only finds the valley in which it starts.
 
-    The correlation knows no play, and one as wide as a step of a staircase puts its peak a whole halt beside the truth.
+    The correlation ignores play; a play as wide as a step of a staircase motion shifts the correlation's peak by the
+    duration of a whole halt.
     """
     longest_mm = _longest_mm(motion)
     tried = [
@@ -79,11 +83,11 @@ def beside(motion: Motion, found: Fit, plays: tuple[float, ...]) -> Fit:
 
 
 def posterior(motion: Motion, best: Fit) -> Posterior:
-    """Integrate over the play, across the whole range in which its likelihood is not negligible.
+    """Integrate the posterior over the play, across the range in which the likelihood is not negligible.
 
-    At constant speed of the stage, small plays and offsets are indistinguishable, and the likelihood is far from
-    normal. It is therefore evaluated at each value of the play, with the Student distribution of the residual's
-    variance.
+    If the stage moves at constant speed, small values of play and offset are indistinguishable, and the likelihood is
+    far from normal. It is therefore evaluated at each value of the play, as a Student distribution, because the
+    residual variance is estimated.
     """
     longest_mm, degrees = _longest_mm(motion), best.degrees
     known: dict[float, Fit] = {}

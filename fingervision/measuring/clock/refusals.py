@@ -1,4 +1,4 @@
-"""Reasons to refuse a log: nothing moves, the gap follows something else, or the motion repeats."""
+"""Reasons to refuse a log: no motion, a gap that does not follow the log, or a motion that repeats."""
 
 import numpy as np
 
@@ -10,12 +10,12 @@ from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
 
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
-"""Frames with a gap and rows of the log below which there is nothing to fit: the fit has eight free numbers."""
+"""Least number of frames with a gap, and of log rows: the fit has eight parameters."""
 LEAST_GAIN = 40.0
-"""Gain in chi-square of the motion over a gap that stands: by chance 20 come once in 10^4 recordings (four parameters),
-as much again for the offsets among which was chosen."""
+"""Least gain in chi-square of the fitted motion over a constant gap: a gain of 20 occurs by chance once in 10^4
+recordings (four parameters); another 20 allow for the choice among many offsets."""
 LEAST_SHARE = 0.5
-"""Share of the gap's variance that the log must explain for it to be this recording's log."""
+"""Least share of the gap's variance that a log must explain to belong to this recording."""
 
 
 def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffset | None:
@@ -42,7 +42,7 @@ def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
 
 
 def unlike(motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse a log that the gap does not follow."""
+    """Refuse a log whose motion the gap does not follow."""
     still = motion.whitened(motion.gap_mm - motion.gap_mm.mean())
     still = still - still.mean()
     gain = found.degrees * float(np.log(max(float(still @ still), 1e-30) / max(found.squares, 1e-30)))
@@ -67,12 +67,12 @@ def unlike(motion: Motion, found: Fit) -> NoClockOffset | None:
 
 
 def explained(motion: Motion, found: Fit) -> float:
-    """Share of the gap's variance that a fit explains."""
+    """Share of the gap's variance explained by a fit."""
     return 1.0 - float(np.var(found.residual_mm) / np.var(motion.gap_mm))
 
 
 def ambiguous(offsets_s: list[float]) -> NoClockOffset:
-    """Name the offsets among which a periodic motion does not decide."""
+    """Refusal that lists the offsets between which a periodic motion does not decide."""
     nearest = np.unique(np.round(offsets_s, 4))
     said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
     apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""

@@ -1,4 +1,4 @@
-"""Offsets other than the best one that explain the frames shared with it as well."""
+"""Other offsets that explain the frames which they have in common with the best offset equally well."""
 
 from dataclasses import replace
 
@@ -16,21 +16,22 @@ from fingervision.measuring.clock.play_posterior import most_likely
 from fingervision.measuring.clock.refusals import FEWEST_FRAMES
 
 CHANCE_SIGMAS = 3.0
-"""Standard deviations that a rival's chi-square may be larger by the log's own noise: one rival in 700 is then lost."""
+"""Standard deviations by which the log's own noise may enlarge the chi-square of another offset: one valid offset in
+700 is then missed."""
 UNREFUTED = 25.0
-"""Chi-square by which another offset must be worse, over the frames that both explain, to be refuted: 5 sigma."""
+"""Increase of chi-square, over common frames, from which on another offset is rejected: 5 standard deviations."""
 SHARED = 0.5
-"""Share of the motion of either record that must lie in the overlap: less than half is no common motion."""
+"""Least share of the motion of either record that must lie in the overlap."""
 ONE_PEAK = 0.25
-"""Frames: offsets closer than that are the same peak."""
+"""Distance in frames within which two offsets are the same peak."""
 QUICK_PLAYS = (0.0, 0.02, 0.08, 0.3)
-"""Plays from which every candidate is fitted, over the largest possible one."""
+"""Initial values of the play for the fit of every candidate, relative to the largest possible play."""
 
 
 def fitted(
     time_s: Array, gap_mm: Array, path: LogPath, candidate: Candidate, plays: tuple[float, ...]
 ) -> tuple[Motion, Fit]:
-    """Fit the frames that lie within the log under a candidate."""
+    """Fit the frames that lie within the log's time for a candidate offset."""
     middle_s = 0.5 * float(time_s[0] + time_s[-1])
     start = Alignment(candidate.offset_s, candidate.rate, 0.0, 0.0)
     motion = Motion(time_s, gap_mm, path, middle_s, WHITE)
@@ -51,12 +52,12 @@ def _between_runs(log_s: Array, drive: DriveHistory) -> NDArray[np.bool_]:
 
 
 def only(motion: Motion, kept: NDArray[np.bool_]) -> Motion:
-    """Keep some of the frames, with white noise assumed until the noise is estimated again."""
+    """Keep the selected frames only; their noise is taken as white until it is estimated again."""
     return replace(motion, time_s=motion.time_s[kept], gap_mm=motion.gap_mm[kept], noise=WHITE)
 
 
 def unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float) -> list[float]:
-    """Offsets that explain the frames which they share with the best one as well as that does."""
+    """Offsets that explain their frames in common with the best offset as well as the best offset does."""
     found = []
     by_chance = _by_chance(motion, drive, best)
     for candidate in others:
@@ -75,10 +76,11 @@ def unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Candi
 
 
 def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:
-    """By how much another part of the log may fit worse for its own noise alone, in chi-square.
+    """Increase of chi-square that the log's own noise may cause at another offset.
 
-    The frames' noise is the same under every offset, the log's is another: two sums of n squares of it differ by a
-    standard deviation of 2 n^(1/2). What smoothing takes off the log is not counted: rather one candidate too many.
+    The frames' noise is the same for every offset, but the log's noise differs from one part of the log to another: two
+    sums of n squared normalised errors differ with a standard deviation of 2 n^(1/2). The reduction of the log's noise
+    by smoothing is ignored, so that rather too many candidates are kept than too few.
     """
     # Second differences of white noise have six times its variance; turns of the motion are few.
     log_mm2 = (1.4826 * float(np.median(np.abs(np.diff(drive.input_mm, 2))))) ** 2 / 6.0
@@ -88,7 +90,7 @@ def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:
 
 
 def _shares_motion(motion: Motion, at: Alignment) -> bool:
-    """Whether the frames within the log hold half of the gap's motion, or of the log's."""
+    """Whether the overlap contains half of the gap's motion, or half of the log's."""
     log_s, times_s = motion.log_time_s(at), motion.drive.time_s
     inside = (log_s >= times_s[0]) & (log_s <= times_s[-1])
     under = (times_s >= log_s[0]) & (times_s <= log_s[-1])
@@ -101,5 +103,5 @@ def _shares_motion(motion: Motion, at: Alignment) -> bool:
 
 
 def _residual(motion: Motion, best: Fit) -> Array:
-    """Residual of the best alignment over other frames."""
+    """Residuals of the best alignment, refitted to other frames."""
     return most_likely(motion, best.at, (0.0, 0.08)).residual_mm

@@ -7,28 +7,29 @@ from fingervision.measuring.clock.joint_fit import Fit
 from fingervision.measuring.clock.motion_model import Motion
 
 STANDS = 0.1
-"""Change of a neighbouring interval over a jump's, below which the log stands on either side of it."""
+"""Change in a neighbouring interval, relative to that of a jump, below which the log counts as constant on that
+side."""
 JUMPING = 0.7
-"""Share of a log's way that lies in such jumps, from which on it may be one of set-points: a stage that is read out
-fast enough is seen under way, and one that is read out slowly jumps as well."""
+"""Share of a log's travel that lies in such jumps, from which on the log may contain set-points: a stage that is read
+out fast enough is seen while it moves; one that is read out slowly shows jumps as well."""
 FEWEST_JUMPS = 3
-"""Jumps from which on a gap that takes longer is no accident."""
+"""Least number of jumps for a decision; with so many, a gap that takes longer than the log is no accident."""
 FRAMES_MORE = 1.0
-"""Frames on either side of a jump at which the gap has left and has arrived, if it jumps as the log does."""
+"""Frames before and after a jump within which the gap must start and arrive, if it jumps as the log does."""
 ARRIVED = 0.85
-"""Share of the jumps' expected height that the gap must make within that time: noise over three jumps and an alignment
-that is a fifth of a frame off take less than a tenth of it."""
+"""Least share of the jumps' expected height that the gap must reach within that time: noise over three jumps, and an
+alignment error of a fifth of a frame, reduce it by less than a tenth."""
 
 
 def gap_arrives(motion: Motion, found: Fit) -> float | None:
-    """Fraction of the log's jumps that the gap makes as fast as the log does; None where the log has no jumps.
+    """Share of the log's jumps that the gap completes as fast as the log does; None if the log has no jumps.
 
     Parameters
     ----------
     motion : Motion
-        Frames and log.
+        The frames and the log.
     found : Fit
-        Its best alignment; the gap that it expects is compared with the one that was seen.
+        Best alignment of the log; the gap predicted from it is compared with the measured gap.
     """
     rows = motion.path.rows
     steps = np.abs(np.diff(rows.input_mm))

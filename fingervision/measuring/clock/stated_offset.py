@@ -1,4 +1,4 @@
-"""Conversion of a fit to the log's clock, with its uncertainty; refused where the motion leaves it undetermined."""
+"""Clock offset and its uncertainty as stated to the user; refused if the motion does not determine it."""
 
 import numpy as np
 
@@ -12,30 +12,30 @@ from fingervision.measuring.clock.refusals import explained
 from fingervision.measuring.clock.set_points import gap_arrives
 
 FOLLOWED = 0.95
-"""Share below which something else moves the gap as well, and is said."""
+"""Share of the gap's variance explained by the log below which a note says that something else also moves the gap."""
 SYSTEMATIC = 0.004
-"""Share of the time between two frames and two rows that is known no better: what a curve between two rows is off at a
-turn, found by `python -m tests.benchmarks.clock` as the scatter that many frames do not average out."""
+"""Systematic standard uncertainty, as a share of the time between two frames and two rows: error of the curve between
+rows at a reversal, which does not average out over frames (`python -m tests.benchmarks.clock`)."""
 MOST_PLAY_SHARE = 0.5
-"""Of the stroke: where more is lost in play, an error of the log's turns shifts the whole motion, and the fit of
-`python -m tests.benchmarks.clock --seed 404` was off by a frame."""
+"""Largest share of the stroke that may be lost in play: with more, an error of the log's reversals shifts the whole
+motion, and the fit of `python -m tests.benchmarks.clock --seed 404` was off by a frame."""
 SURE_RATE, ORDINARY_RATE = 3.0, 1e-4
-"""Standard uncertainties, and relative rate, from which on a clock is said to run fast or slow: crystals differ by up
-to 100 parts in a million, and compressed pictures bend a motion by as much."""
+"""Standard uncertainties, and relative rate, from which on a clock is reported as fast or slow: crystals differ by up
+to 100 parts in a million, and video compression distorts a motion by as much."""
 
 COARSE = 2.0
-"""Frames that an encoder's step takes, from which on an offset off by a frame is less than half a step off."""
+"""Frames per encoder step from which on an offset error of one frame corresponds to less than half a step."""
 
 
 def crossed_in_s(path: LogPath) -> float:
-    """Time that the moving stage takes from one line of the encoder to the next (s); 0 without lines."""
+    """Time that the moving stage takes from one line of the encoder to the next (s); 0 without an encoder step."""
     steps_mm, steps_s = np.abs(np.diff(path.drive.input_mm)), np.diff(path.drive.time_s)
     moving = steps_mm > 0.1 * float(steps_mm.max())
     return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
 
 
 def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOffset | NoClockOffset:
-    """Put the fit into the terms of the log's clock, at the log's first row."""
+    """Convert the fitted offset and rate to the log's clock at the log's first row, with all uncertainties."""
     first_s = float(motion.drive.time_s[0])
     more = np.sqrt(inflation(motion, best.at))
     offset_s, rate, covariance = at.offset_s, at.rate, at.covariance * np.outer(more[:2], more[:2])

@@ -1,4 +1,4 @@
-"""Recipe step: stand at a position."""
+"""Recipe step: move to a position and stay there for a time."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Recipe step: measure a slot of known width in place of the gripper."""
+"""Recipe step: measure a slot of known width that the operator puts in the gripper's place."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Recipe step: reference the stage again."""
+"""Recipe step: search the reference of the stage again, which sets position 0."""
 
 from collections.abc import Iterator
 

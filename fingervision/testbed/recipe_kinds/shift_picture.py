@@ -1,4 +1,4 @@
-"""Recipe step: shift the picture, so that the fingers appear elsewhere in it."""
+"""Recipe step: the operator shifts the camera, so that the fingers appear elsewhere in the picture."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Recipe step: a sinusoidal motion about a mean position."""
+"""Recipe step: move sinusoidally about a mean position."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Recipe step: equal increments from one position to another, with a dwell at each level."""
+"""Recipe step: move in equal increments from one position to another, with a dwell at each level."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Recipe step: motion to a position and back at one speed."""
+"""Recipe step: move to a position and back at constant speed."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Recipe step: turn the part by 180 degrees in the picture."""
+"""Recipe step: the operator turns the part by 180 degrees in the picture."""
 
 from collections.abc import Iterator
 

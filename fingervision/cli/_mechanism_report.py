@@ -1,0 +1,106 @@
+"""Printed figures of a mechanism drawn by bodies, and sentences on the limits of its results."""
+
+import json
+from collections.abc import Mapping, Sequence
+from math import copysign
+
+import click
+
+from fingervision.models.endurance import Endurance, endurance
+from fingervision.models.gripper_figures import unit_of
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_figures import MechanismModel
+from fingervision.models.mechanism_state import MechanismState
+
+_APART = 0.1
+"""Relative: kinds that differ by more beyond their stated errors are worth a sentence (the issue's own bar)."""
+
+
+def print_figures(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> None:
+    """Print one row per figure, one column per kind."""
+    if as_json:
+        click.echo(json.dumps(table, indent=2))
+        return
+    click.echo(f"{name:<44}" + "".join(f"{kind:>18}" for kind in table))
+    labels = list(dict.fromkeys(label for figures in table.values() for label in figures))
+    for label in labels:
+        cells = (f"{figures[label]:.6g}" if label in figures else "-" for figures in table.values())
+        shown = label if label.endswith("]") else f"{label} [{unit_of(label)}]"
+        click.echo(f"{shown:<44}" + "".join(f"{cell:>18}" for cell in cells))
+
+
+def warn(
+    mechanism: Mechanism, model: MechanismModel, states: list[MechanismState], table: dict[str, dict[str, float]], *,
+    contact: bool,
+) -> None:  # fmt: skip
+    """Warn of limits of the results: yield, faces that penetrate each other, kinds that differ."""
+    worst = max(states, key=lambda state: state.stress_mpa)
+    if worst.stress_mpa > mechanism.material.yield_mpa:
+        at_yield_mm = next(iter(table.values()))["input_at_yield_mm"]
+        click.echo(
+            f"Warning: at an input of {worst.input_mm:.3g} mm the stress in the flexures must stay below the yield of "
+            f"{mechanism.material.yield_mpa:g} MPa, but is {worst.stress_mpa:.3g} MPa; stay within "
+            f"{at_yield_mm:.3g} mm.",
+            err=True,
+        )
+    ends = [state.input_mm for state in (states[0], states[-1])]
+    for name, at_mm in model.touch_input_mm().items():
+        if not contact and min(ends) < at_mm < max(ends):
+            click.echo(
+                f"Warning: the faces of contact {name} touch at an input of {at_mm:.4g} mm, and beyond it this answer "
+                "lets them pass through each other; add --contact.",
+                err=True,
+            )
+    if len(table) > 1:
+        for sentence in disagreements_of(table):
+            click.echo(f"Warning: {sentence}", err=True)
+
+
+def disagreements_of(table: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Sentences on figures by which the second kind differs from the first by more than their model errors leave.
+
+    Motions of probes and pairs are compared with the largest of them: a small one by itself has no relative error.
+    """
+    (first, ours), (second, theirs) = list(table.items())[:2]
+    stated = sum(figures["model_error_force_percent"] for figures in (ours, theirs)) / 100.0
+    motions = [label for label in ours if label.endswith("per input [mm/mm]") and label in theirs]
+    largest = max((abs(ours[label]) for label in motions), default=0.0)
+    found = []
+    for label in ("input_stiffness_n_mm", "mode_1_drive_free_hz", "mode_1_drive_held_hz", *motions):
+        if label not in ours or label not in theirs:
+            continue
+        scale = largest if label in motions else abs(ours[label])
+        apart = (theirs[label] - ours[label]) / scale if scale else 0.0
+        if abs(apart) > _APART + stated:
+            of = " of the largest motion" if label in motions else ""
+            found.append(
+                f"{second} differs from {first} by {100.0 * apart:.3g} %{of} in {label}, more than their model errors "
+                f"of together {100.0 * stated:.2g} % leave; trust {first}."
+            )
+    return found
+
+
+def add_endurance(mechanism: Mechanism, states: Sequence[MechanismState], figures: dict[str, float]) -> None:
+    """Add the number of cycles between the ends of the inputs, where the material's S-N line states it.
+
+    The sign of the stress follows the input.
+    """
+    life = _life(mechanism, states)
+    if life is not None and life.cycles is not None:
+        figures["endurance_cycles"] = life.cycles
+
+
+def _life(mechanism: Mechanism, states: Sequence[MechanismState]) -> Endurance | None:
+    ends = sorted(copysign(state.stress_mpa, state.input_mm) for state in (states[0], states[-1]))
+    return endurance(mechanism.material, ends[0], ends[1])
+
+
+def say_endurance(kind: str, mechanism: Mechanism, states: Sequence[MechanismState]) -> None:
+    """Print how long the flexures endure cycles between the ends of the inputs."""
+    life = _life(mechanism, states)
+    if life is not None:
+        click.echo(
+            f"Endurance between {states[0].input_mm:.3g} and {states[-1].input_mm:.3g} mm ({kind}, the material's S-N "
+            f"line, no scatter): {life.words}; the flexures' stress swings by +-{life.amplitude_mpa:.3g} MPa about "
+            f"{life.mean_mpa:.3g} MPa."
+        )

@@ -1,0 +1,140 @@
+"""Effects of weight, warmth and a part between two probes on a mechanism, for small displacements.
+
+All are by finite elements: frames of bars grow and hang where their axes meet, not where the drawing does.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import ModelError
+from fingervision.models.grip import Part
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
+
+Array = NDArray[np.float64]
+
+_STILL = 1e-3
+"""Of the input: a pair whose distance changes by less is no output, and grips nothing."""
+
+
+def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
+    """Compute mechanical advantage, and the effects of weight and warmth.
+
+    The drive stays where it is under weight and warmth, and so do the fixed faces and the sliding faces' own direction.
+
+    Parameters
+    ----------
+    model : MechanismPlate
+        Of the drawing.
+
+    Returns
+    -------
+    dict of str to float
+        By name, with the unit at its end.
+    """
+    figures: dict[str, float] = {}
+    for name in model.pair_rows:
+        if (pressed := GrippedPair(model, name)).per_input:
+            figures[f"{name}: mechanical advantage [N/N]"] = pressed.mechanical_advantage
+    plate = model.plate
+    for way, pulled_dofs, sign in (("-y", plate.y_dofs, -1.0), ("x", plate.x_dofs, 1.0)):
+        pulled = np.zeros(plate.unknowns)
+        pulled[pulled_dofs] = sign * STANDARD_GRAVITY_MM_S2
+        hung = model.driven.under_load(plate.mass_t @ pulled)
+        for name, row in model.pair_rows.items():
+            figures[f"{name}: by its weight along {way} [mm]"] = float(row @ hung)
+        for name, rows in model.probe_rows.items():
+            figures[f"{name}: moved by its weight along {way} [mm]"] = float(np.hypot(*(rows @ hung)))
+    expansion = plate.material.thermal_expansion_per_k
+    if expansion is not None:
+        free = np.zeros(plate.unknowns)
+        free[plate.x_dofs], free[plate.y_dofs] = expansion * plate.nodes_mm
+        stiffness = model.driven.stiffness_n_mm
+        grown = model.driven.under_load(stiffness @ free)
+        figures["force_per_kelvin_n"] = float(model.driven.by_input @ (stiffness @ (grown - free)))
+        for name, row in model.pair_rows.items():
+            figures[f"{name}: per kelvin [mm/K]"] = float(row @ grown)
+        for name, rows in model.probe_rows.items():
+            for axis, row in zip("xy", rows, strict=True):
+                figures[f"{name}: {axis} per kelvin [mm/K]"] = float(row @ grown)
+    return figures
+
+
+@dataclass(frozen=True, slots=True)
+class PairGrip:
+    """A part between the two probes of a pair, at one input.
+
+    Parameters
+    ----------
+    input_mm, distance_mm : float
+        Of the drive, and of the pair.
+    grip_n, force_n : float
+        On the part, and at the drive along its direction.
+    stress_mpa : float
+        Largest in the flexures.
+    """
+
+    input_mm: float
+    distance_mm: float
+    grip_n: float
+    force_n: float
+    stress_mpa: float
+
+
+class GrippedPair:
+    """Two probes that press on a part between them, along the line that joins them.
+
+    The part touches at the probes, over a patch as large as the elements there; how it dents the body is not resolved.
+
+    Parameters
+    ----------
+    model : MechanismPlate
+        Of the drawing.
+    pair : str
+        Name of the pair.
+    """
+
+    def __init__(self, model: MechanismPlate, pair: str) -> None:
+        self.model, self.pair = model, pair
+        row = model.pair_rows[pair]
+        change = float(row @ model.unit_displacement_mm)
+        self.per_input = change if abs(change) > _STILL else 0.0
+        self.rest_mm = model.state(0.0).pairs_mm[pair]
+        self._pushed = model.driven.under_load(row)
+        self.compliance_mm_n = float(row @ self._pushed)
+
+    @property
+    def mechanical_advantage(self) -> float:
+        """Grip on a rigid part over the force at the drive, beyond the touch; what is left bends the flexures.
+
+        By Betti's theorem the grip N pulls the drive with N times the pair's motion by unit input.
+        """
+        grip = abs(self.per_input) / self.compliance_mm_n
+        return grip / (self.model.stiffness_n_mm + grip * abs(self.per_input))
+
+    def touch_input_mm(self, part: Part) -> float:
+        """Input at which the part is touched.
+
+        Raises
+        ------
+        ModelError
+            Where the drive does not move the probes towards each other.
+        """
+        if not self.per_input:
+            raise ModelError(
+                f"Pair {self.pair} of {self.model.mechanism.name} must close by its drive to grip a part, but its "
+                f"distance changes by less than {_STILL:g} of the input."
+            )
+        return (part.width_mm - self.rest_mm) / self.per_input
+
+    def at(self, input_mm: float, part: Part) -> PairGrip:
+        """Find the equilibrium at one input."""
+        model = self.model
+        free_mm = self.rest_mm + self.per_input * input_mm
+        pressed_mm = max(part.width_mm - free_mm, 0.0)
+        grip = pressed_mm / (self.compliance_mm_n + 1.0 / part.stiffness_n_mm)
+        moved = input_mm * model.unit_displacement_mm + grip * self._pushed
+        force = model.stiffness_n_mm * input_mm - grip * self.per_input
+        return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, model.stress_mpa(moved))
