@@ -76,7 +76,7 @@ class LiveSource(Protocol):
 
     @property
     def description(self) -> Description:
-        """What is known of the source before its frames are read."""
+        """Description of the source before its frames are read."""
         ...
 
     @property

@@ -4,11 +4,11 @@ schema = 1
 [[gauge]]
 name = "lever"                       # unique in the file
 kind = "edge"                        # edge | pair | line | circle | marker | patch | gap
-x_px = 320.0                         # its middle, in pixels of the full frame
+x_px = 320.0                         # centre in the first frame, in pixels of the full frame
 y_px = 200.0
-direction_deg = 0.0                  # the kind's own keys follow
+direction_deg = 0.0                  # settings of the kind follow
 length_px = 40.0
-reach_px = 12.0                      # it may move so far from frame to frame; nothing alike may be within it
+reach_px = 12.0                      # largest motion between frames; nothing similar may be within it
 """
 
 from collections.abc import Collection, Mapping

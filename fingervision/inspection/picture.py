@@ -21,7 +21,7 @@ NO_NUMBER_PX = 1.0
 
 
 def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None:
-    """Draw a measured frame beside a bar for every finding.
+    """Draw a measured frame, and next to it a bar for every finding.
 
     Parameters
     ----------

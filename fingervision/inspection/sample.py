@@ -103,7 +103,7 @@ class Sample:
     def fill(self) -> float:
         """Share of the picture's extent across the fingers that fingers and gap occupy.
 
-        It is 1 if they extend beyond the picture.
+        The share is 1 if fingers and gap extend beyond the picture.
         """
         shares = [0.0]
         for look in self.looks:

@@ -132,7 +132,7 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
 
 
 def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: FlatMap | None = None) -> Placed:
-    """Place a drawing so that its silhouette covers what is dark, or what is light, in the picture.
+    """Place a drawing so that its silhouette covers the dark, or the light, area of the picture.
 
     Raises
     ------

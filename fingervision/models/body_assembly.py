@@ -140,7 +140,7 @@ class _Frames:
                 self.held += [at + "xy".index(component)] + [at + 2] * turns
 
     def contacts(self) -> None:
-        """Keep the nodes of contact faces, so that a contact force can bend the face's body."""
+        """Add coordinate frames for the nodes of contact faces, so that contact forces can deform the bodies."""
         for contact in self.mechanism.contacts:
             for face in (contact.face, contact.other):
                 if face is not None:

@@ -1,1 +1,1 @@
-"""The test bed: actuator, force sensor, camera and gripper as one experiment, each part real or simulated."""
+"""The test bed: actuator, force sensor, camera and gripper as one experiment, each real or simulated."""

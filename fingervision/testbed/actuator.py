@@ -1,4 +1,4 @@
-"""Protocol of an actuator: simulated, behind the Arduino board, a hand screw, or a plug-in's."""
+"""Protocol of an actuator: simulated, behind the Arduino board, a hand-turned screw, or of a plug-in."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,19 +13,21 @@ class StageLimits:
     Parameters
     ----------
     lower_mm, upper_mm : float
-        Positions that it can reach; positive opens the gripper.
+        Range of positions; positive positions open the gripper.
     speed_mm_s : float
         Highest speed.
     force_n : float
         Highest force.
     accuracy_mm : float
-        It comes to a stand within +- this of where it was sent; its encoder says where.
+        Largest distance between the target and the position at which the stage stops; the encoder gives the actual
+        position.
     encoder_step_mm : float
-        Positions are read in multiples of it; 0 where they are not.
+        Step of the encoder, of which read positions are multiples; 0 if they are not.
     repeatability_mm : float
-        Positions at rest stray by at most this from one reading to another, and the reference is found again within it.
+        Largest scatter of readings at rest, and of the reference position.
     settling_s : float
-        A motion takes at most so much longer than its way at the asked speed: ramps at both ends, and coming to rest.
+        Largest time by which a motion takes longer than distance over requested speed: acceleration, deceleration, and
+        settling.
     """
 
     lower_mm: float
@@ -40,16 +42,16 @@ class StageLimits:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """Reason why an actuator refuses to move: its own code, and a sentence."""
+    """Reason why an actuator refuses to move: the actuator's own code, and a sentence."""
 
     code: str
     words: str
 
 
 class MoveCheck(Protocol):
-    """Limits of an actuator as far as its configuration states them: enough to check a plan without the bed.
+    """Limits of an actuator as stated in its configuration: sufficient to check a plan without opening the test bed.
 
-    A kind of actuator whose `build` opens hardware provides it by `without_hardware(section, folder)`.
+    A kind of actuator whose `build` opens hardware provides such an object by `without_hardware(section, folder)`.
     """
 
     @property
@@ -61,7 +63,7 @@ class MoveCheck(Protocol):
     def has_steps(self) -> bool:
         """Whether the actuator keeps step data.
 
-        Then `run_step` is possible, and it can reach only the ends of steps.
+        An actuator with step data supports `run_step`, and can reach only the end positions of its steps.
         """
         ...
 
@@ -71,22 +73,22 @@ class MoveCheck(Protocol):
 
 
 class Actuator(MoveCheck, Protocol):
-    """A linear stage. An actuator whose motions begin at once and end by themselves.
+    """A linear stage whose motions start at once and end by themselves.
 
-    `busy` tells whether one is under way.
+    `busy` states whether a motion is in progress.
 
-    Every method raises `FingervisionError` with a sentence if the connection is lost or the motion was refused (beyond
-    the limits, alarm, still busy); a refused motion has not begun.
+    Every method raises `FingervisionError` with a sentence if the connection is lost or the motion is refused (beyond
+    the limits, alarm, still busy); a refused motion is not started.
     """
 
     @property
     def name(self) -> str:
-        """Name for run.json: kind, port, firmware."""
+        """Name for run.json: kind, port and firmware of the actuator."""
         ...
 
     @property
     def busy(self) -> bool:
-        """Whether it moves."""
+        """Whether a motion is in progress."""
         ...
 
     @property
@@ -103,19 +105,19 @@ class Actuator(MoveCheck, Protocol):
         ...
 
     def jog(self, speed_mm_s: float) -> None:
-        """Begin to move until stopped or at a limit; positive speeds open the gripper."""
+        """Begin to move until stopped or until a limit is reached; positive speeds open the gripper."""
         ...
 
     def run_step(self, number: int) -> None:
-        """Begin one of the step data blocks, 1 to 15."""
+        """Begin the motion of a step data block, numbered 1 to 15."""
         ...
 
     def stop(self) -> None:
-        """Stop at once, from any thread, whatever command is under way; never raises while the connection lasts."""
+        """Stop at once, from any thread, whatever command is executed; never raises while the connection lasts."""
         ...
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions in mm since the last call, oldest first, the newest read now; at least one."""
+        """Positions (mm) since the last call, oldest first, the last one read now; at least one."""
         ...
 
     def close(self) -> None:

@@ -16,32 +16,32 @@ from fingervision.testbed.operators.operator import Operator
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bed:
-    """The parts of one experiment; any of them may be real while the rest is simulated.
+    """The parts of one experiment; any of them may be real while the others are simulated.
 
     Parameters
     ----------
     clock : Clock
-        The time that all parts share.
+        Clock whose time all parts use.
     actuator : Actuator
-        Moves the drive point.
+        Actuator of the drive point.
     limits : SoftLimits
-        What nobody may ask for.
+        Limits for all requested motions.
     operator : Operator
-        Does what no motor does: turns the part, shifts the picture, puts in a slot.
+        Performs manual actions: turns the part, shifts the picture, inserts a slot.
     force_sensor : ForceSensor or None
-        Force at the drive.
+        Sensor of the force at the drive.
     camera : BedCamera or None
-        Looks at the fingers.
+        Camera that views the fingers.
     scale : Scale or None
-        From the camera's pixels to millimetres.
+        Conversion from the camera's pixels to millimetres.
     below_tip_mm : float
-        Height of measuring below each finger's tip.
+        Distance of the measuring point below each finger's tip.
     model : Model or None
-        What the gripper should do: its drawing or table, without what is hidden.
+        Expected behaviour of the gripper: its drawing or table, without injected effects.
     replays : bool
-        Whether the same commands give the same answers, so that a run may be brought back to where it broke off.
+        Whether the same commands give the same results, so that an interrupted run can be brought back to its state.
     about : mapping
-        For run.json.
+        Description for run.json.
     """
 
     clock: Clock

@@ -1,4 +1,4 @@
-"""Build a bed from its configuration."""
+"""Build a test bed from its configuration."""
 
 from contextlib import suppress
 from importlib import resources
@@ -44,7 +44,7 @@ def open_bed(
     seed: int | None = None,
     earlier_s: tuple[float, float] | None = None,
 ) -> Bed:
-    """Build a bed and open its parts.
+    """Build a test bed and open its parts.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ def open_bed(
     hidden : Hidden
         Effects that act in the simulated parts.
     pace : float
-        Seconds of a wholly simulated bed in one second of the host; 0 is as fast as it goes.
+        Seconds of a completely simulated test bed per second of the computer; 0 is as fast as possible.
     seed : int, optional
-        Of everything random in the simulated parts; by default that of the configuration.
+        Seed of everything random in the simulated parts; by default that of the configuration.
     earlier_s : (float, float), optional
-        First and last time of the runs that this one follows on a wholly simulated bed: it has warmed and drifted since
-        the first, and goes on from the last.
+        First and last time of the earlier runs that this one continues on a completely simulated test bed: warming and
+        drift started at the first time, and go on from the last.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _built(
 
 
 def read_configuration(name: str) -> Section:
-    """Read the configuration of a bed, without opening anything.
+    """Read the configuration of a test bed, without opening anything.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def stated_limits(section: Section) -> SoftLimits:
 
 
 def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> SoftLimits:
-    """Narrow the bed's limits to those of its actuator."""
+    """Narrow the test bed's limits to those of its actuator."""
     within = limits.within(able)
     if not within.lower_mm < within.upper_mm:
         section.refuse(
@@ -194,7 +194,7 @@ def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> So
 
 
 def stated_scale(section: Section, folder: Path) -> Scale | None:
-    """Read the camera's scale from a configuration; None where it states none."""
+    """Read the camera's scale from a configuration; None if none is stated."""
     section.only(("px_per_mm", "calibration"))
     if "calibration" in section.values:
         return read_calibration(folder / section.word("calibration"))
@@ -204,7 +204,7 @@ def stated_scale(section: Section, folder: Path) -> Scale | None:
 
 
 def gripper_model(section: Section, folder: Path) -> Model:
-    """Read the gripper that simulated parts use, and from which limits of gap and force are predicted."""
+    """Read the gripper model that simulated parts use, and by which gap and force are predicted for the limits."""
     section.only(("file", "columns", "kind", "large_rotation", "contact"))
     if "file" in section.values:
         path = folder / section.word("file")

@@ -1,4 +1,4 @@
-"""Information shared by the builders of a bed's devices while the bed is built."""
+"""Information used by the builders of a test bed's devices while the test bed is built."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,34 +13,35 @@ from fingervision.testbed.simulation.injected_effects import Hidden
 
 @dataclass(slots=True)
 class BuildContext:
-    """The bed under construction: actuator first, then gripper, force sensor and camera.
+    """The test bed under construction, in the order actuator, gripper, force sensor, camera.
 
     Parameters
     ----------
     clock : Clock
-        The bed's time.
+        Clock of the test bed.
     folder : Path
-        Where relative names in the configuration begin.
+        Folder to which relative paths in the configuration refer.
     seed : int
-        Of everything random in simulated parts.
+        Seed of everything random in simulated parts.
     hidden : Hidden
-        Effects that act in simulated parts without the rest knowing.
+        Effects that are injected into simulated parts; the other parts do not know them.
     limits : SoftLimits
-        Of the bed.
+        Soft limits of the test bed.
     scale : Scale or None
-        Of the camera, as the configuration states it.
+        Scale of the camera, if stated in the configuration.
     below_tip_mm : float
-        Height of measuring.
+        Distance of the measuring point below each finger's tip.
     since_s : float or None
-        Since when a simulated gripper warms and drifts, on the bed's clock; None where the bed begins anew.
+        Time on the test bed's clock since which a simulated gripper has been warming and drifting; None for a new
+        start.
     motion : Motion or None
-        What a simulated gripper is driven by; a simulated actuator puts it here.
+        Motion that drives a simulated gripper; a simulated actuator sets it.
     play_mm : float
         Play of a simulated drive.
     gripper : SimulatedGripper or None
-        The simulated gripper, for the parts that look at it or push it.
+        The simulated gripper, for parts that view or load it.
     shared : dict
-        Things that several parts are made from, by name: a board behind a port.
+        Objects used by several parts, by name, such as a board behind a port.
     """
 
     clock: Clock

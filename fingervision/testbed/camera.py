@@ -1,4 +1,4 @@
-"""Protocol of a bed's camera: frames, each with the time of its exposure."""
+"""Protocol of a test bed's camera: frames, each with the time of its exposure."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,32 +12,33 @@ class Shot(Protocol):
 
     @property
     def index(self) -> int:
-        """Frame number in the camera's stream, from 0 without holes."""
+        """Frame number in the camera's stream, from 0 without gaps."""
         ...
 
     @property
     def device_s(self) -> float:
-        """Time of its exposure on the camera's own clock."""
+        """Time of the exposure on the camera's own clock."""
         ...
 
     @property
     def arrived_s(self) -> float:
-        """Arrival time at the host, on the bed's clock."""
+        """Arrival time at the computer, on the test bed's clock."""
         ...
 
     def item(self) -> Frame | LostFrame:
-        """Return the picture; a simulated one is drawn at this call. `time_s` is `device_s`."""
+        """Return the picture; a simulated picture is rendered by this call. Its `time_s` is `device_s`."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Latency from exposure to arrival: its least value, and that value's standard uncertainty.
+    """Latency from exposure to arrival: its smallest value, and the standard uncertainty of this value.
 
     Parameters
     ----------
     least_s, u_s : float
-        No frame arrives sooner after its exposure than this; arrivals alone cannot tell it, it must be stated.
+        Smallest latency and its standard uncertainty; it cannot be determined from arrival times alone and must be
+        stated.
     """
 
     least_s: float
@@ -45,7 +46,7 @@ class Latency:
 
 
 class BedCamera(Protocol):
-    """A camera that looks at the fingers."""
+    """A camera that views the fingers."""
 
     @property
     def description(self) -> Description:

@@ -19,14 +19,14 @@ from fingervision.testbed.guarded_device import guarded
 PACKAGES = {"actuator": actuators, "force_sensor": force_sensors, "camera": cameras}
 PROTOCOLS: dict[str, type] = {"actuator": Actuator, "force_sensor": ForceSensor, "camera": BedCamera}
 FILE = ".py"
-"""A kind that ends so is a file, relative to the bed's."""
+"""Suffix of a kind that is given as a file; its path is relative to the test bed's file."""
 
 
 class Kind(Protocol):
     """A module, or another object, that builds one kind of device.
 
-    `KEYS` are the keys that its section may have besides `kind`. `SIMULATED` states that it needs no hardware, so that
-    a bed of such devices only runs in virtual time.
+    `KEYS` are the settings that its section may have in addition to `kind`. `SIMULATED` states that the device needs no
+    hardware; a test bed that consists of such devices only runs in virtual time.
     """
 
     KEYS: tuple[str, ...]
@@ -38,14 +38,14 @@ class Kind(Protocol):
 
 
 class PluggedKind:
-    """A kind from outside the package: the device that it builds is checked, and its faults become sentences.
+    """A kind from outside the package: the device that it builds is checked, and its exceptions become sentences.
 
     Parameters
     ----------
     part : str
         `actuator`, `force_sensor` or `camera`.
     entry : Entry
-        The kind, and where it comes from.
+        The kind, and its origin.
     """
 
     def __init__(self, part: str, entry: Entry[Kind]) -> None:
@@ -79,7 +79,7 @@ def kinds(part: str) -> tuple[str, ...]:
 
 
 def kind_of(part: str, section: Section) -> Kind:
-    """Find the kind that a section names, and refuse keys that this kind does not know.
+    """Find the kind that a section names, and refuse settings that this kind does not have.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def _registry(part: str) -> Registry[Kind]:
 
 
 def _held(part: str, held: object) -> dict[str, Kind]:
-    """Return what builds the device: the module or object itself, or its ACTUATOR, CAMERA or FORCE_SENSOR."""
+    """Return the builder in a module or object: the object itself, or its ACTUATOR, CAMERA or FORCE_SENSOR."""
     held = getattr(held, part.upper(), held)
     lacks = [name for name in ("KEYS", "SIMULATED") if not hasattr(held, name)]
     lacks += [] if callable(getattr(held, "build", None)) else ["build"]

@@ -1,4 +1,4 @@
-"""Wrapper for a device from outside the package: it is checked after it is built, and its errors name it."""
+"""Wrapper for a device from outside the package: it is checked after it is built, and its errors name the device."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,13 +17,13 @@ def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) 
     Parameters
     ----------
     build : callable
-        Gives the device.
+        Returns the device.
     protocol : type
-        Whose methods and properties it must have.
+        Protocol whose methods and properties the device must have.
     who : str
-        How a sentence about it begins.
+        Beginning of sentences about the device.
     origin : Origin
-        Where it comes from.
+        Origin of the device.
 
     Returns
     -------

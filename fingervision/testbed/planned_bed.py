@@ -1,4 +1,4 @@
-"""A bed as needed for checking a recipe: limits, model, camera and possible motions. No port or camera is opened."""
+"""A test bed as needed for checking a recipe: limits, model, camera and possible motions, without opening hardware."""
 
 from dataclasses import dataclass
 
@@ -19,29 +19,29 @@ from fingervision.testbed.device_kinds import kind_of
 from fingervision.testbed.motion.soft_limits import SoftLimits
 
 CAMERA_PX, CAMERA_HZ = (640, 480), 25.0
-"""A camera's size and rate where its section states none: those of the published test bed."""
+"""Size and frame rate of a camera whose section states none: those of the published test bed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedBed:
-    """The bed against which a recipe is checked.
+    """The test bed against which a recipe is checked.
 
     Parameters
     ----------
     name : str
-        Of the bed.
+        Name of the test bed.
     limits : SoftLimits
-        Of position, speed, force and gap.
+        Soft limits of position, speed, force and gap.
     actuator : MoveCheck
-        Which moves the stage can make.
+        Motions that the stage can make.
     model : Model or None
-        Of the gripper: gap and force at each position.
+        Model of the gripper: gap and force at each position.
     rate_hz : float
-        Frames a second.
+        Frames per second.
     size_px : (int, int)
         Width and height of the pictures.
     px_per_mm : float or None
-        Scale of the camera; None where the configuration states none.
+        Scale of the camera; None if the configuration states none.
     """
 
     name: str
@@ -54,17 +54,17 @@ class PlannedBed:
 
     @property
     def view_mm(self) -> float:
-        """Width of the camera's view (mm); infinite where its scale is unknown."""
+        """Width of the camera's view (mm); infinite if the scale is unknown."""
         return float("inf") if self.px_per_mm is None else self.size_px[0] / self.px_per_mm
 
 
 def planned_bed(name: str) -> PlannedBed:
-    """Read a bed for planning; hardware is neither opened nor moved.
+    """Read a test bed's configuration for planning; hardware is neither opened nor moved.
 
     Parameters
     ----------
     name : str
-        `simulated`, or a configuration file.
+        `simulated`, or the path of a configuration file.
 
     Raises
     ------

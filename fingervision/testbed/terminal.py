@@ -1,4 +1,4 @@
-"""Terminal input: answers to questions, and single letters typed at any time."""
+"""Terminal input: responses to questions, and single letters typed at any time."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -13,10 +13,10 @@ LOOK_EVERY_S = 0.2
 
 
 class Terminal:
-    """Keyboard and screen of the person at the bed.
+    """Keyboard and screen of the person at the test bed.
 
-    Two readers of one keyboard would take each other's lines. Here a line is an answer if a question was asked, and a
-    single letter otherwise.
+    If two parts of the program read from the keyboard, each would take lines meant for the other. Therefore all lines
+    are read here: a line is the response to a question if one was asked, and otherwise a command of a single letter.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Terminal:
         self._ended: Callable[[], bool] = lambda: False
 
     def ask(self, words: str) -> str | None:
-        """Ask and wait for the answer; None if nobody is there.
+        """Ask a question and wait for the response; None if nobody is at the keyboard.
 
         Raises
         ------
@@ -54,7 +54,7 @@ class Terminal:
                     raise StateError("The operator gave no answer before the run was stopped.") from None
 
     def say(self, words: str) -> None:
-        """Write on the screen."""
+        """Write a sentence on the screen."""
         screen = self._screen or sys.stderr
         screen.write(words)
         screen.flush()
@@ -66,9 +66,9 @@ class Terminal:
         Parameters
         ----------
         unasked : callable
-            Told each line that answers no question.
+            Called with each line that is not a response to a question.
         ended : callable
-            Whether nobody waits for answers any more.
+            Returns whether nobody waits for responses any more.
         """
         keyboard = self._keyboard or sys.stdin
         if keyboard is None or not keyboard.isatty():

@@ -179,8 +179,8 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (measure("c.mkv", "--drive", "folder.csv"), 1, "folder.csv"),
     (measure("c.mkv", "--drive", "late.csv", "--drive-offset-s", "nan"), 2, "nan"),
     # Tables.
-    (diagnose("two.csv"), 1, "gap_mm stands twice"),
-    (diagnose("m.csv", "two.csv"), 1, "gap_mm stands twice"),
+    (diagnose("two.csv"), 1, "gap_mm occurs twice"),
+    (diagnose("m.csv", "two.csv"), 1, "gap_mm occurs twice"),
     (diagnose("latin.csv"), 1, "accept=constant_input"),
     (diagnose("nul.csv"), 1, "zero bytes"),
     (diagnose("quote.csv"), 1, "quote"),

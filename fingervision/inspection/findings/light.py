@@ -57,7 +57,7 @@ def _lost(sample: Sample) -> Finding | None:
 
 
 def uneven_light_px(sample: Sample) -> float:
-    """Change of the gap caused by sloping light beside the inner edges (pixels)."""
+    """Change of the gap caused by light that varies linearly beside the inner edges (pixels)."""
     seen = [(look.upright, look.edges) for look in sample.looks]
     levels = int(np.iinfo(seen[0][0].dtype).max) + 1
     light = sample.settings.response.table(sample.top_level, levels)

@@ -55,8 +55,8 @@ class Posterior:
 def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIRST_PLAYS) -> Fit:
     """Fit from several starting values of the play and keep the best; `plays` are fractions of the largest play.
 
-    The sum of squares has narrow valleys in which play and offset are correlated; a search at a fixed play stops beside
-    the minimum. The best two fits, and the starting point, are therefore continued with the play free.
+    The sum of squares has narrow valleys in which play and offset are correlated; a search at a fixed play stops near,
+    but not at, the minimum. The best two fits, and the starting point, are therefore continued with the play free.
     """
     longest_mm = _longest_mm(motion)
     held = [fit(motion, replace(start, play_mm=share * longest_mm), free_play=False) for share in plays]

@@ -1,1 +1,1 @@
-"""Actuators, one per file: a module with `KEYS` and `build(section, context)` is a kind."""
+"""Kinds of actuators, one per module, each with `KEYS` and `build(section, context)`."""

@@ -1,4 +1,4 @@
-"""Base of stages that a library drives, from their maker or a community; they keep no step data."""
+"""Base class of stages that are driven through a library of their maker or community; they store no step data."""
 
 import threading
 from abc import ABC, abstractmethod
@@ -18,18 +18,18 @@ T = TypeVar("T")
 
 
 class LibraryAxis(ABC):
-    """An actuator (`testbed.actuator`) built on six calls of a library, each of which may raise any exception.
+    """An actuator (`testbed.actuator`) that uses six calls of a library, each of which may raise any exception.
 
     Parameters
     ----------
     name : str
-        For run.json and for errors.
+        Name of the actuator in run.json and in errors.
     device : str
-        What it is, with its article: `a Zaber stage`.
+        Description with an article: `a Zaber stage`.
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     limits : StageLimits
-        What it can do.
+        Limits of the stage.
     """
 
     has_steps = False
@@ -43,23 +43,23 @@ class LibraryAxis(ABC):
 
     @abstractmethod
     def _moving(self) -> bool:
-        """Whether a motion is under way, asked from the device."""
+        """Query the device whether a motion is in progress."""
 
     @abstractmethod
     def _position_mm(self) -> float:
-        """Position in mm, asked from the device."""
+        """Query the device for its position (mm)."""
 
     @abstractmethod
     def _go_home(self) -> None:
-        """Begin to go to the reference."""
+        """Begin to move to the reference."""
 
     @abstractmethod
     def _begin(self, to_mm: float, speed_mm_s: float) -> None:
-        """Begin to move."""
+        """Begin to move to a position."""
 
     @abstractmethod
     def _halt(self) -> None:
-        """Stop."""
+        """Stop the motion."""
 
     @abstractmethod
     def _release(self) -> None:
@@ -67,16 +67,16 @@ class LibraryAxis(ABC):
 
     @abstractmethod
     def _do(self, act: Callable[[], None]) -> None:
-        """Send a command; a refusal by the device becomes the alarm and a DeviceError."""
+        """Send a command; a refusal by the device is stored as the alarm and raised as a DeviceError."""
 
     @property
     def busy(self) -> bool:
-        """Whether it moves."""
+        """Whether the actuator moves."""
         return bool(self._asked(self._moving))
 
     @property
     def alarm(self) -> Alarm | None:
-        """The device's last refusal, such as a stall or an unknown reference."""
+        """The device's last refusal, such as a stall or an unknown reference position."""
         return self._alarm
 
     def home(self) -> None:
@@ -89,24 +89,24 @@ class LibraryAxis(ABC):
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
-        """Begin to move."""
+        """Begin to move to a position at a positive speed."""
         check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
         self._do(lambda: self._begin(to_mm, speed_mm_s))
 
     def jog(self, speed_mm_s: float) -> None:
-        """Begin to move until stopped or at a limit."""
+        """Begin to move until stopped or until a limit is reached."""
         check_speed(self.limits, abs(speed_mm_s))
         if speed_mm_s != 0.0:
             # The device's own endless motion knows its own limits alone, not those of the bed's configuration.
             self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
 
     def run_step(self, number: int) -> None:
-        """Refuse: such a device keeps no step data that a bed could use."""
+        """Refuse, because such a device stores no step data that a test bed could use."""
         raise LimitError(f"Step {number} must be stored in the controller, but {self._device} has none: use move.")
 
     def stop(self) -> None:
-        """Stop at once."""
+        """Stop the motion at once."""
         with self._line:
             self._halt()
 
@@ -150,5 +150,5 @@ def in_a_line(error: Exception) -> str:
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
-    """Limits of the stage, for checking a plan without the bed."""
+    """Limits of the stage, for checking a plan without opening the test bed."""
     return FreeMoves(stated_limits(section))

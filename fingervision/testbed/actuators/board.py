@@ -1,4 +1,4 @@
-"""Actuator on the parallel input lines of a motor controller, which runs its stored step data."""
+"""Actuator connected to the parallel input lines of a motor controller, which executes its stored step data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,14 +35,14 @@ CLOSES_WITHIN_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Routes:
-    """Motions that the step data allow, computed without the board.
+    """Motions that the step data allow, computed without opening the board.
 
     Parameters
     ----------
     data : StepData
-        What the controller keeps.
+        Step data stored in the motor controller.
     limits : StageLimits
-        What the stage can do.
+        Limits of the stage.
     """
 
     data: StepData
@@ -56,25 +56,25 @@ class Routes:
 
 
 class BoardActuator:
-    """The stage driven by the board's motor controller.
+    """The stage driven by the motor controller that is connected to the board.
 
-    Parallel lines report no position: it is computed from the profiles of the executed steps, within the stage's
-    accuracy.
+    Parallel lines report no position; the position is computed from the profiles of the executed steps, within the
+    stage's accuracy.
 
     Parameters
     ----------
     board : Board
-        Set up.
+        The board, after its set-up.
     data : StepData
-        What the controller keeps: the same as was put into it with its maker's tool.
+        Step data stored in the controller: the same as was loaded into it by its maker's tool.
     limits : StageLimits
-        What the stage can do.
+        Limits of the stage.
     codes : Codes
-        Of the select lines.
+        Codes of the steps on the select lines.
     waits : Waits
-        What the controller is given time for.
+        Time limits for the controller's signals.
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     """
 
     has_steps = True
@@ -90,7 +90,7 @@ class BoardActuator:
 
     @property
     def name(self) -> str:
-        """Board, port and firmware."""
+        """Names of board, port and firmware."""
         return f"motor controller behind {self._board.name}"
 
     @property
@@ -111,7 +111,7 @@ class BoardActuator:
         return None
 
     def home(self) -> None:
-        """Return to the reference, by its own code or an absolute step to 0; clears the reason of an earlier stop."""
+        """Return to the reference, by its own code or an absolute step to 0; an earlier stop is then reset."""
         self._stand()
         if wire.Levels.ALARM in self._board.levels:
             raise DeviceError(
@@ -143,7 +143,7 @@ class BoardActuator:
         self._begin_steps(route(self._data.steps, at_mm, to_mm, speed_mm_s, self.limits.speed_mm_s))
 
     def jog(self, speed_mm_s: float) -> None:
-        """Begin to move by a repeated relative step, until stopped or at a limit."""
+        """Begin to move by a repeated relative step, until stopped or until a limit is reached."""
         check_speed(self.limits, abs(speed_mm_s))
         self._ready()
         if speed_mm_s == 0.0:
@@ -230,12 +230,12 @@ class BoardActuator:
 
 
 def holder(section: Section, folder: Path) -> int | None:
-    """Process of another fingervision that has the board's port open; None if none is found."""
+    """Process number of another fingervision process that has the board's port open; None if there is none."""
     return fingervision_at(read_board(folder / section.word(KEY)).port)
 
 
 def without_hardware(section: Section, folder: Path) -> Routes:
-    """Limits of the stage, for checking a plan without the bed."""
+    """Limits of the stage, for checking a plan without opening the test bed."""
     return Routes(read_steps(folder / section.word("steps")), stage_limits(section))
 
 

@@ -22,22 +22,22 @@ __all__ = ["KEYS", "SIMULATED", "Esp300Stage", "build", "without_hardware"]
 KEYS = ("port", "axis", *LIMITS)
 SIMULATED = False
 MILLIMETRE = "millimeter"
-"""As pymeasure calls the unit that the axis must be set to (SN2)."""
+"""Pymeasure's name of the unit to which the axis must be set (SN2)."""
 
 
 class Esp300Stage(LibraryAxis):
-    """One axis of the controller.
+    """One axis of an ESP300 controller.
 
     Parameters
     ----------
     controller : pymeasure.instruments.newport.ESP300
-        Connected.
+        The connected controller.
     axis : pymeasure.instruments.newport.esp300.Axis
-        Of the stage.
+        The axis of the stage.
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     limits : StageLimits
-        What it can do.
+        Limits of the stage.
 
     Raises
     ------

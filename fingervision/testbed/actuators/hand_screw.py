@@ -1,4 +1,4 @@
-"""A micrometer screw that a person turns, typing in its readings."""
+"""A micrometer screw that a person turns; the person types in its readings."""
 
 from math import isfinite
 from pathlib import Path
@@ -26,16 +26,16 @@ AN_INSTANT_S = 1e-4
 
 
 class HandScrew:
-    """Positions are asked for on the terminal; a motion lasts until its reading is typed.
+    """Actuator whose positions are requested on the terminal; a motion lasts until its reading is typed.
 
     Parameters
     ----------
     limits : StageLimits
-        What the screw can do; the force is that of a hand, which nobody limits.
+        Limits of the screw; the force of the hand is not limited.
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     terminal : Terminal
-        Where questions go to and answers come from.
+        Terminal for questions and answers.
     """
 
     name = "hand screw"
@@ -76,7 +76,7 @@ class HandScrew:
         """Do nothing: the screw does not move by itself."""
 
     def readings(self) -> tuple[Reading, ...]:
-        """Typed positions, each preceded by the earlier position up to that time, and the present one."""
+        """Typed positions, each preceded by the earlier position up to the time of the change, and the present one."""
         turned, self._turned = self._turned, []
         now_s = self._clock.now_s()
         earlier = [reading for reading in turned if reading.device_s < now_s]
@@ -132,7 +132,7 @@ def _limits(section: Section) -> StageLimits:
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
-    """Limits of the stage, for checking a plan without the bed."""
+    """Limits of the stage, for checking a plan without opening the test bed."""
     return FreeMoves(_limits(section))
 
 

@@ -1,4 +1,4 @@
-"""A simulated actuator modelled on that of Hricko & Havlik (2015), with its encoder, its accuracy and its play."""
+"""A simulated actuator modelled on that of Hricko & Havlik (2015), with its encoder, accuracy and play."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,18 +35,18 @@ Array = NDArray[np.float64]
 
 
 class SimulatedActuator:
-    """The simulated stage behind a board with its own clock.
+    """The simulated stage, connected to a board with its own clock.
 
     Parameters
     ----------
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     stage : SimulatedStage
-        What moves.
+        The stage that moves.
     limits : StageLimits
-        What it can do.
+        Limits of the stage.
     rng : numpy.random.Generator
-        Of clock and answering times.
+        Generator for the board's clock and response times.
     """
 
     name = "simulated actuator"
@@ -62,7 +62,7 @@ class SimulatedActuator:
 
     @property
     def busy(self) -> bool:
-        """Whether it moves."""
+        """Whether the actuator moves."""
         return self._clock.now_s() < self._stage.planned_until_s
 
     @property
@@ -71,7 +71,7 @@ class SimulatedActuator:
         return self._alarm
 
     def raise_alarm(self, alarm: Alarm | None) -> None:
-        """Raise an alarm as a motor controller does (the stage stops and refuses to move), or clear it with None."""
+        """Raise an alarm as a motor controller does (the stage stops and refuses to move), or reset it with None."""
         self._alarm = alarm
         if alarm is not None:
             self.stop()
@@ -86,13 +86,13 @@ class SimulatedActuator:
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
-        """Begin to move."""
+        """Begin to move to a position at a positive speed."""
         check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
         self._stage.go(self._clock.now_s(), to_mm, speed_mm_s)
 
     def jog(self, speed_mm_s: float) -> None:
-        """Begin to move until stopped or at a limit."""
+        """Begin to move until stopped or until a limit is reached."""
         check_speed(self.limits, abs(speed_mm_s))
         self._ready()
         if speed_mm_s != 0.0:
@@ -106,7 +106,7 @@ class SimulatedActuator:
         )
 
     def stop(self) -> None:
-        """Stop at once."""
+        """Stop the motion at once."""
         self._stage.halt(self._clock.now_s())
 
     def readings(self) -> tuple[Reading, ...]:
@@ -139,7 +139,7 @@ class SimulatedActuator:
         return np.array([at_s for at_s in around_s if began_s < at_s < self._read_until_s])
 
     def _borders_s(self, began_s: float) -> list[float]:
-        """Times at which the stage passed from one encoder step to the next, by bisection (s)."""
+        """Times at which the stage passed from one encoder step to the next, found by bisection (s)."""
         grid_s = np.linspace(began_s, self._read_until_s, int((self._read_until_s - began_s) / EDGE_GRID_S) + 2)
         cells = self._stage.at_mm(grid_s) / self._step_mm + 0.5
         low_s, high_s, border = [], [], []
@@ -191,7 +191,7 @@ def _limits(section: Section) -> StageLimits:
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
-    """Limits of the stage, for checking a plan without the bed."""
+    """Limits of the stage, for checking a plan without opening the test bed."""
     return FreeMoves(_limits(section))
 
 

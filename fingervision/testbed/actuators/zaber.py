@@ -3,8 +3,8 @@
 `port` is a serial port, or HOST:PORT of a controller in the network. `microstep_mm` is the stage's microstep size from
 its data sheet. Positions are sent and read in microsteps, speeds in microsteps/s x 1.6384 (Zaber, "ASCII Protocol
 Manual", units), so that neither a device database nor a network is needed. Tested with zaber-motion against an emulated
-device in the network, written from the manual (tests/adapters/ zaber_device.py); not on hardware. The library's own
-mock connection cannot be used, because it answers no commands.
+device in the network, written from the manual (tests/adapters/zaber_device.py); not on hardware. The library's own mock
+connection cannot be used, because it responds to no commands.
 """
 
 from collections.abc import Callable
@@ -23,24 +23,24 @@ __all__ = ["KEYS", "SIMULATED", "ZaberStage", "build", "without_hardware"]
 KEYS = ("port", "device", "axis", "microstep_mm", *LIMITS)
 SIMULATED = False
 SPEED_UNIT = 1.6384
-"""Native speed of one microstep per second (Zaber, "ASCII Protocol Manual", maxspeed)."""
+"""Value of one microstep per second in native speed units (Zaber, "ASCII Protocol Manual", maxspeed)."""
 
 
 class ZaberStage(LibraryAxis):
-    """One axis of a device.
+    """One axis of a Zaber device.
 
     Parameters
     ----------
     connection : zaber_motion.ascii.Connection
-        Open.
+        The open connection.
     axis : zaber_motion.ascii.Axis
-        Of the stage.
+        The axis of the stage.
     microstep_mm : float
-        Way of one microstep.
+        Distance of one microstep.
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     limits : StageLimits
-        What it can do.
+        Limits of the stage.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A board after its set-up: its lines, its force channel, its clock."""
+"""A board after its set-up, with its lines, its force channel and its clock."""
 
 import random
 from collections import deque
@@ -30,23 +30,23 @@ DROPPED = {
 
 @dataclass(frozen=True, slots=True)
 class ForceSample:
-    """Level of the force channel, 0 to 1023, with the board's time."""
+    """Level of the force channel, 0 to 1023, with the time on the board's clock."""
 
     board_s: float
     level: int
 
 
 class Board:
-    """A board, opened by `opened`. Several parts of a bed may share it.
+    """A board, opened by `opened`. Several parts of a test bed may use the same board.
 
     Parameters
     ----------
     settings : BoardSettings
-        Its wiring.
+        Wiring of the board.
     link : BoardLink
-        Its connection.
+        Connection to the board.
     identity : wire.Identity
-        What it says it is.
+        Identity that the board reports.
     """
 
     def __init__(self, settings: BoardSettings, link: BoardLink, identity: wire.Identity) -> None:
@@ -70,7 +70,7 @@ class Board:
 
     @property
     def dropped(self) -> str | None:
-        """Reason why the drive line was released, in words; None if it was not."""
+        """Reason in words why the drive line was released; None if it was not."""
         words = DROPPED.get(self._cause)
         return None if words is None else words.format(silence_ms=self.settings.silence_ms)
 
@@ -81,7 +81,7 @@ class Board:
 
     @property
     def clock(self) -> JoinedClock:
-        """The board's clock, synchronised with the host's."""
+        """Relation of the board's clock to the computer's clock."""
         joined = self._link.joined
         assert joined is not None  # noqa: S101 - a board is opened only with its clock joined
         return joined
@@ -95,14 +95,14 @@ class Board:
     def driven_board_s(self) -> float | None:
         """Time of the drive line's last rising edge on the board's clock (s).
 
-        None if there was none since the last `run`.
+        None is returned if there was no rising edge since the last `run`.
         """
         return self._driven_board_s
 
     def run(self, code: int, at_most_s: float) -> None:
-        """Set the select lines, let them settle, raise the drive line.
+        """Set the select lines, wait until they have settled, and raise the drive line.
 
-        The board releases it at the latest after `at_most_s`.
+        The board releases the drive line after `at_most_s` at the latest.
         """
         self._driven_board_s = None
         self._do(f"R {code:X} {ceil(1e3 * at_most_s):X}")
@@ -129,7 +129,7 @@ class Board:
 
     @property
     def ready(self) -> bool:
-        """Whether a motion may begin: the drive line was not released by a fault, and any enable line is up."""
+        """Whether a motion may begin: no fault has released the drive line, and the enable line (if any) is up."""
         enabled = Role.ENABLE not in self.settings.lines or wire.Levels.ENABLE in self.levels
         return enabled and self.dropped is None
 
@@ -141,7 +141,7 @@ class Board:
             self._do("E 1")
 
     def wait(self, seconds: float) -> None:
-        """Wait until a message has come from the board, at most for so many seconds."""
+        """Wait until a message has come from the board, at most for the given number of seconds."""
         self._link.wait(seconds)
         self._link.check()
 
@@ -160,7 +160,7 @@ class Board:
         return self
 
     def close(self) -> None:
-        """Unregister one part; with the last one, release all lines and close the port."""
+        """Unregister one part; when the last one unregisters, release all lines and close the port."""
         self._users -= 1
         if self._users != 0:
             return

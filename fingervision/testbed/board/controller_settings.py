@@ -1,4 +1,4 @@
-"""Differences between motor controllers: their codes on the select lines, and the time that they need."""
+"""Differences between motor controllers: their codes on the select lines, and their response times."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ HOME_WITHIN_S, BUSY_WITHIN_S, ENABLE_S, LONGEST_S = 10.0, 0.5, 0.5, 60.0
 
 @dataclass(frozen=True, slots=True)
 class Codes:
-    """Codes by which the select lines of the controller select its steps.
+    """Codes on the select lines by which the steps of the controller are selected.
 
     Parameters
     ----------
     first : int
-        Code of step 1; the others follow.
+        Code of step 1; the codes of the other steps follow in order.
     home : int or None
-        Code of the return to the reference, if the controller has one.
+        Code for the return to the reference, if the controller has one.
     """
 
     first: int
@@ -33,11 +33,11 @@ class Waits:
     Parameters
     ----------
     home_s : float
-        The return to the reference.
+        Time for the return to the reference.
     busy_s : float
-        From the drive line to the busy line.
+        Time from the drive line to the busy line.
     enable_s : float
-        From the enable line to readiness; 0 without an enable line.
+        Time from the enable line to readiness; 0 without an enable line.
     """
 
     home_s: float
@@ -59,7 +59,7 @@ def codes_of(section: Section, data: StepData) -> Codes:
 
 
 def waits_of(section: Section) -> Waits:
-    """Read the times."""
+    """Read the time limits."""
     return Waits(
         section.number("home_within_s", HOME_WITHIN_S, above=0.0, high=LONGEST_S),
         section.number("busy_within_s", BUSY_WITHIN_S, above=0.0, high=LONGEST_S),

@@ -1,4 +1,4 @@
-"""One motion by parallel lines: select, settle, drive, busy, not busy; each phase with its own time limit."""
+"""One motion by parallel lines: select, settle, drive, busy, not busy; each phase has its own time limit."""
 
 import gc
 from collections.abc import Callable, Iterator
@@ -18,9 +18,9 @@ WAIT_S = 0.01
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Suspend Python's cyclic garbage collection: with large libraries loaded it stops all threads for 0.1 s.
+    """Suspend Python's cyclic garbage collection, which with large libraries loaded stops all threads for 0.1 s.
 
-    The board would take such a pause for a lost computer and stop the motor.
+    The board would interpret such a pause as a lost connection and stop the motor.
     """
     was_on = gc.isenabled()
     gc.disable()
@@ -38,13 +38,13 @@ class Handshake:
     Parameters
     ----------
     board : Board
-        Set up.
+        The board, after its set-up.
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     busy_s : float
-        The motor controller answers the drive line with busy within this.
+        Longest time between the drive line and the controller's busy signal.
     stopped : threading.Event
-        Set when somebody wants the motion to end.
+        Event that is set when the motion should end.
     """
 
     board: Board
@@ -53,16 +53,16 @@ class Handshake:
     stopped: Event
 
     def run(self, code: int, at_most_s: float, on_driven: Callable[[float], None]) -> bool:
-        """Run the step of a code to its end; return False where it was stopped, or ended by the board.
+        """Execute the step of a code to its end; return False if it was stopped, or ended by the board.
 
         Parameters
         ----------
         code : int
-            For the select lines.
+            Code on the select lines.
         at_most_s : float
-            Longest time of the motion.
+            Longest duration of the motion.
         on_driven : callable
-            Told the host's time at which the drive line rose.
+            Called with the computer's time at which the drive line rose.
 
         Raises
         ------

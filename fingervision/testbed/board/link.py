@@ -1,7 +1,7 @@
 """Connection to a board: commands and their answers, streamed messages, and the board's watchdog.
 
-A thread of the link reads all the time. It also requests the state every few milliseconds. This tells the board that
-the computer is alive, tells the link that the board is alive, and synchronises their clocks.
+A thread of the link reads all the time. It also requests the state every few milliseconds, which shows the board that
+the computer is alive, shows the link that the board is alive, and synchronises the two clocks.
 """
 
 import random
@@ -50,23 +50,23 @@ class Listener(Protocol):
         ...
 
     def on_change(self, change: wire.Change, board_s: float) -> None:
-        """Lines have changed."""
+        """Receive a change of lines."""
         ...
 
     def on_sample(self, sample: wire.Sample, board_s: float) -> None:
-        """A force sample."""
+        """Receive a force sample."""
         ...
 
 
 class BoardLink:
-    """One open port.
+    """The connection through one open port.
 
     Parameters
     ----------
     port : serial.Serial
-        Open.
+        The open port.
     clock : Clock
-        The host's time; it must be that of the machine (a virtual one does not pass while the board works).
+        Clock of the computer; it must run in real time (a virtual clock does not advance while the board works).
     """
 
     def __init__(self, port: serial.Serial, clock: Clock) -> None:
@@ -91,7 +91,7 @@ class BoardLink:
 
     @property
     def joined(self) -> JoinedClock | None:
-        """The board's clock relative to the host's; None in the first moments."""
+        """Relation of the board's clock to the computer's; None in the first moments."""
         return self._joined
 
     @property
@@ -100,7 +100,7 @@ class BoardLink:
         return self._stopping
 
     def keep_awake(self, session: int, listener: Listener) -> None:
-        """Begin to request the state and to pass messages to a listener; fail if the board is lost or was reset."""
+        """Start to request the state and to pass messages to a listener; fail if the board is lost or was reset."""
         self._session, self._listener = session, listener
         self._last_heard_s = self._clock.now_s()
         self._awake = True
@@ -111,13 +111,13 @@ class BoardLink:
             raise DeviceError(self._failure)
 
     def wait(self, seconds: float) -> None:
-        """Wait until a message has come from the board, at most for so many seconds."""
+        """Wait until a message has come from the board, at most for the given number of seconds."""
         with self._news:
             if self._failure is None:
                 self._news.wait(seconds)
 
     def command(self, words: str, within_s: float = ANSWER_WITHIN_S) -> wire.Answer | wire.Identity:
-        """Send a command, repeat it if its answer is lost, and return the answer. The board executes it only once.
+        """Send a command, repeat it if the response is lost, and return the response. The board executes it only once.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class BoardLink:
         )
 
     def stop(self) -> None:
-        """Let the link's thread tell the board to stop, repeatedly until the board confirms.
+        """Let the link's thread send a stop to the board, repeatedly until the board confirms it.
 
         The call only sets a flag, so that a signal handler may use it at any time.
         """

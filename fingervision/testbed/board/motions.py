@@ -1,4 +1,4 @@
-"""Motions through a board, one handshake after another in a thread of its own, and the resulting position."""
+"""Motions through a board: handshakes one after another in a separate thread, and the resulting position."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One handshake: a code, its time limit, and its change of position; None stands for the reference."""
+    """One handshake: a code, its time limit, and its change of position (None for the return to the reference)."""
 
     code: int
     at_most_s: float
@@ -27,18 +27,18 @@ class Run:
 
 
 class Motions:
-    """Runs handshakes, and computes the position from their profiles, because parallel lines report none.
+    """Executes handshakes, and computes the position from their profiles, because parallel lines report none.
 
     Parameters
     ----------
     board : Board
-        Set up.
+        The board, after its set-up.
     waits : Waits
-        What the controller is given time for.
+        Time limits for the controller's signals.
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     start_mm : float
-        Where the stage is taken to stand at first.
+        Assumed position of the stage at the start.
     """
 
     def __init__(self, board: Board, waits: Waits, clock: Clock, start_mm: float) -> None:
@@ -58,7 +58,7 @@ class Motions:
         return self._worker is not None and self._worker.is_alive()
 
     def forget_stop(self) -> None:
-        """Ignore stops requested until now."""
+        """Ignore stops requested before this call."""
         self._stopped.clear()
 
     def stop(self) -> None:
@@ -67,7 +67,7 @@ class Motions:
         self._board.stop()
 
     def begin(self, runs: Sequence[Run]) -> None:
-        """Begin to run handshakes, one after another."""
+        """Begin to execute handshakes, one after another."""
         if not runs:
             return
         self._board.wait_for_stop()
@@ -78,7 +78,7 @@ class Motions:
         self._worker.start()
 
     def wait(self, seconds: float) -> None:
-        """Wait for the end of the present motions, at most for so many seconds."""
+        """Wait for the end of the present motions, at most for the given number of seconds."""
         if self._worker is not None:
             self._worker.join(timeout=seconds)
 

@@ -38,7 +38,7 @@ def holders_of(name: str) -> tuple[int, ...]:
 
 
 def fingervision_at(name: str) -> int | None:
-    """Process of another fingervision that has a port open, and may be asked to end; None if there is none."""
+    """Number of another fingervision process that has a port open, and may be asked to end; None if there is none."""
     for process in holders_of(name):
         try:
             words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")

@@ -1,4 +1,4 @@
-"""One board for all parts of a bed that name the same file."""
+"""One board object for all parts of a test bed that name the same board file."""
 
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.toml_section import Section
@@ -9,7 +9,7 @@ KEY = "board"
 
 
 def board_of(section: Section, context: BuildContext) -> Board:
-    """Return the board named by the key `board` of a part's section, opened once.
+    """Return the board named by the key `board` of a part's section; it is opened once.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Messages between computer and board, one per line, as in the board's sketch (`firmware/README.md`).
+"""Messages between computer and board, one per line, as defined by the board's sketch (`firmware/README.md`).
 
 A line is `words*CRC` with a line feed; the CRC is CRC-16/XMODEM of the words, in four hexadecimal digits.
 """
@@ -28,7 +28,7 @@ class Levels(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Identity that a board reports."""
+    """Identity that a board reports about itself."""
 
     number: int
     name: str
@@ -38,22 +38,23 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A command was executed; this is the state after it.
+    """Response to an executed command, with the state after it.
 
     Parameters
     ----------
     number : int
-        Of the command.
+        Number of the command.
     time_us : int
-        Board's time when the command was received; wraps at 2**32.
+        Time on the board's clock at which the command was received; wraps at 2**32.
     session : int
-        Of the set-up; 0 after a reset.
+        Number of the set-up; 0 after a reset.
     levels : Levels
-        Lines that say yes.
+        Active lines.
     changes : int
-        How many changes of lines the board has noticed, wrapping at 256.
+        Number of changes of lines noticed by the board, wrapping at 256.
     cause : str
-        Why the drive line was dropped: w silence, l too long, a alarm, h by the computer, - not at all.
+        Reason why the drive line was released: w no message from the computer, l motion too long, a alarm, h by the
+        computer, - not released.
     """
 
     number: int
@@ -66,7 +67,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A command was not executed, for a reason in one word."""
+    """Response to a command that was not executed, with the reason in one word."""
 
     number: int
     reason: str
@@ -146,7 +147,7 @@ class Unwrapped:
     Parameters
     ----------
     bits : int
-        It wraps at 2**bits.
+        The counter wraps at 2**bits.
     """
 
     def __init__(self, bits: int) -> None:

@@ -1,1 +1,1 @@
-"""Cameras of the bed, one per file: a module with `KEYS` and `build(section, context)` is a kind."""
+"""Kinds of cameras for the test bed, one per module, each with `KEYS` and `build(section, context)`."""

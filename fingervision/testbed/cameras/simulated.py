@@ -1,4 +1,4 @@
-"""A simulated camera, which draws the fingers in their true positions at the time of exposure."""
+"""A simulated camera, which renders the fingers at their true positions at the time of exposure."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -47,7 +47,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedShot:
-    """A frame that is drawn when its picture is requested."""
+    """A frame that is rendered when its picture is requested."""
 
     index: int
     exposure: int
@@ -58,31 +58,32 @@ class SimulatedShot:
     camera: "SimulatedCamera"
 
     def item(self) -> Frame:
-        """Draw the picture."""
+        """Render the picture."""
         return Frame(self.camera.draw(self), self.index, self.device_s)
 
 
 class SimulatedCamera:
-    """A camera in front of the simulated gripper, with a clock of its own.
+    """A camera in front of the simulated gripper, with its own clock.
 
     Parameters
     ----------
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     gripper : SimulatedGripper
-        What it looks at.
+        The gripper in view.
     optics : Optics
-        Scale, lens, blur, noise and what is hidden in them.
+        Scale, lens, blur, noise and injected optical effects.
     size_px : (int, int)
         Width and height.
     rate_hz : float
-        Frames in a second.
+        Frames per second.
     arrival_s : (float, float)
-        Least time from exposure to arrival, and the mean of what comes on top.
+        Smallest latency from exposure to arrival, and mean of the additional latency.
     fingers_mm : (float, float, float, float)
-        Width of the fingers, radius of their tips, how far off the picture's middle they stand, measuring height.
+        Width of the fingers, radius of their tips, their offset from the picture's centre, and distance of the
+        measuring point below the tips.
     seed : int
-        Of clock, arrivals and noise.
+        Seed of clock, latencies and noise.
     """
 
     def __init__(
@@ -109,7 +110,7 @@ class SimulatedCamera:
         gripper.looked_at(self._own.bed_s(self._exposure / rate_hz), 1.0 / (rate_hz * self._own.rate))
 
     def next(self) -> SimulatedShot:
-        """Wait for the next frame; frames that nobody waited for are lost."""
+        """Wait for the next frame; frames for which nobody waited are lost."""
         while True:
             device_s = self._exposure / self._rate_hz
             exposed_s = self._own.bed_s(device_s)
@@ -130,7 +131,7 @@ class SimulatedCamera:
         """Do nothing: there is no hardware to release."""
 
     def draw(self, shot: SimulatedShot) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-        """Draw the picture of a shot."""
+        """Render the picture of a shot."""
         optics, placed = self._optics, shot.placed
         if placed.slot_mm is not None:
             scene = self._slot(self._gripper.slot_at(placed.slot_mm, shot.exposed_s - optics.late_s))

@@ -1,4 +1,4 @@
-"""Any live source of frames as the bed's camera: a camera of this machine, or a network stream."""
+"""Any live source of frames as the test bed's camera: a camera of this machine, or a network stream."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -33,21 +33,21 @@ class SourceShot:
     received: Frame | LostFrame
 
     def item(self) -> Frame | LostFrame:
-        """Give the picture."""
+        """Return the picture."""
         return self.received
 
 
 class SourceCamera:
-    """Reads a source in a thread of its own, and delivers frames on request.
+    """Reads a source in a separate thread, and delivers frames on request.
 
     Parameters
     ----------
     source : LiveSource
-        Open.
+        The open source.
     latency : Latency
-        From exposure to arrival, as far as it is known.
+        Latency from exposure to arrival, as far as it is known.
     patience_s : float
-        Without a frame for so long the camera is stale.
+        Time without a frame after which the camera counts as failed.
     """
 
     def __init__(self, source: LiveSource, latency: Latency, patience_s: float) -> None:
@@ -96,7 +96,7 @@ class SourceCamera:
 
 
 def build(section: Section, context: BuildContext) -> SourceCamera:
-    """Open the source as its section of the configuration states."""
+    """Open the source that its section of the configuration states."""
     name = section.word("source")
     size = None
     if "width_px" in section.values or "height_px" in section.values:

@@ -1,1 +1,1 @@
-"""The bed's clock, and its synchronisation with the clocks of cameras and boards."""
+"""The test bed's clock, and its synchronisation with the clocks of cameras and boards."""

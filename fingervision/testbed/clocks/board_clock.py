@@ -1,9 +1,9 @@
 """Synchronisation of the board's clock with the host's: offset and rate, with their uncertainty.
 
-The board stamps the time at which it receives a command; that time lies between the sending of the command and the
-arrival of its answer (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many exchanges
-narrow the interval: the rate is fitted to their midpoints, and the offset is the midpoint of the intersection of their
-intervals.
+The board records the time at which it receives a command; that time lies between the sending of the command and the
+arrival of the response (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many such
+exchanges narrow the interval: the clock rate is fitted to the midpoints, and the offset is the midpoint of the
+intersection of the intervals.
 """
 
 from collections import deque
@@ -25,18 +25,18 @@ UNKNOWN_RATE = 0.008
 
 @dataclass(frozen=True, slots=True)
 class JoinedClock:
-    """Host time as a linear function of the board's time, near the exchanges to which it was fitted.
+    """The computer's time as a linear function of the board's time, near the exchanges to which it was fitted.
 
     Parameters
     ----------
     board_s : float
-        Board's time in the middle of the exchanges.
+        Time of the board in the middle of the exchanges.
     host_s : float
-        Host's time then.
+        Time of the computer at that instant.
     rate : float
-        Host seconds in a board second.
+        Seconds of the computer per second of the board.
     within_s : float
-        `host_s` is true within +- this.
+        Bound of the error of `host_s`.
     u_rate : float
         Standard uncertainty of the rate.
     """
@@ -68,7 +68,7 @@ class ClockJoin:
         self._exchanges: deque[tuple[float, float, float]] = deque()
 
     def add(self, board_s: float, earliest_s: float, latest_s: float) -> None:
-        """Add an exchange: the board's time stamp, and the host times between which it was taken."""
+        """Add an exchange: the board's time stamp, and the computer's times between which it was taken."""
         self._exchanges.append((board_s, earliest_s, max(latest_s, earliest_s)))
         while self._exchanges[-1][1] - self._exchanges[0][1] > WINDOW_S:
             self._exchanges.popleft()

@@ -1,8 +1,9 @@
-"""Synchronisation of a camera's clock with the bed's, from the arrival times of its frames.
+"""Synchronisation of a camera's clock with the test bed's clock, from the arrival times of its frames.
 
-A frame arrives no sooner than its exposure plus the least latency, and occasionally hardly later. The earliest arrivals
-therefore lie on a line, whose slope is the rate and whose height is the offset plus the least latency. Arrival times
-alone cannot separate these two, so the least latency must be known (`Latency` of the camera).
+A frame arrives at the earliest at its exposure plus the smallest latency, and occasionally hardly later. The earliest
+arrivals therefore lie on a line, whose slope is the rate and whose intercept is the offset plus the smallest latency.
+Arrival times alone cannot separate offset and latency, so that the smallest latency must be known (`Latency` of the
+camera).
 """
 
 from dataclasses import dataclass
@@ -24,16 +25,16 @@ FIRST_SCATTER_S = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class CameraClock:
-    """The bed's time as a linear function of the camera's time.
+    """The test bed's time as a linear function of the camera's time.
 
     Parameters
     ----------
     camera_s, bed_s : float
-        An instant on both.
+        Times of one instant on the two clocks.
     rate : float
-        Seconds of the bed in one of the camera's.
+        Seconds of the test bed's clock per second of the camera's.
     u_s : float
-        Standard uncertainty near that instant: that of the least latency, and the scatter of the earliest arrivals.
+        Standard uncertainty near that instant, from the smallest latency and the scatter of the earliest arrivals.
     """
 
     camera_s: float
@@ -52,7 +53,7 @@ class ArrivalClock:
     Parameters
     ----------
     latency : Latency
-        Of the camera.
+        Latency of the camera.
     """
 
     def __init__(self, latency: Latency) -> None:
@@ -61,7 +62,7 @@ class ArrivalClock:
         self._bins: list[tuple[float, float, float]] = []
 
     def add(self, camera_s: float, arrived_s: float) -> None:
-        """Take a frame."""
+        """Add the arrival of a frame."""
         delay_s = arrived_s - self._latency.least_s - camera_s
         if not self._bins or camera_s - self._bins[-1][0] > BIN_S:
             self._bins = [*self._bins[-MOST_BINS + 1 :], (camera_s, camera_s, delay_s)]

@@ -1,4 +1,4 @@
-"""The bed's clock: the host's, or a virtual one that advances with the simulation."""
+"""The test bed's clock: the computer's, or a virtual clock that advances with the simulation."""
 
 from time import monotonic, sleep
 from typing import Protocol
@@ -8,7 +8,7 @@ MOST_HURRY_S = 0.05
 
 
 class Clock(Protocol):
-    """The bed's time, to which every `asked_s`, `got_s` and `arrived_s` refers."""
+    """The test bed's time, to which every `asked_s`, `got_s` and `arrived_s` refers."""
 
     def now_s(self) -> float:
         """Seconds since a fixed instant."""
@@ -20,30 +20,30 @@ class Clock(Protocol):
 
 
 class HostClock:
-    """The host's monotonic clock, used for any bed with a real part."""
+    """The computer's monotonic clock, used for any test bed with a real part."""
 
     def now_s(self) -> float:
         """Seconds on the host's monotonic clock."""
         return monotonic()
 
     def wait_until(self, time_s: float) -> None:
-        """Sleep until then."""
+        """Sleep until the given time."""
         left_s = time_s - monotonic()
         if left_s > 0.0:
             sleep(left_s)
 
 
 class VirtualClock:
-    """Clock of a bed without any real part: its time passes only while somebody waits.
+    """Clock of a completely simulated test bed: its time advances only while some part waits.
 
-    With a pace, it passes no faster than that; time lost by a pause or a busy machine is not made up for.
+    With a pace, time advances no faster than that; time lost by a pause or a busy machine is not made up for.
 
     Parameters
     ----------
     pace : float
-        Seconds of the bed in a second of the host: 1 is real time, 0 as fast as it goes.
+        Seconds of the test bed per second of the computer: 1 is real time, 0 as fast as possible.
     begin_s : float
-        Its first time: that much has passed before.
+        Time at which the clock starts, as if that time had already passed.
     """
 
     def __init__(self, pace: float = 0.0, begin_s: float = 0.0) -> None:

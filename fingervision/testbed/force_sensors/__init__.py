@@ -1,1 +1,1 @@
-"""Force sensors, one per file: a module with `KEYS` and `build(section, context)` is a kind."""
+"""Kinds of force sensors, one per module, each with `KEYS` and `build(section, context)`."""

@@ -1,4 +1,4 @@
-"""A force sensor with an analogue output, read by the board's converter."""
+"""A force sensor with an analogue output, which the board's analogue-to-digital converter reads."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -23,19 +23,19 @@ WAIT_S = 0.005
 
 
 class BoardForceSensor:
-    """Converts volts to newtons by a measured table.
+    """Force sensor that converts volts to newtons by a measured table.
 
     Parameters
     ----------
     board : Board
-        Set up, with a force line.
+        The board, after its set-up, with a force line.
     volts, newtons : sequence of float, length n
-        The table: volts increasing. Between its rows the force is linear, beyond them it goes on as between the last
-        two, so that an overload is never taken for less.
+        Calibration table with increasing volts. The force is interpolated linearly between rows, and extrapolated
+        linearly beyond them, so that an overload is not underestimated.
     reference_v : float
-        Voltage that the converter compares with (AVcc, the board's 5 V).
+        Reference voltage of the converter (AVcc, the board's 5 V).
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     """
 
     def __init__(
@@ -48,11 +48,11 @@ class BoardForceSensor:
 
     @property
     def name(self) -> str:
-        """Board, port and firmware."""
+        """Names of board, port and firmware."""
         return f"force sensor at {self._board.name}"
 
     def readings(self) -> tuple[Reading, ...]:
-        """Forces since the last call, each with the bounds of its time on the host's clock.
+        """Forces since the last call, each with bounds of its time on the computer's clock.
 
         Raises
         ------
@@ -72,7 +72,7 @@ class BoardForceSensor:
         )
 
     def force_n(self, level: int) -> float:
-        """Force at a level of the converter, taken at the centre of its step (N)."""
+        """Force at a level of the converter, evaluated at the centre of the converter's step (N)."""
         volts, newtons = self._volts, self._newtons
         at_v = (level + 0.5) * self._reference_v / CONVERTER_STEPS
         if volts[0] <= at_v <= volts[-1]:

@@ -23,19 +23,19 @@ class SimulatedForceSensor:
     Parameters
     ----------
     clock : Clock
-        The bed's.
+        Clock of the test bed.
     gripper : SimulatedGripper
-        What is pushed.
+        The gripper whose drive force is measured.
     full_scale_n : float
-        Largest force, either way.
+        Largest measurable force, in either direction.
     noise_n : float
         Standard deviation of one sample.
     rate_hz : float
-        Samples in a second.
+        Samples per second.
     step_n : float
-        One step of the converter.
+        Quantisation step of the converter.
     rng : numpy.random.Generator
-        Of clock and noise.
+        Generator for clock and noise.
     """
 
     name = "simulated force sensor"

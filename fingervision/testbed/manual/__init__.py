@@ -1,1 +1,1 @@
-"""Motions that a person requests one by one, and sequences of step data."""
+"""Motions that a person requests individually, and sequences of step data."""

@@ -1,4 +1,4 @@
-"""Single motions on request, monitored until they end and stopped at a limit."""
+"""Individual motions on request, monitored until they end and stopped at a limit."""
 
 import signal
 import threading
@@ -17,19 +17,19 @@ WARNING_S = 0.1
 
 
 class Interrupted(BaseException):
-    """Ctrl-C or a request to end; the motor was stopped before it was raised."""
+    """Ctrl-C or a request to end; the motor was stopped before this exception was raised."""
 
 
 @dataclass(frozen=True, slots=True)
 class Looking:
-    """How a motion is monitored: normally by the bed's instruments alone, on the page also by every frame.
+    """How a motion is monitored: normally by the test bed's instruments alone, in the browser also by every frame.
 
     Parameters
     ----------
     wait : callable
-        Lets a little time of the bed pass.
+        Waits for a short time of the test bed.
     position_mm, force_n : callable
-        The newest readings; None where there is no force sensor.
+        Return the latest readings; the force is None without a force sensor.
     """
 
     wait: Callable[[], None]
@@ -38,7 +38,7 @@ class Looking:
 
 
 def by_instruments(bed: Bed) -> Looking:
-    """Monitor a motion by the bed's own readings."""
+    """Monitor a motion by the test bed's own readings."""
     return Looking(
         lambda: bed.clock.wait_until(bed.clock.now_s() + LOOK_EVERY_S),
         lambda: bed.actuator.readings()[-1].value,
@@ -66,12 +66,12 @@ def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
 
 
 def home(bed: Bed, looking: Looking | None = None) -> float:
-    """Go to the reference; return the position afterwards (mm)."""
+    """Move to the reference; return the position afterwards (mm)."""
     return _watched(bed, bed.actuator.home, looking=looking)
 
 
 def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = None) -> float:
-    """Move within the bed's limits; return the position afterwards (mm).
+    """Move within the test bed's limits; return the position afterwards (mm).
 
     Raises
     ------
@@ -92,7 +92,7 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
 
 
 def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None = None) -> float:
-    """Move at a signed speed until stopped, for a time, or to the bed's limit; return the position afterwards (mm)."""
+    """Move at a signed speed until stopped, for a time, or to a limit; return the position afterwards (mm)."""
     _check_speed(bed, abs(speed_mm_s))
     end_mm = bed.limits.upper_mm if speed_mm_s > 0.0 else bed.limits.lower_mm
     # A block that has begun goes to its end unless it is stopped in time.

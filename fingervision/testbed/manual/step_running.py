@@ -1,4 +1,4 @@
-"""Run a sequence of step data on a bed."""
+"""Run a sequence of step data on a test bed."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,16 +16,16 @@ from fingervision.testbed.motion.step_checks import PlannedMotion, planned_seque
 
 
 def step_limits(bed_name: str) -> StageLimits:
-    """Limits of a bed's stage, without opening it; the published figures where its file states no others."""
+    """Limits of a test bed's stage, without opening it; the published values if its file states no others."""
     if bed_name == SIMULATED:
         return PUBLISHED
     return stage_limits(read_configuration(bed_name).table("actuator"))
 
 
 def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> None:
-    """Go to the reference, then run the sequence, after all of it was checked against the bed's limits.
+    """Move to the reference, then run the sequence, after all of it was checked against the limits.
 
-    An actuator without step data goes to each target at the step's peak speed.
+    An actuator without step data moves to each target at the step's peak speed.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def _within(bed: Bed) -> StageLimits:
 
 
 def _check_kept(data: StepData, bed_name: str) -> None:
-    """Refuse to run steps by number if the motor controller keeps other steps under these numbers."""
+    """Refuse to run steps by number if other steps are stored in the motor controller under these numbers."""
     top = read_configuration(bed_name)
     section = top.table("actuator")
     if "steps" not in section.values:

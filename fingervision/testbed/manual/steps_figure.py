@@ -1,4 +1,4 @@
-"""Figure of a sequence of steps: position and speed over time."""
+"""Plot of a sequence of steps: position and speed over time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ TITLE_PAD_POINTS = 30.0
 
 
 def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: StageLimits) -> None:
-    """Draw position and speed of a sequence over time, with each motion numbered and pushing ones shaded.
+    """Plot position and speed of a sequence over time, with motions numbered and pushing motions shaded.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
 
 
 def _draw_motion(upper: Axes, lower: Axes, planned: PlannedMotion, begin_s: float, standing_s: float) -> float:
-    """Draw one motion and the pause after it; return the time of its end (s)."""
+    """Plot one motion and the pause after it; return the time of its end (s)."""
     motion = planned.motion
     end_s = begin_s + motion.seconds
     since_s = np.append(np.linspace(0.0, motion.seconds, POINTS_PER_MOTION), motion.seconds + standing_s)

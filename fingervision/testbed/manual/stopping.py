@@ -1,4 +1,4 @@
-"""Stop a bed, also one that is driven by another process."""
+"""Stop a test bed, also if another process operates it."""
 
 import os
 import signal
@@ -13,12 +13,12 @@ LOOK_EVERY_S = 0.02
 
 
 def stop_bed(name: str) -> str:
-    """Stop a bed's motor, and return a sentence on what was done.
+    """Stop a test bed's motor, and return a sentence that says what was done.
 
     Parameters
     ----------
     name : str
-        `simulated`, or a configuration file.
+        `simulated`, or the path of a configuration file.
 
     Raises
     ------

@@ -20,23 +20,23 @@ class _Piece:
 
 
 class CommandedPath:
-    """Position over time; constant between motions.
+    """Position over time, constant between motions.
 
     Parameters
     ----------
     at_mm : float
-        Where it stands at first.
+        Initial position.
     """
 
     def __init__(self, at_mm: float) -> None:
         self._pieces: list[_Piece] = [_Piece(-np.inf, at_mm, MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0), np.inf)]
 
     def begin(self, begin_s: float, motion: MotionProfile) -> None:
-        """Begin a motion where the last one ended."""
+        """Begin a motion at the position where the last one ended."""
         self._pieces.append(_Piece(begin_s, self.at_mm(begin_s), motion, np.inf))
 
     def jump(self, time_s: float, to_mm: float) -> None:
-        """Set the position from a time on: after homing, or after a turn by hand."""
+        """Set the position from a time on, after homing or after a turn by hand."""
         self._pieces.append(_Piece(time_s, to_mm, MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0), np.inf))
 
     def break_off(self, time_s: float) -> None:
@@ -45,7 +45,7 @@ class CommandedPath:
         self._pieces[-1] = _Piece(last.begin_s, last.from_mm, last.motion, max(time_s, last.begin_s))
 
     def at_mm(self, time_s: float) -> float:
-        """Position at a time."""
+        """Position at a time (mm)."""
         piece = next((each for each in reversed(self._pieces) if each.begin_s <= time_s), self._pieces[0])
         since_s = min(time_s, piece.until_s) - piece.begin_s
         return piece.from_mm + float(piece.motion.travelled_mm(np.array([since_s]))[0])

@@ -1,10 +1,10 @@
-"""Interpolation of a stage's position between the steps of its encoder, from the times of its edges.
+"""Interpolation of a stage's position between the steps of its encoder, from the times of step transitions.
 
 An encoder resolves the position to one step; at a transition the stage is exactly at the border of two steps. Between
-two borders the stage is assumed to move at constant speed; where it stops follows from its speed until the controller
-reports the end of the motion. Without interpolation, an encoder step of 30 µm leaves 9 µm (30 / sqrt 12), which is 67
-µm of gap, and play would keep that error during a whole stop. Edges with time stamps to 4 µs leave nanometres; readings
-200 times a second at 0.5 mm/s leave 1 µm.
+two borders the stage is assumed to move at constant speed; its stopping position follows from its speed until the
+controller reports the end of the motion. Without interpolation, an encoder step of 30 µm causes a standard uncertainty
+of 9 µm (30 / sqrt 12), which is 67 µm of gap, and play would keep that error during a whole stop. With transitions
+time-stamped to 4 µs, the uncertainty is a few nanometres; with 200 readings per second at 0.5 mm/s, 1 µm.
 """
 
 from bisect import bisect_right
@@ -24,7 +24,7 @@ MOST_KNOTS = 4000
 
 @dataclass(frozen=True, slots=True)
 class Knot:
-    """A known position and its time on the instrument's clock."""
+    """A known position, with its time on the instrument's clock."""
 
     device_s: float
     position_mm: float
@@ -36,7 +36,7 @@ class StageTrack:
     Parameters
     ----------
     step_mm : float
-        The encoder's; 0 takes readings as they are.
+        Step of the encoder; 0 to use readings as they are.
     """
 
     def __init__(self, step_mm: float) -> None:
@@ -81,14 +81,14 @@ class StageTrack:
         Parameters
         ----------
         device_s : float
-            Not after the newest reading.
+            Time, not later than the newest reading.
         at_once : bool
-            Take what is known by now.
+            Whether to use what is known now, instead of waiting for further readings.
 
         Returns
         -------
         float or None
-            In mm; None where the next readings will tell it better, and those before `WAIT_FOR_BORDER_S`.
+            Position in mm; None if later readings, up to `WAIT_FOR_BORDER_S`, will determine it better.
         """
         if self._last is None:
             return 0.0

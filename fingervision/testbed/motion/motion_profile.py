@@ -1,9 +1,10 @@
 """Trapezoidal speed profile of one motion: acceleration, constant speed, deceleration.
 
-The formulas are those of uniformly accelerated motion. With equal accelerations the triangle of distance s and time T
-has its peak at v = 2 s / T with a = 4 s / T^2; the trapezoid of top speed v takes T = s / v + v / a. The shape that a
-real controller uses for a block in cycle-time entry is not published. Here it is the one with the least acceleration,
-hence the least force, that respects the top speed.
+The formulas are those of uniformly accelerated motion. With equal acceleration and deceleration, a triangular profile
+of distance s and time T has the peak speed v = 2 s / T and the acceleration a = 4 s / T^2; a trapezoidal profile of top
+speed v takes T = s / v + v / a. The profile that a real controller uses for a block specified by its cycle time is not
+published. Here it is the profile with the least acceleration, and so the least force, that does not exceed the top
+speed.
 """
 
 from dataclasses import dataclass
@@ -24,11 +25,11 @@ class MotionProfile:
     Parameters
     ----------
     distance_mm : float
-        Signed.
+        Signed distance.
     speed_mm_s : float
         Peak speed, not negative.
     speeding_s, cruising_s, slowing_s : float
-        Lengths of the three parts, not negative.
+        Durations of acceleration, constant speed and deceleration, not negative.
     """
 
     distance_mm: float
@@ -94,7 +95,7 @@ class MotionProfile:
 
 
 def shortest_s(distance_mm: float, top_speed_mm_s: float, top_acceleration_mm_s2: float) -> float:
-    """Least duration from rest to rest within a top speed and a top acceleration (s).
+    """Shortest duration from rest to rest within a top speed and a top acceleration (s).
 
     Examples
     --------
@@ -108,16 +109,16 @@ def shortest_s(distance_mm: float, top_speed_mm_s: float, top_acceleration_mm_s2
 
 
 def profile(distance_mm: float, entry: CycleTime | SpeedEntry, top_speed_mm_s: float) -> MotionProfile:
-    """Profile of a motion as specified by its block.
+    """Motion profile specified by a step data block.
 
     Parameters
     ----------
     distance_mm : float
-        Signed.
+        Signed distance.
     entry : CycleTime or SpeedEntry
-        How it is timed. A positioning time must be longer than the way at top speed.
+        Timing of the motion. A positioning time must be longer than the distance takes at top speed.
     top_speed_mm_s : float
-        What the stage can do; only cycle-time entry needs it, to choose the shape.
+        Top speed of the stage; only needed for cycle-time entry, to choose the profile.
     """
     if isinstance(entry, CycleTime):
         return _in_time(distance_mm, entry.positioning_time_s, top_speed_mm_s)

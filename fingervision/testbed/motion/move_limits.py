@@ -7,7 +7,7 @@ from fingervision.testbed.actuator import StageLimits
 
 
 def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
-    """Refuse a target beyond the stroke, and a speed that is not positive or too high.
+    """Refuse a target outside the stroke, and a speed that is not positive or too high.
 
     Raises
     ------
@@ -40,12 +40,12 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FreeMoves:
-    """A stage that can go anywhere within its limits.
+    """A stage that can move to any position within its limits.
 
     Parameters
     ----------
     limits : StageLimits
-        What it can do.
+        Limits of the stage.
     """
 
     limits: StageLimits

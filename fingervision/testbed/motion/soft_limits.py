@@ -7,18 +7,18 @@ from fingervision.testbed.actuator import StageLimits
 
 @dataclass(frozen=True, slots=True)
 class SoftLimits:
-    """Limits of one bed, checked before any motion and monitored during it.
+    """Soft limits of one test bed, checked before any motion and monitored during it.
 
     Parameters
     ----------
     lower_mm, upper_mm : float
-        Positions of the stage.
+        Range of positions of the stage.
     speed_mm_s : float
-        Its speed.
+        Highest speed of the stage.
     force_n : float
-        Force at the drive, either way; above it the stage stops.
+        Largest force at the drive, in either direction; above it the stage stops.
     gap_mm : float
-        Least gap while the stage closes; below it the stage stops.
+        Smallest gap while the stage closes; below it the stage stops.
     """
 
     lower_mm: float

@@ -1,4 +1,4 @@
-"""Limits of a stage from the [actuator] section of a bed file, for a controller that does not report them."""
+"""Limits of a stage from the [actuator] section of a test bed's file, for a controller that does not report them."""
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
@@ -7,13 +7,13 @@ KEYS = (
     "lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm", "encoder_step_mm", "repeatability_mm", "settling_s",
 )  # fmt: skip
 ENDLESS_N = 1e9
-"""Stands for a force that nobody states."""
+"""Value used for a force limit that is not stated."""
 
 
 def stated_limits(section: Section) -> StageLimits:
-    """Read the keys of `KEYS`.
+    """Read the settings listed in `KEYS`.
 
-    Without accuracy, encoder step, repeatability and settling the stage is taken as exact.
+    If accuracy, encoder step, repeatability and settling are not stated, the stage is taken as exact.
     """
     lower_mm = section.number("lower_mm")
     return StageLimits(

@@ -19,15 +19,15 @@ class PlannedMotion:
     Parameters
     ----------
     number : int
-        Of the block.
+        Number of the block.
     step : Step
         The block.
     from_mm, to_mm : float
-        Where it starts and ends.
+        Start and end position.
     motion : MotionProfile
-        How it goes there.
+        Motion profile.
     force_n : float
-        Largest force that it asks the motor for: load times acceleration, or the pushing force.
+        Largest required motor force: load times acceleration, or the pushing force.
     """
 
     number: int
@@ -44,13 +44,13 @@ def planned(number: int, step: Step, from_mm: float, limits: StageLimits) -> Pla
     Parameters
     ----------
     number : int
-        Of the block, for the sentence.
+        Number of the block, for error messages.
     step : Step
         The block.
     from_mm : float
-        Where the stage stands.
+        Start position of the stage.
     limits : StageLimits
-        What it can do.
+        Limits of the stage.
 
     Raises
     ------
@@ -114,9 +114,9 @@ def planned_sequence(data: StepData, limits: StageLimits, from_mm: float | None 
     data : StepData
         Blocks and sequence.
     limits : StageLimits
-        What the stage can do.
+        Limits of the stage.
     from_mm : float, optional
-        Where it stands; the data's own start if not given.
+        Start position; the start stated in the data if not given.
 
     Raises
     ------

@@ -26,23 +26,23 @@ def nominal_speed_mm_s(step: Step, way_mm: float, top_speed_mm_s: float) -> floa
 def route(
     steps: Mapping[int, Step], at_mm: float | None, to_mm: float, speed_mm_s: float, top_speed_mm_s: float
 ) -> tuple[int, ...]:
-    """Numbers of the moving blocks that lead to a position without exceeding the requested speed.
+    """Numbers of the blocks that lead to a position without exceeding the requested speed.
 
-    An absolute block is preferred to a repeated relative one, and that to an absolute block followed by relative ones;
-    among several the fastest is chosen, with the fewest blocks.
+    A single absolute block is preferred to a repeated relative block, and the latter to an absolute block followed by
+    relative ones; among several possibilities the fastest is chosen, then that with the fewest blocks.
 
     Parameters
     ----------
     steps : mapping of int to Step
-        What the controller keeps.
+        Step data stored in the motor controller.
     at_mm : float or None
-        Where the stage stands; None if that is not known, so that only absolute blocks lead anywhere.
+        Present position of the stage; None if it is not known, so that only absolute blocks can be used.
     to_mm : float
-        Where to.
+        Target position.
     speed_mm_s : float
         Highest speed.
     top_speed_mm_s : float
-        That of the stage.
+        Top speed of the stage.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def _moving(steps: Mapping[int, Step]) -> dict[int, Step]:
 def _routes(
     steps: Mapping[int, Step], at_mm: float | None, to_mm: float, top_speed_mm_s: float
 ) -> Iterator[tuple[tuple[int, ...], float, int]]:
-    """Each possible sequence: its blocks, its highest speed, and the rank of its kind."""
+    """Each possible sequence: its blocks, its highest speed, and its order of preference."""
     moving = _moving(steps)
     absolute = {n: step for n, step in moving.items() if step.coordinates is Coordinates.ABSOLUTE}
     starts: list[tuple[tuple[int, ...], float, float, int]] = []

@@ -1,1 +1,1 @@
-"""The operator, who performs the manual steps of a recipe, and the terminal that asks for them."""
+"""The operator, who performs the manual steps of a recipe, and the terminal on which they are requested."""

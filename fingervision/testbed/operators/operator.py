@@ -4,7 +4,7 @@ from typing import Protocol
 
 
 class Operator(Protocol):
-    """A person at a real bed; at a simulated bed the steps are performed at once."""
+    """Protocol of the operator: a person at a real test bed; at a simulated one the steps are performed at once."""
 
     def turn_part(self) -> None:
         """Turn the part by 180 degrees in the picture."""
@@ -15,7 +15,7 @@ class Operator(Protocol):
         ...
 
     def put_in_slot(self, size_mm: float) -> None:
-        """Put a reference slot of known width in place of the gripper, in the fingers' plane."""
+        """Put a reference slot of known width in place of the gripper, in the plane of the fingers."""
         ...
 
     def take_out_slot(self) -> None:

@@ -1,4 +1,4 @@
-"""Kinds of operators: a person at the terminal, or an immediate action where the camera is simulated."""
+"""Kinds of operators: a person at the terminal, or an immediate action for a simulated camera."""
 
 from dataclasses import replace
 
@@ -10,22 +10,22 @@ from fingervision.testbed.terminal import TERMINAL
 
 
 class AtTheBed:
-    """A person who is asked on the terminal, and confirms when the step is done."""
+    """A person who receives requests on the terminal, and confirms when a step is done."""
 
     def turn_part(self) -> None:
-        """Ask for it."""
+        """Ask the person on the terminal to do so, and wait for the confirmation."""
         self._ask("Turn the part by 180 degrees in the picture.")
 
     def shift_picture(self) -> None:
-        """Ask for it."""
+        """Ask the person on the terminal to do so, and wait for the confirmation."""
         self._ask("Shift the camera, so that the fingers stand elsewhere in the picture.")
 
     def put_in_slot(self, size_mm: float) -> None:
-        """Ask for it."""
+        """Ask the person on the terminal to do so, and wait for the confirmation."""
         self._ask(f"Put the reference slot of {size_mm:g} mm in the fingers' plane before the camera.")
 
     def take_out_slot(self) -> None:
-        """Ask for it."""
+        """Ask the person on the terminal to do so, and wait for the confirmation."""
         self._ask("Take the reference slot away, so that the camera sees the fingers again.")
 
     def _ask(self, words: str) -> None:
@@ -37,36 +37,36 @@ class AtTheBed:
 
 
 class AtTheSimulation:
-    """Operator of a simulated bed: the placement of the simulated part changes at once.
+    """Operator of a simulated test bed: the placement of the simulated part changes at once.
 
     Parameters
     ----------
     camera : SimulatedCamera
-        Before which it lies.
+        The camera in front of which the part is placed.
     """
 
     def __init__(self, camera: SimulatedCamera) -> None:
         self._camera = camera
 
     def turn_part(self) -> None:
-        """Turn it."""
+        """Turn the simulated part."""
         placed = self._camera.placed
         self._camera.place(replace(placed, turned=not placed.turned))
 
     def shift_picture(self) -> None:
-        """Shift the part, and shift it back the next time."""
+        """Shift the simulated part, and shift it back at the next call."""
         placed = self._camera.placed
         self._camera.place(replace(placed, shift_mm=SHIFT_MM - placed.shift_mm))
 
     def put_in_slot(self, size_mm: float) -> None:
-        """Draw a slot in place of the fingers."""
+        """Render a slot in place of the fingers."""
         self._camera.place(replace(self._camera.placed, slot_mm=size_mm))
 
     def take_out_slot(self) -> None:
-        """Draw the fingers again."""
+        """Render the fingers again."""
         self._camera.place(replace(self._camera.placed, slot_mm=None))
 
 
 def operator_of(camera: BedCamera | None) -> Operator:
-    """Choose the operator of a bed by its camera."""
+    """Choose the operator of a test bed according to its camera."""
     return AtTheSimulation(camera) if isinstance(camera, SimulatedCamera) else AtTheBed()

@@ -1,4 +1,4 @@
-"""Kinds of recipe steps, one per file: `KEYS` and `acts(section, at_mm)`, which returns the bed's actions."""
+"""Kinds of recipe steps, one per module, each with `KEYS` and `acts(section, at_mm)`, which returns actions."""
 
 import importlib
 import pkgutil
@@ -11,7 +11,7 @@ from fingervision.testbed.run.motion_segments import Act, Frames
 CONTINUOUS = "continuous"
 MOST_FRAMES = 10000
 Asked = tuple[Act, str]
-"""What to do, and the key that it follows from."""
+"""An action, and the setting of the recipe from which it follows."""
 
 
 class StepKind(Protocol):
@@ -20,7 +20,7 @@ class StepKind(Protocol):
     KEYS: tuple[str, ...]
 
     def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
-        """Actions of the bed for a step that begins at a given position."""
+        """Actions of the test bed for a step that starts at a given position."""
         ...
 
 
@@ -30,7 +30,7 @@ def step_kinds() -> tuple[str, ...]:
 
 
 def kind_of(section: Section) -> StepKind:
-    """Find the kind of a step, and refuse keys that the kind does not know."""
+    """Find the kind of a step, and refuse settings that the kind does not have."""
     name = section.word("kind", of=step_kinds())
     kind: StepKind = importlib.import_module(f"{__name__}.{name}")
     section.only(("kind", *kind.KEYS))
@@ -38,7 +38,7 @@ def kind_of(section: Section) -> StepKind:
 
 
 def frames_of(section: Section) -> Frames:
-    """Read `frames`: the word continuous, or a number per point."""
+    """Read `frames`: the word `continuous`, or a number of frames per point."""
     value = section.values.get("frames", CONTINUOUS)
     if value == CONTINUOUS:
         return None

@@ -10,6 +10,6 @@ KEYS = ("speed_mm_s", "below_force_n")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """One motion, which ends when force or picture shows contact."""
+    """Yield one motion, which ends when force or picture shows contact."""
     speed, force_n = section.number("speed_mm_s", above=0.0), section.number("below_force_n", above=0.0)
     yield Close(speed, force_n), "below_force_n"

@@ -10,5 +10,5 @@ KEYS = ("size_mm", "u_size_mm")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Have the slot put in, measure it, and have it taken out."""
+    """Yield one action: the slot is inserted, measured and removed."""
     yield Slot(section.number("size_mm", above=0.0), section.number("u_size_mm", 0.0, low=0.0)), "size_mm"

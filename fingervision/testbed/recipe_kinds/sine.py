@@ -12,7 +12,7 @@ SLOWEST_APPROACH_MM_S = 0.05
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Move to the mean position, then oscillate."""
+    """Yield a move to the mean position, then an oscillation."""
     mean_mm, amplitude_mm = section.number("mean_mm"), section.number("amplitude_mm", above=0.0)
     frequency_hz = section.number("frequency_hz", above=0.0, high=10.0)
     cycles = section.number("cycles", 1.0, above=0.0)

@@ -10,7 +10,7 @@ KEYS = ("from_mm", "to_mm", "speed_mm_s", "cycles", "frames")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Move to the first position if the stage is elsewhere, then out and back for each cycle."""
+    """Yield a move to the first position if the stage is elsewhere, then out and back for each cycle."""
     from_mm, to_mm = section.number("from_mm"), section.number("to_mm")
     speed, frames = section.number("speed_mm_s", above=0.0), frames_of(section)
     if from_mm == to_mm:

@@ -1,1 +1,1 @@
-"""Execution of a recipe on a bed: planned, checked, monitored during motion, recorded."""
+"""Execution of a recipe on a test bed: planned, checked, monitored during motion, recorded."""

@@ -12,15 +12,15 @@ PAUSE_LETTER, STOP_LETTER = "p", "q"
 
 
 class Controls:
-    """The user's commands, from any thread.
+    """The user's commands during a run, given from any thread.
 
-    They are plain flags, each set in one instruction, because a signal handler that waited for a lock would block the
-    program that it interrupted.
+    The commands are plain flags, each set in one instruction, because a signal handler that waited for a lock would
+    block the program that it interrupted.
 
     Attributes
     ----------
     stopped, paused : bool
-        Whether the run shall end, or wait.
+        Whether the run should end, or wait.
     halted : bool
         Whether a pause has stopped the motor since the flag was last set to False.
     """
@@ -40,7 +40,7 @@ class Controls:
         self._stop_motor()
 
     def toggle_pause(self) -> None:
-        """Pause, which stops the motor at once, or continue."""
+        """Pause the run, which stops the motor at once, or continue it."""
         if self.paused:
             self.paused = False
             return
@@ -49,7 +49,7 @@ class Controls:
 
     @contextmanager
     def listening(self, stop_motor: Callable[[], None]) -> Iterator[None]:
-        """While a run lasts, turn Ctrl-C and SIGTERM into a stop, and letters on the terminal into pauses.
+        """During a run, convert Ctrl-C and SIGTERM to a stop, and letters on the terminal to pauses.
 
         Parameters
         ----------

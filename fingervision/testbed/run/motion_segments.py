@@ -1,11 +1,11 @@
-"""Motion segments: the elementary actions into which a recipe's steps are divided."""
+"""Motion segments: the elementary actions into which the steps of a recipe are divided."""
 
 from dataclasses import dataclass
 
 from fingervision.storage.toml_section import Section
 
 Frames = int | None
-"""So many frames at a point once the picture is still; None records every frame all the while."""
+"""Number of frames taken at a point once the picture is at rest; None records all frames continuously."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Go:
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """Stand for a time; frames, if requested by number, are taken after it."""
+    """Rest for a time; frames, if requested by number, are taken afterwards."""
 
     seconds: float
     frames: Frames = None
@@ -27,7 +27,7 @@ class Stand:
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """Oscillate as a sine about a mean, starting from the mean towards opening."""
+    """Oscillate sinusoidally about a mean position, starting from the mean towards opening."""
 
     mean_mm: float
     amplitude_mm: float
@@ -37,7 +37,7 @@ class Swing:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """Close until the force limit is reached, the fingers touch, or the bed's limit is reached."""
+    """Close until the force limit is reached, the fingers touch, or the test bed's limit is reached."""
 
     speed_mm_s: float
     below_force_n: float
@@ -50,17 +50,17 @@ class Rezero:
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Have the part turned by 180 degrees in the picture; a new run begins."""
+    """Request the part to be turned by 180 degrees in the picture; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Have the picture shifted; a new run begins."""
+    """Request the picture to be shifted; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """Have a reference slot put in, measure it, and have it taken out."""
+    """Request a reference slot to be inserted, measure it, and request its removal."""
 
     size_mm: float
     u_size_mm: float
@@ -76,13 +76,13 @@ class Leg:
     Parameters
     ----------
     act : Go, Stand, Swing, Close, Rezero, Turn, Shift or Slot
-        What.
+        The action.
     step : int
-        Step of the recipe, from 1.
+        Number of the recipe's step, from 1.
     section : Section
-        The step as it is written, for sentences.
+        The step as written in the recipe, for error messages.
     key : str
-        The key that it follows from.
+        The setting from which the segment follows.
     """
 
     act: Act

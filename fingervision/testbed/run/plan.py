@@ -1,4 +1,4 @@
-"""Convert a recipe to motion segments, all checked before anything moves."""
+"""Convert a recipe to motion segments, all of which are checked before anything moves."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ LONGEST_S = 30.0 * 86400.0
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The segments that the bed will execute.
+    """The segments that the test bed will execute.
 
     Parameters
     ----------
     legs : tuple of Leg
-        In order.
+        Segments in order.
     seconds : tuple of float
-        Expected time of each.
+        Expected duration of each segment.
     """
 
     legs: tuple[Leg, ...]
@@ -40,7 +40,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Timed:
-    """One segment with its expected time, and the position of the stage after it."""
+    """One segment with its expected duration, and the position of the stage after it."""
 
     leg: Leg
     seconds: float
@@ -55,17 +55,17 @@ def plan(
     Parameters
     ----------
     recipe : Recipe
-        As it was read.
+        The recipe as read from its file.
     limits : SoftLimits
-        Of the bed.
+        Soft limits of the test bed.
     model : Model or None
-        Of the gripper: what gap and force its positions mean.
+        Model of the gripper, which predicts gap and force at each position.
     start_mm : float
-        Where the stage is.
+        Present position of the stage.
     rate_hz : float
-        Of the camera.
+        Frame rate of the camera.
     view_mm : float
-        Width of what it sees.
+        Width of the camera's view.
 
     Raises
     ------
@@ -92,20 +92,20 @@ def plan(
 def timed_segments(
     number: int, section: Section, at_mm: float, limits: SoftLimits, rate_hz: float
 ) -> Iterator["Timed"]:
-    """Read one step: its segments, each with its expected time and where it ends; no limit is checked.
+    """Read one step: yield its segments, each with its duration and end position, without checking limits.
 
     Parameters
     ----------
     number : int
-        Of the step, from 1.
+        Number of the step, from 1.
     section : Section
         The step.
     at_mm : float
-        Where the stage is before it.
+        Position of the stage before the step.
     limits : SoftLimits
-        Where closing until contact ends at the latest.
+        Limits at which closing until contact ends at the latest.
     rate_hz : float
-        Of the camera.
+        Frame rate of the camera.
 
     Raises
     ------

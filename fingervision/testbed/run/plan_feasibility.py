@@ -10,7 +10,7 @@ from fingervision.testbed.run.plan import Plan
 
 
 def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: float) -> None:
-    """Refuse a plan that the actuator cannot follow: a motor controller can go only to the targets of its step data.
+    """Refuse a plan that the actuator cannot execute: a motor controller can only move to the targets of its step data.
 
     Raises
     ------

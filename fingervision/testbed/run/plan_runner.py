@@ -27,17 +27,17 @@ Progress = Callable[[float, float], None]
 class Runner:
     """Executes a plan, starting where the recorded rows end.
 
-    A bed that can replay executes the whole plan again; rows that are in the folder already are not drawn, measured or
-    written a second time. On any other bed the interrupted motion segment is repeated, as a new run.
+    A test bed that can replay executes the whole plan again; rows that are already in the folder are not rendered,
+    measured or written a second time. On any other test bed the interrupted motion segment is repeated, as a new run.
 
     Parameters
     ----------
     plan : Plan
-        What.
+        The plan.
     watch : Watch
-        Where, and what is seen there.
+        Monitor through which the test bed is operated.
     on_progress : callable
-        Told the seconds done, and those expected in all.
+        Called with the seconds done, and the seconds expected in all.
     """
 
     plan: Plan
@@ -114,7 +114,7 @@ class Runner:
         record.event("ended", f"{record.counts.recorded} frames.")
 
     def _first_leg(self) -> int:
-        """Index of the first segment to execute: 0, or the one at which a bed that cannot replay was interrupted."""
+        """Index of the first segment to execute: 0, or that at which a test bed without replay was interrupted."""
         folder = self.watch.record.folder
         if self.watch.bed.replays or not folder.resumed:
             return 0
@@ -150,7 +150,7 @@ class Runner:
         self._rest(leg + 1)
 
     def _rest(self, leg: int) -> None:
-        """Record the pause at the beginning of a run, if the following segment is recorded continuously."""
+        """Record the pause at the start of a run, if the following segment is recorded continuously."""
         following = self.plan.legs[leg].act if leg < len(self.plan.legs) else None
         moves_on = isinstance(following, Swing | Close)
         if moves_on or (isinstance(following, Go | Stand) and following.frames is None):

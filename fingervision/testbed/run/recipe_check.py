@@ -1,4 +1,4 @@
-"""Check a recipe against a bed without using it: its motions, its duration, and what is not possible."""
+"""Check a recipe against a test bed without operating it: motions, duration, and impossible steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,33 +15,33 @@ from fingervision.testbed.run.plan_feasibility import check_moves
 from fingervision.testbed.run.run_folder import BYTES_PER_PX
 
 POSITIONS = 41
-"""Positions of a step's way at which gap and force are predicted: grippers bend little between them."""
+"""Positions along a step's path at which gap and force are predicted; between them, grippers are nearly linear."""
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedStep:
-    """One step of a recipe, as the bed would execute it.
+    """One step of a recipe, as the test bed would execute it.
 
     Parameters
     ----------
     number : int
-        Of the step, from 1.
+        Number of the step, from 1.
     kind : str
-        Of the step.
+        Kind of the step.
     from_mm, to_mm : float
         Position of the stage before the step, and after it.
     lower_mm, upper_mm : float
-        Least and greatest position on the way.
+        Smallest and largest position during the step.
     speed_mm_s : float
-        Highest speed; 0 where nothing moves.
+        Highest speed; 0 without a motion.
     seconds : float
-        Expected time.
+        Expected duration.
     gap_mm : (float, float) or None
-        Least and greatest gap that the bed's gripper predicts; None without a gripper.
+        Smallest and largest gap predicted by the gripper model; None without a model.
     force_n : float or None
-        Greatest drive force that it predicts; None where it knows none.
+        Largest predicted drive force; None if the model predicts no force.
     refusal : str or None
-        The sentence with which the bed refuses the step; None where it can be done.
+        Sentence with which the test bed refuses the step; None if the step is possible.
     """
 
     number: int
@@ -59,20 +59,20 @@ class CheckedStep:
 
 @dataclass(frozen=True, slots=True)
 class RecipeCheck:
-    """Result of checking a recipe for a bed.
+    """Result of checking a recipe against a test bed.
 
     Parameters
     ----------
     bed : PlannedBed
-        The bed.
+        The test bed.
     steps : tuple of CheckedStep
-        In order.
+        Steps in order.
     seconds : float
-        Expected time of all.
+        Expected duration of all steps.
     frames : int
-        Frames that the camera delivers meanwhile.
+        Number of frames that the camera delivers during this time.
     megabytes : float
-        Space that their lossless video may take.
+        Space that their lossless video may need.
     """
 
     bed: PlannedBed
@@ -83,7 +83,7 @@ class RecipeCheck:
 
     @property
     def refusals(self) -> tuple[str, ...]:
-        """Reasons why the bed refuses the recipe; empty where it can be run."""
+        """Reasons why the test bed refuses the recipe; empty if it can be run."""
         return tuple(step.refusal for step in self.steps if step.refusal is not None)
 
 
@@ -93,9 +93,9 @@ def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
     Parameters
     ----------
     recipe : Recipe
-        As it was read.
+        The recipe as read from its file.
     bed : PlannedBed
-        What it is checked against.
+        Test bed against which the recipe is checked.
     """
     at_mm = 0.0
     steps: list[CheckedStep] = []
@@ -155,7 +155,7 @@ def _speed_mm_s(leg: Leg) -> float:
 
 
 def _foretold(lower_mm: float, upper_mm: float, bed: PlannedBed) -> tuple[tuple[float, float] | None, float | None]:
-    """Gap and force that the bed's gripper predicts over a motion; None where its range does not include the motion."""
+    """Predicted gap and force over a motion; None if the model's range does not include the motion."""
     if bed.model is None:
         return None, None
     try:

@@ -1,4 +1,4 @@
-"""Run a recipe on a bed: plan it, check it, run it, record it."""
+"""Run a recipe on a test bed: plan it, check it, execute it, record it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ class RunDone:
     Parameters
     ----------
     folder : Path
-        Its files.
+        Folder with the run's files.
     counts : Counts
-        What became of the frames.
+        Number of frames by status.
     resumed_after : int
-        Frames that were there before; 0 for a new run.
+        Number of frames recorded before an interruption; 0 for a new run.
     """
 
     folder: Path
@@ -52,25 +52,25 @@ def run_recipe(
     on_plan: Callable[[Plan], None] = lambda planned: None,
     on_row: OnRow = lambda row, picture: None,
 ) -> RunDone:
-    """Run a recipe; nothing moves before all of it is checked against the limits and both fingers are visible.
+    """Run a recipe; nothing moves before it is checked against the limits and both fingers are visible.
 
     Parameters
     ----------
     recipe : Recipe
-        What to do.
+        The recipe.
     bed : Bed
-        Where; it is left open.
+        The test bed; it is left open.
     out : Path
-        Folder for the run; one that broke off is gone on with.
+        Folder for the run; an interrupted run in it is continued.
     hidden : Hidden
-        What the bed was put together with.
+        Effects injected into the test bed.
     before : sequence of SampleRow
-        Rows of an earlier run on this bed, which this one goes on from: its runs are numbered on, on the same clock.
+        Rows of an earlier run on this test bed that is continued: its numbering and its clock go on.
     controls : Controls, optional
-        Pause and stop.
+        Controls for pause and stop.
     on_progress, say, on_plan, on_row : callable
-        Told of the way: seconds done and expected, sentences, the plan before it is run, and every row as it is
-        written, with its picture.
+        Called with: seconds done and expected; sentences; the plan before it is executed; every row as it is written,
+        with its picture.
 
     Raises
     ------

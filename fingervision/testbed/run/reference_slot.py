@@ -19,16 +19,17 @@ def measured_slot(frames: Sequence[Frame], size_mm: float, scale: Scale) -> dict
     Parameters
     ----------
     frames : sequence of Frame
-        Of the slot at rest.
+        Frames of the slot at rest.
     size_mm : float
-        Its width.
+        Known width of the slot.
     scale : Scale
-        Of the bed.
+        Scale of the test bed's camera.
 
     Returns
     -------
     dict
-        `measured_mm` (mean over the frames), `u_random_mm` (its standard uncertainty), `ratio` (measured by known).
+        `measured_mm` (mean over the frames), `u_random_mm` (its standard uncertainty), `ratio` (measured over known
+        width).
 
     Raises
     ------

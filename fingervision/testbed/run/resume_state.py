@@ -1,4 +1,4 @@
-"""State of an earlier run's folder: empty, resumable, or finished and not to be changed."""
+"""State of a run's folder: empty, interrupted and resumable, or finished and not to be changed."""
 
 import json
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class Remains:
     Parameters
     ----------
     began_at : datetime
-        When it began.
+        Time at which the run began.
     rows : list of SampleRow
-        Frames that have a row and a picture.
+        Rows of the frames that have a row and a picture.
     events : list of dict
         Events of the run itself, in order.
     """
@@ -40,14 +40,14 @@ def contents(path: Path) -> list[str]:
 
 
 def refuse_others(path: Path, held: str) -> NoReturn:
-    """Refuse a folder with other files, among which the run's files would be lost."""
+    """Refuse a folder with other files, among which the run's files would be hard to find."""
     raise OutputError(f"--out must be a new or empty folder, but {path} holds {held}: name another.")
 
 
 def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
-    """Find the interrupted run of this recipe on this bed; None where there is nothing to continue.
+    """Find the interrupted run of this recipe on this test bed; None if there is nothing to continue.
 
-    The table is truncated to the rows whose pictures are in the video, the events to complete lines.
+    The table is truncated to the rows whose pictures are in the video, and the file of events to complete lines.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Folder of a run, written so that a run may end at any time and be resumed."""
+"""Folder of a run, written so that a run can be interrupted at any time and resumed."""
 
 import shutil
 from collections.abc import Mapping, Sequence
@@ -37,20 +37,20 @@ BYTES_PER_PX = 0.8
 
 
 class BedRunFolder:
-    """Writes a run while it is executed, and finds out how far an earlier one came.
+    """Writes a run while it is executed, and determines how far an interrupted one got.
 
     Parameters
     ----------
     path : Path
-        The folder; made, empty, or holding a run of the same recipe on the same bed that broke off.
+        The folder; it may be missing, empty, or contain an interrupted run of the same recipe on the same test bed.
     recipe : Recipe
-        What is run.
+        The recipe that is run.
     bed : Bed
-        Where.
+        The test bed.
     hidden : Hidden
-        Its digest belongs to the run: a simulation that hides something else is another bed.
+        Injected effects, whose hash is stored: a simulation with other effects counts as another test bed.
     before : sequence of SampleRow
-        Rows of an earlier run that this one follows; both together are written to joined.csv.
+        Rows of an earlier run that this one continues; both together are written to joined.csv.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class BedRunFolder:
             self._files.event({"time_s": self._last_s, "event": "resumed", "words": f"After {len(self.rows)} frames."})
 
     def needs_room(self, frames: float, size_px: tuple[int, int]) -> None:
-        """Refuse a run for which the disk has no space."""
+        """Refuse a run for which the disk has not enough space."""
         needed = int(frames * size_px[0] * size_px[1] * BYTES_PER_PX)
         free = shutil.disk_usage(self.path).free
         if needed > free:
@@ -116,7 +116,7 @@ class BedRunFolder:
         self._last_s = row.time_s
 
     def event(self, number: int, name: str, words: str, **more: object) -> None:
-        """Append an event; events that were written before an interruption are not written again."""
+        """Append an event; events written before an interruption are not written again."""
         if number >= len(self.events_done):
             self._files.event({"n": number, "time_s": round(self._last_s, 6), "event": name, "words": words, **more})
 
@@ -134,7 +134,7 @@ class BedRunFolder:
         self._lock.release()
 
     def break_off(self, why: str) -> None:
-        """Close the folder of an interrupted run; its content stays valid, and the run may be continued."""
+        """Close the folder of an interrupted run; its content remains valid, and the run may be continued."""
         with suppress(FingervisionError):
             self._files.event({"time_s": round(self._last_s, 6), "event": "stopped", "words": why})
         with suppress(FingervisionError):
@@ -149,7 +149,7 @@ class BedRunFolder:
 
 
 def rows_before(path: Path) -> list[SampleRow]:
-    """Rows of a finished run, with those of the runs that it continued.
+    """Rows of a finished run, with those of the earlier runs that it continued.
 
     Raises
     ------

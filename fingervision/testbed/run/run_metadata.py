@@ -1,4 +1,4 @@
-"""Metadata of a run: its files, recipe, bed, and the simulation of the expected gap."""
+"""Metadata of a run: its files, recipe and test bed, and the simulated gap that is expected."""
 
 import hashlib
 import json
@@ -27,13 +27,13 @@ SIMULATED_ROWS, BEYOND_LIMITS_MM = 201, 0.06
 
 
 def digest_of(bed: Bed, hidden: Hidden) -> str:
-    """Hash that identifies a bed and its hidden effects without revealing them."""
+    """Hash that identifies a test bed and its injected effects without revealing them."""
     effects = {name: dict(sorted(values.items())) for name, values in sorted(hidden.effects.items())}
     return hashlib.sha256(json.dumps([bed.about, effects], sort_keys=True, default=str).encode()).hexdigest()
 
 
 def write_expected(path: Path, model: Model, limits: SoftLimits) -> None:
-    """Write the gap that the model predicts within the bed's limits."""
+    """Write the gap that the model predicts within the test bed's limits."""
     low_mm, high_mm = limits.lower_mm - BEYOND_LIMITS_MM, limits.upper_mm + BEYOND_LIMITS_MM
     inputs = np.linspace(low_mm, high_mm, SIMULATED_ROWS)
     # Without its force: what the fingers press on is no property of the gripper.
@@ -41,7 +41,7 @@ def write_expected(path: Path, model: Model, limits: SoftLimits) -> None:
 
 
 def about_run(recipe: Recipe[Section], bed: Bed, hidden: Hidden, began_at: datetime) -> dict[str, Any]:
-    """Content of run.json at the beginning of a run."""
+    """Content of run.json at the start of a run."""
     camera = None if bed.camera is None else bed.camera.description
     return {
         "schema": SCHEMA,

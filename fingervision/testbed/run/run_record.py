@@ -17,9 +17,10 @@ PAUSE_S, GAP_S = 5.0, 1.0
 TURNED = "turned"
 
 PlaceAt = Callable[[float, bool], float | None]
-"""Where the stage was at a time of the bed; None where that is not known yet, and need not be known at once."""
+"""Function that returns the stage's position at a time of the test bed; None if later readings will determine it, and
+it is not needed at once."""
 OnRow = Callable[[SampleRow, Frame], None]
-"""Told of a row that was written, and its picture."""
+"""Function that is called with every row that was written, and its picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +38,11 @@ class RunRecord:
     Parameters
     ----------
     folder : BedRunFolder
-        Where it is written.
+        Folder to which they are written.
     place_at : callable
-        The stage's place.
+        Position of the stage as a function of time.
     on_row : callable, optional
-        Told of every row as it is written, with its picture.
+        Called with every row as it is written, and its picture.
     """
 
     def __init__(self, folder: BedRunFolder, place_at: PlaceAt, on_row: OnRow = lambda row, picture: None) -> None:
@@ -62,14 +63,14 @@ class RunRecord:
     # How it begins.
 
     def follow_replayed(self, last: SampleRow) -> None:
-        """Continue after the last row of an earlier run, on a bed whose camera clock continues from there."""
+        """Continue after the last row of an earlier run, on a test bed whose camera clock continues from there."""
         self._run = _run_number(last) + 1
         self._zero_s = last.camera_s - last.time_s
 
     def follow(self, last: SampleRow, now_s: float) -> None:
-        """Continue after the last row of an earlier run, on a bed whose camera clock has started again.
+        """Continue after the last row of an earlier run, on a test bed whose camera clock has restarted.
 
-        The time in between is known to the accuracy of the host's clock, which suffices.
+        The time in between is known to the accuracy of the computer's clock, which suffices.
         """
         self._run = _run_number(last) + 1
         self._base_s = last.time_s + max(PAUSE_S, now_s - last.arrived_s)
@@ -87,7 +88,7 @@ class RunRecord:
 
     @property
     def label(self) -> str:
-        """Name of the run: its number, and what a diagnosis must know about it."""
+        """Label of the run: its number, and what a diagnosis must know about it."""
         words = [str(self._run), *([TURNED] if self.turned else []), *([REZEROED] if self._rezeroed else [])]
         return " ".join(words)
 
@@ -98,7 +99,7 @@ class RunRecord:
     # Frames.
 
     def there_already(self) -> GapRow | None:
-        """Take the next frame from the folder if it was recorded before; None if it must be taken now."""
+        """Take the next frame's row from the folder if it was recorded before; None if it must be recorded now."""
         if self._rows >= len(self.folder.rows):
             return None
         row = self.folder.rows[self._rows]

@@ -1,4 +1,4 @@
-"""Monitor every frame of a motion against the limits, and stop the motor when one is exceeded."""
+"""Monitor every frame of a motion against the limits, and stop the motor if one is exceeded."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,26 +28,26 @@ class StoppedError(FingervisionError):
 
 @dataclass(slots=True)
 class Watch:
-    """Takes frames, measures, records, and stops the motor at a limit.
+    """Takes frames, measures and records them, and stops the motor at a limit.
 
     Parameters
     ----------
     bed : Bed
-        What is looked at.
+        The test bed that is monitored.
     sight : Sight
-        The bed's eyes.
+        Acquisition of frames and instrument readings.
     record : RunRecord
-        What was seen.
+        Record of the run.
     controls : Controls
-        What the user wants.
+        Commands of the user.
     below_force_n : float
-        The recipe's limit of force.
+        Force limit of the recipe.
     say : callable
-        Told what a person at the bed shall know, in sentences.
+        Called with sentences for the person at the test bed.
     leg : Leg or None
-        What is under way.
+        Segment that is being executed.
     paused_s : float
-        How long it was paused, in all.
+        Total duration of pauses.
     """
 
     bed: Bed
@@ -62,7 +62,7 @@ class Watch:
     # Frames.
 
     def look(self) -> Look:
-        """Look once.
+        """Take one frame without measuring it, and check alarm, force and the user's commands.
 
         Raises
         ------
@@ -111,7 +111,7 @@ class Watch:
         return look, measured
 
     def find_fingers(self) -> None:
-        """Refuse to continue where the camera does not see both fingers."""
+        """Refuse to continue if the camera does not see both fingers."""
         words = ""
         for _ in range(FRAMES_TO_FIND_FINGERS):
             measured, words = self.sight.measure(self.look().shot.item())
@@ -136,16 +136,16 @@ class Watch:
     def follow(
         self, begin: Callable[[], None], *, record: bool, until: Callable[[Look, GapRow], bool] | None = None
     ) -> None:
-        """Begin a motion and monitor it until the stage stands; after a pause the motion is begun again.
+        """Begin a motion and monitor it until the stage is at rest; after a pause the motion is started again.
 
         Parameters
         ----------
         begin : callable
-            Begins the motion, from wherever the stage is.
+            Begins the motion from the present position of the stage.
         record : bool
-            Whether its frames are recorded.
+            Whether the frames of the motion are recorded.
         until : callable, optional
-            Ends the motion where it is true of a frame.
+            Ends the motion when it returns True for a frame.
         """
         while True:
             self.wait_while_paused(record=record)

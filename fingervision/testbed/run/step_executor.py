@@ -1,4 +1,4 @@
-"""Execute one segment of a recipe's plan: move, dwell, oscillate, close until contact, measure a slot."""
+"""Execute one segment of a recipe's plan: move, rest, oscillate, close until contact, measure a slot."""
 
 from functools import partial
 from math import sin, tau
@@ -32,7 +32,7 @@ def go(watch: Watch, act: Go) -> None:
 
 
 def stand(watch: Watch, act: Stand) -> None:
-    """Stand for a time."""
+    """Rest for a time."""
     since = _Since(watch)
     while since.s < act.seconds:
         watch.see(record=act.frames is None)
@@ -41,7 +41,7 @@ def stand(watch: Watch, act: Stand) -> None:
 
 
 def swing(watch: Watch, act: Swing) -> None:
-    """Move as a sine, in short pieces."""
+    """Move sinusoidally, in short pieces."""
     since, piece_s = _Since(watch), SWING_FRAMES / watch.sight.rate_hz
     lasts_s = act.cycles / act.frequency_hz
     at_mm = act.mean_mm
@@ -57,7 +57,7 @@ def swing(watch: Watch, act: Swing) -> None:
 
 
 def close(watch: Watch, act: Close) -> None:
-    """Close until the force limit is reached, the fingers touch, or the bed's limit is reached."""
+    """Close until the force limit is reached, the fingers touch, or the test bed's limit is reached."""
     felt: list[str] = []
 
     def met(look: Look, row: GapRow) -> bool:
@@ -80,7 +80,7 @@ def rezero(watch: Watch) -> None:
 
 
 def slot(watch: Watch, act: Slot) -> dict[str, float]:
-    """Have a reference slot put in, measure it, and have it taken out; return the result for run.json."""
+    """Request a reference slot, measure it, and request its removal; return the result for run.json."""
     operator, scale = watch.bed.operator, watch.bed.scale
     operator.put_in_slot(act.size_mm)
     watch.look()
@@ -123,7 +123,7 @@ def _settle(watch: Watch) -> None:
 
 
 def _still(rows: list[GapRow]) -> bool:
-    """Whether successive frames show the same gap, or none."""
+    """Whether successive frames show the same gap, or no gap."""
     gaps = [row.gap_mm for row in rows if row.gap_mm is not None]
     if len(gaps) < len(rows):
         return not gaps
@@ -139,7 +139,7 @@ class _Since:
 
     @property
     def s(self) -> float:
-        """Seconds."""
+        """Number of seconds."""
         return self._now_s(self._watch) - self._began_s
 
     @staticmethod

@@ -25,12 +25,12 @@ READINGS_KEPT = 2000
 
 
 class JoinedInstrument:
-    """An instrument whose clock is synchronised with the bed's by every answer.
+    """An instrument whose clock is synchronised with the test bed's clock by every response.
 
     Parameters
     ----------
     source : Actuator or ForceSensor
-        Where the readings come from.
+        Source of the readings.
     """
 
     def __init__(self, source: Actuator | ForceSensor) -> None:
@@ -39,7 +39,7 @@ class JoinedInstrument:
         self.newest = 0.0
 
     def read(self) -> tuple[Reading, ...]:
-        """Take the readings since the last call."""
+        """Return the readings since the last call, and synchronise the clocks with them."""
         readings = self._source.readings()
         asked = readings[-1]
         self.clock.add(asked.device_s, asked.asked_s, asked.got_s)
@@ -47,7 +47,7 @@ class JoinedInstrument:
         return readings
 
     def device_at(self, bed_s: float) -> float:
-        """Convert a bed time to the instrument's clock; before the clocks are synchronised, the bed time itself."""
+        """Convert a time of the test bed to the instrument's clock; before synchronisation, the time itself."""
         joined = self.clock.joined()
         return bed_s if joined is None else joined.board_s + (bed_s - joined.host_s) / joined.rate
 
@@ -60,14 +60,14 @@ class Position(JoinedInstrument):
         self._track = StageTrack(actuator.limits.encoder_step_mm)
 
     def read(self) -> tuple[Reading, ...]:
-        """Take the readings since the last call."""
+        """Return the readings since the last call, and use them for the interpolation."""
         readings = super().read()
         for reading in readings:
             self._track.add(reading)
         return readings
 
     def at(self, bed_s: float, *, at_once: bool = False) -> float | None:
-        """Position at a bed time (mm); None where later readings will determine it better (see `StageTrack`)."""
+        """Position at a time of the test bed (mm); None if later readings will determine it (see `StageTrack`)."""
         return self._track.at_mm(self.device_at(bed_s), at_once=at_once)
 
 
@@ -80,7 +80,7 @@ class Force(JoinedInstrument):
         self._force_n: deque[float] = deque(maxlen=READINGS_KEPT)
 
     def read(self) -> tuple[Reading, ...]:
-        """Take the readings since the last call."""
+        """Return the readings since the last call, and store them."""
         readings = super().read()
         for reading in readings:
             if not self._device_s or reading.device_s > self._device_s[-1]:
@@ -89,26 +89,26 @@ class Force(JoinedInstrument):
         return readings
 
     def at(self, bed_s: float) -> float:
-        """Force at a bed time, interpolated linearly between readings (N)."""
+        """Force at a time of the test bed, interpolated linearly between readings (N)."""
         return float(np.interp(self.device_at(bed_s), self._device_s, self._force_n))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """One frame, with the state of the bed at its exposure.
+    """One frame, with the state of the test bed at its exposure.
 
     Parameters
     ----------
     shot : Shot
-        The frame, perhaps not yet drawn.
+        The frame, possibly not yet rendered.
     exposed_s : float
-        When, on the bed's clock, as far as the camera's is joined to it.
+        Time of the exposure on the test bed's clock, as far as the camera's clock is synchronised.
     encoder_mm : float
-        The newest reading of the stage.
+        Latest reading of the stage's position.
     force_n : float or None
         Force at the drive at the exposure.
     force_now_n : float or None
-        The newest force.
+        Latest reading of the force.
     """
 
     shot: Shot
@@ -119,12 +119,12 @@ class Look:
 
 
 class Sight:
-    """Looks and measures.
+    """Takes frames and instrument readings, and measures the frames.
 
     Parameters
     ----------
     bed : Bed
-        With a camera and a scale.
+        Test bed with a camera and a scale.
 
     Raises
     ------
@@ -163,7 +163,7 @@ class Sight:
         return Look(shot, exposed_s, self.position.newest, force_n, force_now_n)
 
     def clocks(self) -> dict[str, dict[str, float]]:
-        """Relation of each instrument's clock to the bed's, for run.json."""
+        """Relation of each instrument's clock to the test bed's, for run.json."""
         camera = self.camera_clock.joined()
         clocks = {"camera": {"offset_s": camera.bed_s - camera.camera_s, "rate": camera.rate, "u_s": camera.u_s}}
         for name, instrument in (("actuator", self.position), ("force_sensor", self.force)):
@@ -174,7 +174,7 @@ class Sight:
         return clocks
 
     def measure(self, item: Frame | LostFrame) -> tuple[GapRow, str]:
-        """Measure a picture: return its row, and where there is no number the reason in a sentence."""
+        """Measure a picture: return its row and, if there is no measured gap, the reason as a sentence."""
         outcome = item if isinstance(item, LostFrame) else measure_frame(item, self._settings)
         (row,) = self._rows.rows((Result(item.index, item.time_s, outcome),))
         return row, outcome.words if isinstance(outcome, NoGap | LostFrame) else ""

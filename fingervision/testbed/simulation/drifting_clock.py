@@ -1,4 +1,4 @@
-"""An instrument's own clock, with another start than the bed's and a slightly different rate."""
+"""An instrument's own clock, with an offset to the test bed's clock and a slightly different rate."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ BEGAN_WITHIN_S = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class OwnClock:
-    """A clock that is not yet synchronised with the bed's.
+    """A clock that is not synchronised with the test bed's clock.
 
     Parameters
     ----------
     began_s : float
-        Time of the bed at which it showed 0.
+        Time of the test bed at which the clock showed 0.
     rate : float
-        Its seconds in one second of the bed's.
+        Seconds of this clock per second of the test bed.
     """
 
     began_s: float
@@ -26,14 +26,14 @@ class OwnClock:
 
     @staticmethod
     def drawn(rng: np.random.Generator) -> "OwnClock":
-        """Draw a clock with random offset and rate."""
+        """Choose a clock with random offset and rate."""
         began_s = rng.uniform(-BEGAN_WITHIN_S, 0.0)
         return OwnClock(float(began_s), float(1.0 + rng.uniform(-LARGEST_RATE_ERROR, LARGEST_RATE_ERROR)))
 
     def shows_s(self, bed_s: float) -> float:
-        """Reading of this clock at a time of the bed's clock."""
+        """Reading of this clock at a time of the test bed (s)."""
         return (bed_s - self.began_s) * self.rate
 
     def bed_s(self, shown_s: float) -> float:
-        """Bed time at which the clock shows a given time (s)."""
+        """Time of the test bed at which the clock shows a given time (s)."""
         return self.began_s + shown_s / self.rate

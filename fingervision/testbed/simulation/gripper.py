@@ -1,4 +1,4 @@
-"""A gripper on a stage: the true positions of its measuring points, with all hidden effects of drive and mechanism."""
+"""A simulated gripper on a stage: true positions of its measuring points, with all injected effects."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -30,20 +30,20 @@ CONTACT_N_PER_MM = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Position of the stage over time: past, present, and as far ahead as its motion is planned.
+    """Position of the stage over time: past, present, and future as far as the motion is planned.
 
     Parameters
     ----------
     at_mm : callable
-        Positions at times, shape (n,).
+        Returns the positions at given times, shape (n,).
     known_until_s : callable
-        Until when they are known; after it the stage stands unless it is told otherwise.
+        Returns the time until which positions are known; afterwards the stage rests unless a new motion is requested.
     version : callable
-        Changes whenever a plan changes.
+        Returns a number that changes whenever the planned motion changes.
     homed_s : callable
-        When its zero was referenced anew: runs begin there, at rest.
+        Returns the times at which the zero was referenced again: runs start there, at rest.
     began_s : callable
-        When it first moved; infinity before that.
+        Returns the time of the first motion; infinity before it.
     """
 
     at_mm: Callable[[Array], Array]
@@ -54,23 +54,23 @@ class Motion:
 
 
 class SimulatedGripper:
-    """The mechanism, driven by a stage.
+    """The simulated mechanism, driven by a stage.
 
-    Effects act by their own formulas over the whole history of the stage since the bed was opened, in the catalogue's
-    order; camera effects that are visible in the picture's form are left to the camera.
+    Effects act by their own formulas over the whole history of the stage since the test bed was opened, in the order of
+    the catalogue; effects that change the picture itself are applied by the simulated camera.
 
     Parameters
     ----------
     model : Model
-        The gripper as it is drawn.
+        Model of the gripper as drawn.
     motion : Motion
-        The stage.
+        Motion of the stage.
     hidden : Hidden
-        What else acts.
+        Injected effects.
     play_mm : float
-        The drive's own play.
+        Play of the drive.
     since_s : float, optional
-        Since when it warms and drifts; by default since it is first moved.
+        Time since which the gripper has been warming and drifting; by default that of the first motion.
     """
 
     def __init__(
@@ -89,14 +89,14 @@ class SimulatedGripper:
         self._known: tuple[object, Array, Response] | None = None
 
     def looked_at(self, begin_s: float, period_s: float) -> None:
-        """Set when the camera exposes: at one bed time, and every period before and after."""
+        """Set the camera's exposure times: one time of the test bed, and every period before and after it."""
         self._begin_s, self._period_s = begin_s, period_s
         self._known = None
 
     def at(self, time_s: float) -> Response:
-        """Positions of the points at one bed time, and the force; arrays of one element.
+        """Positions of the measuring points, and the force, at one time of the test bed; arrays of one element.
 
-        Before the first motion it is the state at rest.
+        Before the first motion, this is the state at rest.
         """
         began_s = self._motion.began_s()
         version = (self._motion.version(), len(self._motion.homed_s()), began_s)
@@ -109,7 +109,7 @@ class SimulatedGripper:
         return Response(np.interp(at, grid_s, known.left_mm), np.interp(at, grid_s, known.right_mm), force)
 
     def slot_at(self, width_mm: float, time_s: float) -> Response:
-        """Positions of a slot in place of the gripper as seen by the camera, with effects that move the picture."""
+        """Positions of the edges of a slot in place of the gripper, as seen by the camera with its injected effects."""
         began_s = self._motion.began_s() if self._since_s is None else self._since_s
         times_s = np.array([min(began_s, time_s - self._period_s), time_s])
         half = np.full(2, 0.5 * width_mm)

@@ -1,4 +1,4 @@
-"""The effects that are injected into a simulated bed, with their parameters."""
+"""Effects that are injected into a simulated test bed, with their parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ class Hidden:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def of_stage(self, stage: str) -> dict[str, Mapping[str, float]]:
-        """Hidden effects of one stage of the measuring chain, in the order in which they act."""
+        """Injected effects of one stage of the measuring chain, in the order in which they act."""
         return {
             name: self.effects[name]
             for name, effect in catalogue().items()

@@ -1,4 +1,4 @@
-"""Camera effects in the picture itself: what lens and tilt do to a scene, and when it is exposed."""
+"""Camera effects in the picture itself: lens, tilt, and a delay of the exposure."""
 
 from dataclasses import dataclass, replace
 from math import asin, degrees
@@ -13,18 +13,18 @@ TILT_SINE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Optics:
-    """Optical settings with which a frame is drawn.
+    """Optical settings with which a frame is rendered.
 
     Parameters
     ----------
     camera : Camera
         Tilt, lens, blur, noise.
     px_per_mm : float
-        Scale in the middle of the picture.
+        Scale at the centre of the picture.
     half_diagonal_mm : float
-        Of the frame.
+        Half diagonal of the frame.
     late_s : float
-        Frames show what was so long before their stamp.
+        Delay: a frame shows the scene this long before its time stamp.
     """
 
     camera: Camera
@@ -34,30 +34,31 @@ class Optics:
 
 
 def _lens(optics: Optics, k_per_mm2: float) -> Optics:
-    """Map x (1 + k x^2) in mm to the renderer's q = r / half the diagonal."""
+    """Convert the distortion x (1 + k x^2) in mm to the renderer's coordinate q = r / (half the diagonal)."""
     lens = RadialLens(k1=k_per_mm2 * optics.half_diagonal_mm**2)
     return replace(optics, camera=replace(optics.camera, lens=lens))
 
 
 def _tilt(optics: Optics, k_per_mm: float) -> Optics:
-    """Map x / (1 + k x) in mm to a plane tilted about the vertical axis: k = sin(tilt) / distance."""
+    """Convert x / (1 + k x) in mm to a plane tilted about the vertical axis: k = sin(tilt) / distance."""
     sine = TILT_SINE if k_per_mm > 0.0 else -TILT_SINE
     tilt = Tilt(about_y_deg=degrees(asin(sine)), distance_px=sine / k_per_mm * optics.px_per_mm)
     return replace(optics, camera=replace(optics.camera, tilt=tilt))
 
 
 def in_the_picture(name: str) -> bool:
-    """Whether an effect changes the picture itself.
+    """Whether an effect is applied to the picture itself.
 
-    All other camera effects move the scene in front of the camera, which for drifts and scale errors is equivalent.
-    Light that blooms over round tips moves the gap by less than two straight edges (because the tip moves down as
-    well), which would not be `edge_bias` as defined in the catalogue; therefore this effect, too, moves the fingers.
+    All other camera effects are applied by moving the scene in front of the camera, which is equivalent for drifts and
+    scale errors. An edge bias in the picture would change the gap of round tips by less than that of two straight edges
+    (because the tip moves down as well), which is not `edge_bias` as defined in the catalogue; therefore this effect is
+    also applied by moving the fingers.
     """
     return catalogue()[name].in_picture is not None
 
 
 def hidden_in(optics: Optics, hidden: Hidden) -> Optics:
-    """Add the hidden effects of the camera."""
+    """Add the injected effects of the camera to the optical settings."""
     for name, values in hidden.of_stage("camera").items():
         form_of = catalogue()[name].in_picture
         if form_of is None:

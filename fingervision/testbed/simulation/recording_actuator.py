@@ -1,4 +1,4 @@
-"""A real actuator whose readings drive a simulated gripper: hardware in the loop."""
+"""A real actuator whose readings drive a simulated gripper (hardware in the loop)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ class Followed:
     Parameters
     ----------
     actuator : Actuator
-        The real one.
+        The real actuator.
     """
 
     def __init__(self, actuator: Actuator) -> None:
@@ -28,7 +28,7 @@ class Followed:
 
     @property
     def name(self) -> str:
-        """What it is."""
+        """Name of the actuator."""
         return self._actuator.name
 
     @property
@@ -38,7 +38,7 @@ class Followed:
 
     @property
     def busy(self) -> bool:
-        """Whether it moves."""
+        """Whether the actuator moves."""
         return self._actuator.busy
 
     @property
@@ -53,7 +53,7 @@ class Followed:
 
     @property
     def motion(self) -> Motion:
-        """Position of the stage over time, as far as it was read."""
+        """Motion of the stage, as far as it was read."""
         return Motion(
             self._at_mm, self._known_until_s, lambda: len(self._time_s), lambda: list(self._homed_s), self._began_s
         )
@@ -68,7 +68,7 @@ class Followed:
         self._actuator.check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
-        """Begin to move."""
+        """Begin to move to a position at a positive speed."""
         self._actuator.move(to_mm, speed_mm_s)
 
     def jog(self, speed_mm_s: float) -> None:
@@ -76,11 +76,11 @@ class Followed:
         self._actuator.jog(speed_mm_s)
 
     def run_step(self, number: int) -> None:
-        """Begin a step data block."""
+        """Begin the motion of a step data block."""
         self._actuator.run_step(number)
 
     def stop(self) -> None:
-        """Stop at once."""
+        """Stop the motion at once."""
         self._actuator.stop()
 
     def close(self) -> None:

@@ -1,11 +1,11 @@
-"""Drawing of the published physical sample: the default gripper of a simulated bed."""
+"""Drawing of the published physical sample, the default gripper of a simulated test bed."""
 
 from fingervision.domain.gripper import Body, Gripper, Material
 from fingervision.models.reference_mesh import REFERENCE_HINGE, REFERENCE_LEVER, REFERENCE_LINKS
 
 
 def sample_gripper() -> Gripper:
-    """Return the drawing; data of material and body are published, the others are those of sample_frames/paper."""
+    """Return the drawing; material and body are published, the other dimensions are those of sample_frames/paper."""
     return Gripper(
         material=Material("PA2200", 1650.0, 0.34, 930.0, 48.0),
         body=Body(80.0, 100.0, 3.0, 4.0, 0.3),

@@ -1,4 +1,4 @@
-"""Motion of a stage as pieces of constant acceleration, one after another."""
+"""Motion of a stage, composed of pieces of constant acceleration."""
 
 from math import copysign, sqrt
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Piece = tuple[float, float, float, float, float]
-"""Begin, position and speed there, acceleration, duration."""
+"""A piece of the motion: start time, position and speed at the start, acceleration, duration."""
 
 # With 16 m/s2 the paper's stage covers its 10 mm within 50 ms as a triangle of 400 mm/s (v = 2 s / T, a = 4 s / T2).
 ACCELERATION_MM_S2 = 16000.0
@@ -16,16 +16,17 @@ LEAD_PERIODS_MM, LEAD_SHARES = (7.3, 2.9, 1.1), (0.55, 0.3, 0.15)
 
 
 class SimulatedStage:
-    """True position of the stage, for all times until now and as planned.
+    """True position of the stage, for all past times and as planned.
 
     Parameters
     ----------
     lower_mm, upper_mm : float
-        Its stops.
+        Positions of the end stops.
     accuracy_mm : float
-        It comes to a stand within +- this of where it was sent, always at the same place for the same target.
+        Largest distance between a target and the position at which the stage stops, which is always the same for a
+        target.
     rng : numpy.random.Generator
-        Of its lead errors.
+        Generator of the lead errors.
     """
 
     def __init__(self, lower_mm: float, upper_mm: float, accuracy_mm: float, rng: np.random.Generator) -> None:
@@ -60,7 +61,7 @@ class SimulatedStage:
         return min(max(landed_mm, self.lower_mm), self.upper_mm)
 
     def go(self, now_s: float, target_mm: float, speed_mm_s: float) -> None:
-        """Begin a motion; a motion under way is ended first."""
+        """Begin a motion; a motion in progress is ended first."""
         self.halt(now_s)
         begin_s = max(now_s, self.planned_until_s)
         from_mm = float(self.at_mm(np.array([begin_s]))[0])
@@ -98,7 +99,7 @@ class SimulatedStage:
         self.version += 1
 
     def home(self, now_s: float, speed_mm_s: float) -> None:
-        """Go to the reference; a new run begins there, with the correct zero."""
+        """Move to the reference; a new run begins there, with the correct zero."""
         self.go(now_s, 0.0, speed_mm_s)
         self.homed_s.append(max(now_s, self.planned_until_s))
         self.version += 1
@@ -110,12 +111,12 @@ class SimulatedStage:
         return sorted({at for piece in ends for at in piece if at not in joined and after_s < at <= until_s})
 
     def moves(self, time_s: Array) -> NDArray[np.bool_]:
-        """Whether the stage moves at the given bed times, shape (n,)."""
+        """Whether the stage moves at the given times of the test bed, shape (n,)."""
         rows = self._pieces_at(time_s)
         return np.asarray(time_s < rows[:, 0] + rows[:, 4], dtype=np.bool_)
 
     def at_mm(self, time_s: Array) -> Array:
-        """True positions at the given bed times, shape (n,) (mm)."""
+        """True positions at the given times of the test bed, shape (n,) (mm)."""
         rows = self._pieces_at(time_s)
         rows[:, 0] = np.where(np.isfinite(rows[:, 0]), rows[:, 0], time_s)
         since_s = np.minimum(time_s - rows[:, 0], rows[:, 4])
