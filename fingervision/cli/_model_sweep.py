@@ -84,7 +84,7 @@ def _write(
 def _draw(
     name: str, variations: Sequence[Variation], values: Array, columns: Sequence[str], answers: Array, path: Path
 ) -> None:
-    """Draw every column over the number that varies fastest; the first number colours the curves of a grid."""
+    """Plot every column over the number that varies fastest; colours show the first number if two numbers vary."""
     last = variations[-1]
     count = len(last.values)
     first = values[::count, 0]
