@@ -1,1 +1,1 @@
-"""Adapters to the software of laboratories, one per file; each needs its own library, which is an optional extra."""
+"""Adapters to laboratory software, one per module; each needs a library that is an optional extra."""

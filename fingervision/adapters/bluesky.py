@@ -1,11 +1,12 @@
-"""A test bed for bluesky: stage, force sensor and camera as devices of its RunEngine.
+"""A test bed for bluesky: stage, force sensor and camera as devices of the RunEngine of bluesky.
 
 The stage is movable, readable, stoppable and flyable; the force sensor is readable. The camera is readable and flyable:
 each measured frame is one event, with stage position and force at its exposure. `bluesky_agent` suggests the next run.
 
-Tested with a real RunEngine of bluesky 1.15 on the simulated bed (tests/adapters/test_bluesky.py); on hardware only as
-far as the bed's own devices are. A simulated bed must be opened with `pace=1`: time then passes for every device alike.
-Protocols: bluesky.protocols, https://blueskyproject.io/bluesky/main/hardware.html. Needs the extra `bluesky`.
+The adapter is tested with a RunEngine of bluesky 1.15 on the simulated test bed (tests/adapters/test_bluesky.py); on
+hardware, only the devices of the test bed are tested. A simulated test bed must be opened with `pace=1`, so that its
+time advances in the same way for every device. Protocols: bluesky.protocols,
+https://blueskyproject.io/bluesky/main/hardware.html. The adapter needs the extra `bluesky`.
 """
 
 import threading
@@ -29,7 +30,7 @@ JOINED_WITHIN_S = 5.0
 
 
 class _Shared:
-    """An actuator whose readings are shared by several readers; otherwise one reader would take them from another."""
+    """An actuator whose readings go to several readers; otherwise each reading would reach only one of them."""
 
     def __init__(self, actuator: Any, lock: threading.RLock) -> None:
         self._actuator, self._lock = actuator, lock
@@ -81,30 +82,30 @@ class StageDevice:
         return {"fields": [self.name]}
 
     def set(self, value: float) -> ThreadStatus:
-        """Move to a position in mm at `speed_mm_s`; the status is done when the stage stands there."""
+        """Move to a position in mm at `speed_mm_s`; the status is done when the stage is at rest at this position."""
         self._within(value)
         self._actuator.move(float(value), self.speed_mm_s)
         return ThreadStatus(self._until_rest)
 
     def stop(self, success: bool = True) -> None:
-        """Stop the motor at once, whatever command is under way."""
+        """Stop the motor at once, during any command."""
         self._actuator.stop()
 
     def read(self) -> dict[str, dict[str, Any]]:
-        """Position of now."""
+        """Return the present position."""
         newest = self._consumer.readings()[-1]
         return {self.name: {"value": newest.value, "timestamp": self._unix_s + newest.got_s}}
 
     def describe(self) -> dict[str, dict[str, Any]]:
-        """Unit and source of the position."""
+        """Return unit and source of the position."""
         return {self.name: {"source": self._actuator.name, "dtype": "number", "shape": [], "units": "mm"}}
 
     def read_configuration(self) -> dict[str, dict[str, Any]]:
-        """Speed of the motions."""
+        """Return the speed of motions."""
         return {f"{self.name}_speed": {"value": self.speed_mm_s, "timestamp": time.time()}}
 
     def describe_configuration(self) -> dict[str, dict[str, Any]]:
-        """Unit of the speed."""
+        """Return the unit of the speed."""
         return {f"{self.name}_speed": {"source": "settings", "dtype": "number", "shape": [], "units": "mm/s"}}
 
     def prepare(self, value: tuple[float, float]) -> ThreadStatus:
@@ -114,7 +115,7 @@ class StageDevice:
         return ThreadStatus(lambda: None)
 
     def kickoff(self) -> ThreadStatus:
-        """Begin to fly."""
+        """Start the motion of the flight."""
         if self._flight is None:
             raise StateError(
                 f"{self.name} must be prepared with (to_mm, speed_mm_s) before kickoff (Bluesky's fly scan)."
@@ -134,11 +135,11 @@ class StageDevice:
         return ThreadStatus(work)
 
     def describe_collect(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """The stream of a flight: positions."""
+        """Describe the data stream of a flight: positions."""
         return {f"{self.name}_flight": self.describe()}
 
     def collect(self) -> Iterator[dict[str, Any]]:
-        """Give every reading of the flight."""
+        """Yield every reading of the flight."""
         for one in self._flown:
             at_s = self._unix_s + one.got_s
             yield {"time": at_s, "data": {self.name: one.value}, "timestamps": {self.name: at_s}}
@@ -170,18 +171,18 @@ class ForceDevice:
         self.name, self._sensor, self._lock, self._unix_s = name, bed.force_sensor, lock, unix_s
 
     def read(self) -> dict[str, dict[str, Any]]:
-        """Force of now."""
+        """Return the present force."""
         with self._lock:
             newest = self._sensor.readings()[-1]
         return {self.name: {"value": newest.value, "timestamp": self._unix_s + newest.got_s}}
 
     def describe(self) -> dict[str, dict[str, Any]]:
-        """Unit and source of the force."""
+        """Return unit and source of the force."""
         return {self.name: {"source": self._sensor.name, "dtype": "number", "shape": [], "units": "N"}}
 
 
 class GapDevice:
-    """The camera with its frames measured: readable after `trigger`, or flyable with one event per frame."""
+    """The camera as a device that measures the gap: readable after `trigger`, or flyable with one event per frame."""
 
     parent = None
 
@@ -201,7 +202,7 @@ class GapDevice:
         return {"fields": [f"{self.name}_gap_mm"]}
 
     def trigger(self) -> ThreadStatus:
-        """Take a frame whose exposure begins after this call, and measure it."""
+        """Acquire a frame whose exposure begins after this call, and measure the frame."""
 
         def work() -> None:
             with self._lock:
@@ -214,14 +215,14 @@ class GapDevice:
         return ThreadStatus(work)
 
     def read(self) -> dict[str, dict[str, Any]]:
-        """Gap, edges, stage and force of the last triggered frame; None where a frame has no gap."""
+        """Return gap, edges, stage position and force of the last triggered frame; None for a missing gap."""
         if self._newest is None:
             raise StateError(f"{self.name} must be triggered before it is read: no frame was taken yet.")
         at_s = self._unix_s + self._at_s
         return {key: {"value": value, "timestamp": at_s} for key, value in self._newest.items()}
 
     def describe(self) -> dict[str, dict[str, Any]]:
-        """Units of the columns."""
+        """Return the units of the columns."""
         units = {"gap_mm": "mm", "u_gap_mm": "mm", "left_mm": "mm", "right_mm": "mm", "input_mm": "mm", "force_n": "N"}
         keys = {
             f"{self.name}_{key}": {"source": self._source, "dtype": "number", "shape": [], "units": unit}
@@ -230,14 +231,14 @@ class GapDevice:
         return {**keys, f"{self.name}_status": {"source": self._source, "dtype": "string", "shape": []}}
 
     def kickoff(self) -> ThreadStatus:
-        """Begin to measure every frame."""
+        """Start to measure every frame."""
         self._stop_flight.clear()
         self._flown = []
         self._flight = ThreadStatus(self._fly)
         return ThreadStatus(lambda: None)
 
     def complete(self) -> ThreadStatus:
-        """Stop after the next few frames."""
+        """End the measurement after the next few frames."""
         self._stop_flight.set()
         flight = self._flight
 
@@ -249,7 +250,7 @@ class GapDevice:
         return ThreadStatus(work)
 
     def describe_collect(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """The stream of a flight: the columns of a frame."""
+        """Describe the data stream of a flight: the columns of a frame."""
         return {f"{self.name}_flight": self.describe()}
 
     def collect(self) -> Iterator[dict[str, Any]]:
@@ -260,9 +261,9 @@ class GapDevice:
         self._flown = []
 
     def _begin(self) -> float:
-        """Read the stage before the first frame that counts, and return the time from which frames count.
+        """Read the stage position before the first frame to be used, and return the time from which frames are used.
 
-        The time is in seconds on the bed's clock.
+        The time is in seconds by the test bed's clock.
         """
         instruments = [one for one in (self._sight.position, self._sight.force) if one is not None]
         until_s = self._clock.now_s() + JOINED_WITHIN_S
@@ -313,7 +314,7 @@ class GapDevice:
 
 
 class Devices(NamedTuple):
-    """The devices of a bed; None for a part that the bed lacks."""
+    """The bluesky devices of a test bed; None for a part that the test bed lacks."""
 
     stage: StageDevice
     force: ForceDevice | None
@@ -321,7 +322,7 @@ class Devices(NamedTuple):
 
 
 def devices(bed: Bed, *, prefix: str = "") -> Devices:
-    """Make the devices of an open bed: `stage`, `force`, `gap`, each with the prefix before its name."""
+    """Make the devices of an open test bed: `stage`, `force` and `gap`, with the prefix before each name."""
     lock, unix_s = threading.RLock(), time.time() - bed.clock.now_s()
     shared = _Shared(bed.actuator, lock)
     return Devices(

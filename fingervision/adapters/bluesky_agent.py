@@ -1,7 +1,7 @@
 """An agent for bluesky that suggests the next run, and a plan that executes the steps of a recipe.
 
-`NextRunAgent` takes measured rows (`ingest`, or as a subscriber of the RunEngine), diagnoses them, and suggests the run
-that best separates the explanations still possible (`suggest`). Needs the extra `bluesky`.
+`NextRunAgent` receives measured rows (by `ingest`, or as a subscriber of the RunEngine), diagnoses these rows, and
+suggests the run that best distinguishes the remaining explanations (`suggest`). The module needs the extra `bluesky`.
 """
 
 import csv
@@ -20,16 +20,16 @@ ROW = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
 
 
 class NextRunAgent:
-    """Diagnoses measured rows, and suggests the run that separates the explanations still possible.
+    """Diagnoses measured rows, and suggests the run that best distinguishes the remaining explanations.
 
     Parameters
     ----------
     model : CorrectedModel
         Model that is compared with the measurement (`fingervision.tables.read.read_model`).
     gap : str
-        Name of the `GapDevice` whose events it takes as a subscriber (`RE.subscribe(agent)`).
+        Name of the `GapDevice` whose events the agent receives as a subscriber (`RE.subscribe(agent)`).
     seed : int
-        Of the diagnosis.
+        Random seed of the diagnosis.
     """
 
     def __init__(self, model: CorrectedModel, gap: str = "gap", *, seed: int = 1) -> None:
@@ -39,7 +39,7 @@ class NextRunAgent:
         self._answer: Diagnosis | None = None
 
     def ingest(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Take rows with `input_mm` and any of `gap_mm`, `run`, `time_s`, `left_mm`, `right_mm`, `force_n`."""
+        """Add rows with `input_mm` and any of `gap_mm`, `run`, `time_s`, `left_mm`, `right_mm`, `force_n`."""
         for row in rows:
             if row.get("input_mm") is None:
                 raise DataError(f"Every row must have input_mm, but one has {sorted(row)}: add it.")
@@ -57,7 +57,7 @@ class NextRunAgent:
                 self._ingest_event(at_s, {key: values[k] for key, values in document["data"].items()})
 
     def report(self) -> Diagnosis:
-        """Diagnose all rows taken so far."""
+        """Diagnose all rows received so far."""
         if self._answer is None:
             with TemporaryDirectory(prefix="fingervision-") as folder:
                 path = Path(folder) / "measured.csv"
@@ -70,7 +70,7 @@ class NextRunAgent:
         return self._answer
 
     def suggest(self, batch_size: int = 1) -> list[dict[str, Any]]:
-        """Suggest the next run: `name`, `steps` as in a recipe, `separates`; empty where one explanation is left."""
+        """Suggest the next run: `name`, `steps` as in a recipe, `separates`; empty if a single explanation remains."""
         proposed = self.report().report.next_run
         if proposed is None or batch_size < 1:
             return []
@@ -85,9 +85,9 @@ class NextRunAgent:
 
 
 def run_steps(steps: Sequence[Mapping[str, Any]], stage: StageDevice, gap: GapDevice) -> Iterator[Any]:
-    """Give a bluesky plan for the steps of a recipe: one run, the gap flown while the stage moves.
+    """Return a bluesky plan for the steps of a recipe: one run, in which the gap is measured while the stage moves.
 
-    The kinds triangle, move and hold are supported; others need the bed's own runner (`fingervision bed run`).
+    The kinds triangle, move and hold are supported; other kinds of steps require `fingervision bed run`.
     """
     import bluesky.plan_stubs as bps
     import bluesky.preprocessors as bpp

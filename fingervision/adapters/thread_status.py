@@ -1,4 +1,4 @@
-"""Status of work in a thread, as bluesky.protocols.Status asks for it: done, callbacks, exception."""
+"""Status of work in a thread, following bluesky.protocols.Status: done, callbacks, exception."""
 
 import threading
 from collections.abc import Callable
@@ -10,7 +10,7 @@ class ThreadStatus:
     Parameters
     ----------
     work : callable
-        Returns when it is done; an exception is the status's.
+        Function that does the work; the status reports an exception that it raises.
     """
 
     def __init__(self, work: Callable[[], None]) -> None:

@@ -1,4 +1,4 @@
-"""Batch processing of many recordings or tables, on this machine's cores or on an existing Dask cluster.
+"""Batch processing of many recordings or tables, on the cores of this computer or on an existing Dask cluster.
 
-Each input gets its own result folder.
+Each input has a result folder of its own.
 """

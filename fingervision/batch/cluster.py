@@ -1,4 +1,4 @@
-"""Workers of an existing Dask cluster, with all files on a path that every machine sees."""
+"""Workers of an existing Dask cluster; all files must be on a path that every computer can access."""
 
 import logging
 import os
@@ -22,19 +22,19 @@ WINDOW = 4
 
 @contextmanager
 def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
-    """Connect to a cluster and check that its workers run the same versions as this machine.
+    """Connect to a cluster and check that its workers have the same software versions as this computer.
 
     Parameters
     ----------
     scheduler : str
-        `tcp://HOST:PORT`.
+        Address of the scheduler, `tcp://HOST:PORT`.
     patience_s : float
-        Time to wait for an answer.
+        Longest time to wait for a response of the scheduler.
 
     Yields
     ------
     distributed.Client
-        Its `get_executor()` is a `concurrent.futures.Executor`.
+        Connected client; its `get_executor()` returns a `concurrent.futures.Executor`.
 
     Raises
     ------
@@ -84,9 +84,9 @@ def _check_workers(client: Any, scheduler: str, patience_s: float) -> None:
 
 
 def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generator[tuple[int, Outcome], None, None]:
-    """Process tasks on a cluster, and yield each outcome as it arrives, with its task's number.
+    """Process tasks on a cluster, and yield each outcome as it arrives, with the index of its task.
 
-    The scheduler gives the task of a dead worker to another one; a task may then run twice, which does no harm.
+    The scheduler assigns the task of a dead worker to another worker; a task may then run twice, which is harmless.
 
     Raises
     ------
@@ -134,12 +134,12 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
 
 
 def _absolute(task: Task) -> Task:
-    """Make file names absolute, so that a process with another working directory finds them."""
+    """Make the file names in a task absolute, because a worker may have another working directory."""
     return replace(task, input=os.path.abspath(task.input), folder=Path(os.path.abspath(task.folder)))  # noqa: PTH100
 
 
 def _work_there(task: Task, perform: Perform, wanted: dict[str, str]) -> Outcome:
-    """Process a task on a worker; a worker that joined after the check is checked here."""
+    """On a worker, process a task; the versions of a worker that joined the cluster late are checked first."""
     words = difference(wanted, versions())
     if words:
         return failure(task, f"A worker joined that has {words}: install the same there and restart it.")

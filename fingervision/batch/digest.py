@@ -1,4 +1,4 @@
-"""Summary of one result for the overview: a table row and a small picture."""
+"""Summary of one result for the overview: a table row and a small plot."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ class Digest:
     Parameters
     ----------
     cells : mapping of str to text, number or None
-        Its line of the table, by column.
+        Cells of the result's table row, by column.
     curve : tuple of float or None
-        At most `CURVE_POINTS` values, evenly spaced; None is a hole.
+        At most `CURVE_POINTS` evenly spaced values for the small plot; None for a missing value.
     caption : str
-        A few words below the picture.
+        Short caption of the plot.
     """
 
     cells: Mapping[str, Cell]
@@ -31,12 +31,12 @@ class Digest:
 
 
 def thinned(values: NDArray[np.float64]) -> tuple[float | None, ...]:
-    """Select evenly spaced values, rounded to five figures.
+    """Select evenly spaced values, rounded to five significant digits.
 
     Parameters
     ----------
     values : ndarray of float, shape (n,)
-        Not a number where there is a hole.
+        Values; NaN for a missing value.
     """
     if values.size > CURVE_POINTS:
         values = values[np.linspace(0, values.size - 1, CURVE_POINTS).round().astype(np.int64)]

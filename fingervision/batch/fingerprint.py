@@ -1,4 +1,4 @@
-"""Detect a changed input: by size and time of change first, then by the hash of its content."""
+"""Detect changes of an input, first by size and modification time, then by the hash of its content."""
 
 import hashlib
 from pathlib import Path
@@ -12,7 +12,7 @@ SETTLED_NS = 3_000_000_000
 
 
 def files_of(path: Path) -> list[Path]:
-    """Files of an input: itself and the columns.toml beside it; for a folder, its files that are not hidden."""
+    """Files of an input: the file and the columns.toml beside it, or the files in a folder that are not hidden."""
     if not path.is_dir():
         columns = path.parent / COLUMNS
         return [path, columns] if columns != path and columns.is_file() else [path]
@@ -20,7 +20,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def stamp_of(path: Path) -> str:
-    """Sizes and modification times; while they are unchanged, so is the content of files that are settled.
+    """Sizes and modification times of an input's files; if they are unchanged, so is the content of settled files.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def stamp_of(path: Path) -> str:
 
 
 def is_settled(path: Path) -> bool:
-    """Whether the last change is old enough that a further change would give another modification time.
+    """Whether the last change is so old that any further change would give a different modification time.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def is_settled(path: Path) -> bool:
 
 
 def content_hash(path: Path) -> str:
-    """SHA-256 of the bytes of a file; of a folder, of its files' names and hashes.
+    """SHA-256 hash of the content of a file, or of the names and hashes of the files in a folder.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The recordings or tables that a user names: paths, and patterns in quotes."""
+"""List the recordings or tables that a user names by paths and by patterns in quotes."""
 
 import glob
 import mimetypes
@@ -12,9 +12,9 @@ from fingervision.domain.errors import InputFileError, UsageError
 def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
     """List every input once, in natural order within each name (run2 before run10).
 
-    A folder is one input (of images); then the files in it are not inputs. Nothing inside `out` is an input, because
-    videos written by an earlier call may match the pattern as well. A missing path is kept, so that it is listed with
-    its error; so is a pattern without a match, if others match.
+    A folder is a single input (a sequence of images), and the files in this folder are then not inputs. Files inside
+    `out` are not inputs, because videos written by an earlier call may match a pattern. A missing path is kept, so that
+    it is listed with its error; a pattern without a match is kept too if other names match.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Worker processes on this machine: one per core, each with one task at a time."""
+"""Worker processes on this computer, one per core, each with one task at a time."""
 
 import multiprocessing
 import os
@@ -36,18 +36,18 @@ def cores() -> tuple[int, ...]:
 
 
 class LocalCrew:
-    """Worker processes of this machine, started together, each with one task at a time.
+    """Worker processes on this computer, started together, each with one task at a time.
 
     Each process is bound to one core, so that decoders, OpenCV and linear algebra start one thread each instead of one
-    per core; as many processes as cores then fill the machine exactly. A process that dies (by a fault in a decoder, or
-    for lack of memory) loses only its own task.
+    per core; with as many processes as cores, every core is then used exactly once. If a process dies (because of a
+    fault in a decoder, or lack of memory), only its task is lost.
 
     Parameters
     ----------
     perform : callable
-        Importable by its name.
+        Function that performs a command; it must be importable by name.
     size : int
-        Processes.
+        Number of processes.
     """
 
     def __init__(self, perform: Perform, size: int) -> None:
@@ -57,19 +57,20 @@ class LocalCrew:
         self._fill_up()
 
     def __enter__(self) -> Self:
-        """Return the crew; all of its processes end when the block is left."""
+        """Return this object; all of its processes are ended when the `with` block is left."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let all go."""
+        """End all processes."""
         self._let_go()
         for worker in self._workers.values():
             worker.process.join()
 
     def answer(self, command: str, arguments: tuple[str, ...]) -> Ended:
-        """Let a worker execute a command and return its answer.
+        """Let a worker execute a command, and return the worker's result.
 
-        Every process is asked, so that all of them meanwhile import what the tasks need; the first answer counts.
+        The command is sent to every process, so that all of them already import the modules that the tasks need; the
+        first result is returned.
 
         Raises
         ------
@@ -95,12 +96,12 @@ class LocalCrew:
         )
 
     def outcomes_of(self, tasks: Sequence[Task]) -> Generator[tuple[int, Outcome], None, None]:
-        """Process tasks, and yield each outcome as it arrives, with its task's number; the workers end afterwards.
+        """Process tasks, and yield each outcome as it arrives, with the index of its task; then end the workers.
 
         Parameters
         ----------
         tasks : sequence of Task
-            What shall be done.
+            Tasks to process.
         """
         waiting = deque(range(len(tasks)))
         attempts = [0] * len(tasks)
@@ -161,7 +162,7 @@ class LocalCrew:
         del self._workers[worker.link]
 
     def _let_go(self) -> None:
-        """End the tasks in progress; idle workers end by themselves."""
+        """End workers with a task in progress; idle workers end by themselves."""
         busy = [worker for worker in self._workers.values() if worker.number is not None or worker.is_asked]
         for worker in busy:
             worker.process.kill()
@@ -183,7 +184,7 @@ def _died(task: Task, exit_code: int | None) -> str:
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Block Ctrl-C, so that a process started meanwhile never receives it, even before it can ignore it."""
+    """Block Ctrl-C, so that a process started in the `with` block never receives it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

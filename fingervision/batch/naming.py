@@ -1,4 +1,4 @@
-"""Names of result folders: the file name, with as much of the path as makes it unique."""
+"""Names of result folders: the file name of the input, with as much of its path as makes the name unique."""
 
 import hashlib
 from collections import Counter
@@ -11,14 +11,14 @@ LONGEST = 200
 
 
 def folder_names(inputs: Sequence[Path], taken: Collection[str]) -> tuple[str, ...]:
-    """Choose a unique folder name for each input, also if upper and lower case are not distinguished.
+    """Choose a folder name for each input; names are unique even without distinction of upper and lower case.
 
     Parameters
     ----------
     inputs : sequence of Path
-        Absolute, all different.
+        Absolute paths of the inputs, all different.
     taken : collection of str
-        Names that belong to something else.
+        Names that are already in use.
     """
     parts = [path.parts[1:] or path.parts for path in inputs]
     depth = [1] * len(inputs)

@@ -1,4 +1,4 @@
-"""Overview of all results: a table, a figure, and a page with a small picture of each."""
+"""Overview of all results: a table, a plot, and an HTML page with a small plot of each result."""
 
 import csv
 import hashlib
@@ -46,7 +46,7 @@ def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None
 
 
 def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> str:
-    """Write one line per input; an empty cell where there is no value."""
+    """Return the text of batch.csv: one line per input, with empty cells for missing values."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow((*FIRST_COLUMNS, *reduction.COLUMNS, "seconds"))
@@ -61,7 +61,7 @@ def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> 
 
 
 def _no_formula(cell: Cell) -> Cell:
-    """Keep a spreadsheet from treating a name as a formula, by an apostrophe that marks text."""
+    """Put an apostrophe before a name that a spreadsheet would interpret as a formula."""
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t")) else cell
 
 

@@ -1,4 +1,4 @@
-"""How the results of a command are summarised in a table, a figure and small pictures: one module per command."""
+"""Summaries of the results of a command in a table, a plot and small plots, with one module per command."""
 
 import importlib
 import pkgutil
@@ -17,7 +17,7 @@ PREFIX = "results_of_"
 
 
 class Reduction(Protocol):
-    """What a module `results_of_<command>` must provide."""
+    """Protocol of a module `results_of_<command>`."""
 
     COLUMNS: tuple[str, ...]
     """Columns of its table after those that every command has."""
@@ -27,7 +27,7 @@ class Reduction(Protocol):
         ...
 
     def draw(self, figure: "Figure", outcomes: Sequence[Outcome]) -> None:
-        """Draw the figure of all results."""
+        """Draw the plot of all results."""
         ...
 
 

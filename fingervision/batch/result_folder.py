@@ -1,4 +1,4 @@
-"""The folder of one result: written beside its final place and renamed when complete, with a record of its input."""
+"""Folder of one result with a record of its input: written under a temporary name, and renamed when complete."""
 
 import errno
 import hashlib
@@ -31,21 +31,21 @@ class Record:
     input : str
         Absolute path of the input.
     stamp : str or None
-        See `fingerprint.stamp_of`.
+        Sizes and modification times of the input's files, from `fingerprint.stamp_of`.
     content : str
         Hash of the input's content.
     options_key : str
-        Hash of options, the files that they name, and version.
+        Hash of the options, of the files that the options name, and of the version.
     exit_code : int
-        How the command ended.
+        Exit code of the command.
     words : str
-        Its sentence.
+        Sentence with which the command ended.
     seconds : float
-        Time that it took.
+        Duration of the command.
     digest : Digest
-        Its line of the table and its small picture.
+        Table row and small plot of the result.
     tables : mapping of str to (int, int, str)
-        Size, time of change and hash of its tables, by file name.
+        Size, modification time and hash of each table of the result, by file name.
     """
 
     input: str
@@ -60,7 +60,7 @@ class Record:
 
 
 def read_record(folder: Path) -> Record | None:
-    """Read the record of a result; None where there is none, or it is unreadable."""
+    """Read the record of a result; None for a missing or unreadable record."""
     try:
         held: Mapping[str, object] = json.loads((folder / RECORD).read_bytes())
         if held.pop("schema") != SCHEMA:  # type: ignore[attr-defined]
@@ -75,7 +75,7 @@ def read_record(folder: Path) -> Record | None:
 
 
 def write_record(folder: Path, place: Path, record: Record) -> None:
-    """Write the record of a result into `folder`, which is or will be at `place`.
+    """Write the record of a result into `folder`, whose final path is `place`.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def write_record(folder: Path, place: Path, record: Record) -> None:
 
 
 def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
-    """Size, time of change (ns) and hash of every table of a result, by file name.
+    """Size, modification time (ns) and hash of every table of a result, by file name.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
 
 
 def is_whole(folder: Path, record: Record) -> bool:
-    """Whether a result's tables are unchanged since they were written; they are read only if their time differs."""
+    """Whether the tables of a result are unchanged; a table is read only if its modification time differs."""
     try:
         for name, (size, changed_ns, content) in record.tables.items():
             stat = (folder / name).stat()
@@ -135,7 +135,7 @@ def _hash(path: Path) -> str:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Replace a text file; an older one stays complete until the new one is complete.
+    """Replace a text file; the older file remains until the new file is complete.
 
     Raises
     ------
@@ -153,15 +153,15 @@ def replace_text(path: Path, text: str) -> None:
 
 
 def new_part(folder: Path) -> Path:
-    """Choose a name beside the result folder that no other worker uses; it contains the worker's identity."""
+    """Choose a temporary folder name beside the result folder, which contains the identity of the worker."""
     return folder.with_name(f".{folder.name}.part~{_host()}~{os.getpid()}~{uuid4().hex[:8]}")
 
 
 def publish(part: Path, folder: Path, record: Record) -> None:
-    """Rename a complete result into its place; an older one is moved aside first and then removed.
+    """Rename a complete result to its final name; an older result is first moved aside and then removed.
 
-    Where another worker has finished the same task first (a scheduler may assign a task twice), that worker's result
-    stays.
+    If another worker has finished the same task before (a scheduler may assign a task twice), the result of that worker
+    is kept.
 
     Raises
     ------
@@ -190,12 +190,12 @@ def publish(part: Path, folder: Path, record: Record) -> None:
 
 
 def is_same(there: Record, wanted: Record) -> bool:
-    """Whether a result is of the same input, with the same content and options."""
+    """Whether two records are of the same input, with the same content and options."""
     return (there.input, there.content, there.options_key) == (wanted.input, wanted.content, wanted.options_key)
 
 
 def remove_left_parts(out: Path) -> None:
-    """Remove unfinished folders of dead workers of this machine; those of live workers and of other machines stay."""
+    """Remove unfinished folders of ended workers on this computer, not those of running workers or other computers."""
     for entry in out.iterdir():
         found = PART.fullmatch(entry.name)
         if found is not None and found["host"] == _host() and not _lives(int(found["pid"])):

@@ -1,4 +1,4 @@
-"""Summary of diagnoses: how often each verdict was given, and the disagreement that it left."""
+"""Summary of diagnoses: frequency of each verdict, and the remaining disagreement."""
 
 import json
 from collections import Counter
@@ -45,7 +45,7 @@ def digest_of(folder: Path) -> Digest:
 
 
 def draw(figure: "Figure", outcomes: Sequence[Outcome]) -> None:
-    """Draw how often each verdict was given, and the disagreement after it against that before it."""
+    """Plot the frequency of each verdict, and the disagreement after the diagnosis over the disagreement before it."""
     left, right = figure.subplots(1, 2)
     done = [outcome.digest.cells for outcome in outcomes if outcome.digest is not None]
     answers = Counter((str(cells["effects"]) or str(cells["verdict"]), str(cells["verdict"])) for cells in done)

@@ -1,4 +1,4 @@
-"""Summary of measurements: range of each recording's gap, with its uncertainty."""
+"""Summary of measurements: range of the gap in each recording, with its uncertainty."""
 
 import csv
 import json
@@ -40,7 +40,7 @@ def digest_of(folder: Path) -> Digest:
 
 
 def draw(figure: "Figure", outcomes: Sequence[Outcome]) -> None:
-    """Draw each recording's range of the gap with its median, and the uncertainty of a single frame."""
+    """Plot range and median of the gap in each recording, and the uncertainty of a single frame."""
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     number = np.arange(1, len(outcomes) + 1)
     least, median, greatest, u_mm = (

@@ -53,11 +53,11 @@ class Plan:
     Parameters
     ----------
     job : Job
-        What the user wants.
+        The user's request.
     tasks : tuple of Task
         One for each input.
     done : dict of int to Outcome
-        Those that have their result, by their place in `tasks`.
+        Outcomes of inputs that have a result already, by index in `tasks`.
     """
 
     job: Job
@@ -66,7 +66,7 @@ class Plan:
 
     @property
     def to_do(self) -> tuple[int, ...]:
-        """Indices of the tasks that remain."""
+        """Indices of the tasks that are still to be processed."""
         return tuple(number for number in range(len(self.tasks)) if number not in self.done)
 
 
@@ -79,11 +79,11 @@ class Batch:
     out : Path
         Folder of all results.
     outcomes : tuple of Outcome
-        One for each input, in their order.
+        One outcome for each input, in the order of the inputs.
     fresh : int
-        How many of them were worked on by this call.
+        Number of inputs that were processed by this call.
     stopped : str
-        Why it stopped before its end; empty where it did not.
+        Reason why the batch stopped early; empty for a complete batch.
     """
 
     out: Path
@@ -93,12 +93,12 @@ class Batch:
 
     @property
     def bad(self) -> tuple[Outcome, ...]:
-        """Outcomes that have a message to read."""
+        """Outcomes with a message for the user."""
         return tuple(outcome for outcome in self.outcomes if outcome.exit_code)
 
     @property
     def exit_code(self) -> ExitCode:
-        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done; 2 wrong usage in all inputs."""
+        """Exit code: 0 all done; 3 done, but some inputs bad; 1 stopped, or none done; 2 wrong usage for all inputs."""
         codes = {outcome.exit_code for outcome in self.outcomes}
         if self.stopped:
             return ExitCode.COULD_NOT
@@ -114,9 +114,9 @@ Progress = Callable[[int, int], None]
 
 
 def planned(job: Job) -> Plan:
-    """Find the inputs, and which of them already have their result.
+    """Find the inputs, and determine which of them already have a result.
 
-    An input keeps its folder from an earlier call; a new one gets the shortest unused name.
+    An input keeps its folder from an earlier call; the folder of a new input has the shortest unused name.
 
     Raises
     ------
@@ -155,11 +155,11 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
     Parameters
     ----------
     plan : Plan
-        See `planned`.
+        Inputs and tasks, from `planned`.
     crew : callable
-        Works on tasks and gives each outcome with its task's place, as they come.
+        Function that processes tasks and yields each outcome, as it arrives, with the index of its task.
     on_progress : callable, optional
-        Called with the tasks done and all tasks of this call.
+        Function called with the number of completed tasks and the number of all tasks of this call.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def _check_folder(job: Job) -> None:
 
 
 def _claim(job: Job) -> None:
-    """Create the result folder, and mark it as that of a batch."""
+    """Create the result folder, and mark it as the result folder of a batch."""
     mark = job.out / MARK
     try:
         job.out.mkdir(parents=True, exist_ok=True)

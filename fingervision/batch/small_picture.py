@@ -1,4 +1,4 @@
-"""A small picture of a curve, embedded in the page."""
+"""Small plot of a curve, embedded in the HTML page."""
 
 from collections.abc import Sequence
 
@@ -6,12 +6,12 @@ WIDTH_PX, HEIGHT_PX, MARGIN_PX = 156, 44, 2
 
 
 def small_picture(curve: Sequence[float | None]) -> str:
-    """Draw evenly spaced values as SVG, scaled to their own range; missing values leave holes.
+    """Plot evenly spaced values as SVG, scaled to the range of the values; missing values leave gaps in the curve.
 
     Parameters
     ----------
     curve : sequence of float or None
-        None is a hole.
+        Values of the curve; None for a missing value.
     """
     there = [value for value in curve if value is not None]
     lines = ""

@@ -1,4 +1,4 @@
-"""Task and outcome of a worker, as sent between processes and machines."""
+"""Task and outcome of a worker, as sent between processes and computers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,13 +16,14 @@ class Task:
     command : str
         `measure` or `diagnose`.
     input : str
-        As the user named it.
+        The input as named by the user.
     arguments : tuple of str
-        The command's options, as on a command line; without input and --out.
+        Options of the command as on the command line, without the input and --out.
     folder : Path
-        Where the result shall be.
+        Folder for the result.
     options_key : str
-        Hash of everything but the input that decides the result: options, the files that they name, the version.
+        Hash of everything besides the input that determines the result: the options, the files that the options name,
+        and the version.
     """
 
     command: str
@@ -34,18 +35,18 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a command ended.
+    """Result of the execution of a command.
 
     Parameters
     ----------
     exit_code : int
-        As the command line would end with.
+        Exit code, as on the command line.
     words : str
-        Its sentence; empty where all went well.
+        Sentence with which the command ended; empty without a problem.
     finished : bool
-        Whether it came to its end, so that its files are the result, also where they hold no number.
+        Whether the command was completed, so that its files are the result, even if they contain no values.
     disk_full : bool
-        Whether it could not go on for want of room.
+        Whether the command was stopped because the disk was full.
     """
 
     exit_code: int
@@ -64,21 +65,21 @@ class Outcome:
     Parameters
     ----------
     input : str
-        As the user named it.
+        The input as named by the user.
     folder : Path or None
-        Where its result is; None where there is none.
+        Folder of the result; None without a result.
     exit_code : int
-        0, or 3 where the input was damaged, or 1 or 2 where it could not be done.
+        0 for success, 3 for a damaged input, 1 or 2 if the input could not be processed.
     words : str
-        Its sentence; empty where all went well.
+        Sentence with which the command ended; empty without a problem.
     digest : Digest or None
-        Its line of the table and its small picture.
+        Table row and small plot of the result; None without a result.
     seconds : float
-        Time that it took, hashing included.
+        Duration of the processing, including hashing.
     disk_full : bool
-        Whether there was no room for the result.
+        Whether the disk was too full for the result.
     kept : bool
-        Whether the result was there already.
+        Whether the result existed already and was kept.
     """
 
     input: str

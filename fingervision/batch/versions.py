@@ -1,4 +1,4 @@
-"""Versions of a worker's software, and a hash of this package's source."""
+"""Versions of a worker's software, and a hash of the source code."""
 
 import hashlib
 import platform
@@ -25,14 +25,14 @@ def versions() -> dict[str, str]:
 
 
 def difference(here: dict[str, str], there: dict[str, str]) -> str:
-    """Describe the differences between two sets of versions; empty where there is none."""
+    """Describe the differences between two sets of versions; empty if they are equal."""
     return ", ".join(
         f"{name} {there.get(name, 'unknown')} instead of {here[name]}" for name in here if there.get(name) != here[name]
     )
 
 
 def _source() -> str:
-    """Hash of every module and C loop of both packages, because two copies of one version may still differ."""
+    """Hash of all Python and C sources of both packages, because two copies of the same version may still differ."""
     found = hashlib.sha256()
     for package in (fingervision, calib):
         top = Path(str(package.__file__)).parent

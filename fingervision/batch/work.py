@@ -1,4 +1,4 @@
-"""Process one input in a worker; doing so twice does no harm."""
+"""Processing of one input in a worker; processing the same input twice is harmless."""
 
 import errno
 import os
@@ -24,17 +24,17 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
 
 def work(task: Task, perform: Perform) -> Outcome:
-    """Put the result of one input into its folder, unless it is there already.
+    """Process one input and store the result in its folder, unless the result already exists.
 
-    Every failure becomes an outcome with a sentence. The folder appears complete, by a rename; an older result stays
-    until then, and also if the new one fails.
+    Every failure becomes an outcome with a sentence. The complete result folder is put in place by a rename; until
+    then, and if the new result fails, an older result is kept.
 
     Parameters
     ----------
     task : Task
-        What shall be done.
+        Task to process.
     perform : callable
-        Runs a command: its name and arguments in, how it ended out.
+        Function that runs a command, given its name and arguments, and returns how it ended.
     """
     started = perf_counter()
     part = new_part(task.folder)

@@ -1,4 +1,4 @@
-"""The command line: one command per file, found by the file's name."""
+"""The command line: each command is defined in its own module and found by the module's name."""
 
 import errno
 import importlib
@@ -37,7 +37,7 @@ class Commands(click.Group):
         return sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the command's module, and no other."""
+        """Import only the module of the requested command."""
         if cmd_name not in self.list_commands(ctx):
             return None
         command = importlib.import_module(f"{__name__}.{cmd_name}").command
@@ -45,7 +45,7 @@ class Commands(click.Group):
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; an error about an argument names its option."""
+        """Run the command; an error about an argument states the name of the command-line option."""
         from fingervision.interface.argument_names import command_words
 
         with command_words():
@@ -59,7 +59,7 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command line; a foreseen error gives one sentence and an exit code, never a traceback."""
+    """Run the command line; an expected error gives one sentence and an exit code, never a traceback."""
     # Who is asked to terminate (by a scheduler, at shut-down) ends as with Ctrl-C: in order, and with a sentence.
     with suppress(ValueError):  # not in a thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -97,7 +97,7 @@ def main() -> None:
 
 
 def _mend_streams() -> None:
-    """Replace closed standard streams, and allow names that are not UTF-8."""
+    """Replace closed standard streams, and allow printing of file names that are not valid UTF-8."""
     # A file that is opened would take the closed one's place, and FFmpeg would write its words into it.
     while (lowest := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass

@@ -1,4 +1,4 @@
-"""`fingervision bed check`: the motions of a recipe, its duration, and whether the bed can execute it."""
+"""`fingervision bed check`: motions and duration of a recipe, and whether the test bed can execute it."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`fingervision bed home`: go to the reference, which becomes position 0."""
+"""`fingervision bed home`: move the stage to its reference position, which becomes position 0."""
 
 import click
 

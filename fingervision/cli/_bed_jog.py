@@ -1,4 +1,4 @@
-"""`fingervision bed jog`: move at a speed until stopped."""
+"""`fingervision bed jog`: move the stage at a given speed until stopped."""
 
 import click
 

@@ -1,4 +1,4 @@
-"""`fingervision bed move`: move to a position."""
+"""`fingervision bed move`: move the stage to a given position."""
 
 import click
 

@@ -1,4 +1,4 @@
-"""`fingervision bed run`: execute a recipe on the bed, giving the table that `diagnose` takes."""
+"""`fingervision bed run`: execute a recipe on the test bed and write the table that `diagnose` reads."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`fingervision bed steps`: step data as a table and a plot, and their execution on a bed."""
+"""`fingervision bed steps`: show step data as a table and a plot, and execute them on a test bed."""
 
 from pathlib import Path
 

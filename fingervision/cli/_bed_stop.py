@@ -1,4 +1,4 @@
-"""`fingervision bed stop`: stop the motor, whichever program moves it."""
+"""`fingervision bed stop`: stop the motor, even if another program drives it."""
 
 import click
 
@@ -19,7 +19,7 @@ fingervision/testbed/firmware/README.md.
 @click.command(epilog=EXAMPLES)
 @bed_option
 def command(bed_name: str) -> None:
-    """Stop the motor, whichever program drives it."""
+    """Stop the motor, even if another program drives it."""
     from fingervision.testbed.manual.stopping import stop_bed
 
     click.echo(stop_bed(bed_name))

@@ -1,4 +1,4 @@
-"""Options that state properties of the bench that no picture shows and the uncertainty budget needs."""
+"""Options for properties of the set-up that the uncertainty budget needs and that no picture shows."""
 
 from collections.abc import Callable
 from typing import Any
@@ -41,7 +41,7 @@ Command = Callable[..., Any]
 
 
 def limit_options(command: Command) -> Command:
-    """Add one option for every limit."""
+    """Add one option for the limit of each such property."""
     for option, name, default, words in reversed(LIMITS):
         text = f"{words}  [default: {default:g}]"
         command = click.option(option, name, type=float, default=None, help=text)(command)

@@ -1,4 +1,4 @@
-"""Drawing of a deformed body: frame, outline at rest, and stress."""
+"""Plot of a deformed body: axes, outline at rest, and stress."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ def framed(low: Array, high: Array) -> tuple[Figure, Axes]:
     Parameters
     ----------
     low, high : ndarray of float, shape (2,)
-        Corners of the box round it, in mm.
+        Lower left and upper right corner of the content's bounding box, in mm.
     """
     wide, tall = (high - low).tolist()
     scale = min((_MOST_INCHES - _BESIDE_INCHES) / wide, (_MOST_INCHES - _TITLE_INCHES) / tall)
@@ -51,7 +51,7 @@ def draw_body(
     Parameters
     ----------
     axes : Axes
-        To draw on.
+        Axes to draw on.
     plate : PlaneStressPlate
         The meshed body.
     moved : ndarray of float, shape (unknowns,)
@@ -59,10 +59,11 @@ def draw_body(
     stress : ndarray of float, shape (corners,)
         Von Mises stress at the corners, in MPa.
     top_mpa : float
-        At the end of the colours.
+        Stress at the upper end of the colour scale.
     side : float or None
-        1 or -1 for the right half of a body that is its own mirror image in the y axis: -1 draws that image, and the
-        axis, where the two halves are one piece, is drawn as no edge. None for a whole body.
+        For a body that is symmetric about the y axis and of which only the right half is meshed: 1 draws the right
+        half, and -1 its mirror image; the y axis, along which the halves join, is not drawn as an edge. None for a
+        complete body.
     """
     x, y = plate.nodes_mm
     u, v = moved[plate.x_dofs], moved[plate.y_dofs]
@@ -82,7 +83,7 @@ def draw_body(
 
 
 def extent_mm(plate: PlaneStressPlate, moved: Array, *, mirrored: bool = False) -> tuple[Array, Array]:
-    """Bounding box of a body at rest and deformed."""
+    """Bounding box that contains a body both at rest and deformed, in mm."""
     at_rest = plate.nodes_mm
     there = at_rest + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
     both = np.hstack([at_rest, there])

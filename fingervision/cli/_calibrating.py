@@ -1,4 +1,4 @@
-"""The calibrating commands: options to arguments of `fingervision.calibrate`, and its result to files and text."""
+"""Shared parts of the calibration commands: read options, call `fingervision.calibrate`, write and print its result."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from fingervision.domain.errors import NoCalibrationError, UsageError
 
 @contextmanager
 def sentences() -> Iterator[None]:
-    """Convert calib's errors to this program's."""
+    """Convert errors of the package `calib` to errors of fingervision."""
     from calib.errors import CalibrationError
 
     try:
@@ -24,18 +24,18 @@ def sentences() -> Iterator[None]:
 
 
 def calibrate_on_sizes(kind: str, items: Sequence[str], roi: str | None, **options: Any) -> None:
-    """Calibrate on bars and slots; arguments are the options of the commands."""
+    """Calibrate on bars and slots; the arguments are the options of the commands `bar` and `slot`."""
     pictures = [(path, size_mm, which) for which, path, size_mm in named_references(items, kind)]
     _calibrate(kind, pictures, roi=region_from(roi), **options)
 
 
 def calibrate_on_board(kind: str, images: Sequence[Path], squares: str, **options: Any) -> None:
-    """Calibrate on a board; arguments are the options of the commands."""
+    """Calibrate on a chessboard or ChArUco board; the arguments are the options of these commands."""
     _calibrate(kind, list(images), squares=_squares(squares), **options)
 
 
 def calibrate_on_lines(image: Path, roi: str | None, **options: Any) -> None:
-    """Calibrate on a line scale; arguments are the options of the command."""
+    """Calibrate on a line scale; the arguments are the options of the command `scale`."""
     _calibrate("scale", image, roi=region_from(roi), **options)
 
 

@@ -1,4 +1,4 @@
-"""The option that states the meaning of the columns of foreign tables."""
+"""The option `--columns`, which states the meaning of the columns of tables written by other programs."""
 
 from pathlib import Path
 

@@ -11,7 +11,7 @@ Command = Callable[..., Any]
 
 
 def effects_option(command: Command) -> Command:
-    """Add `--effects`: files whose effects belong to the catalogue while the command runs."""
+    """Add `--effects`: Python files whose effects are added to the catalogue while the command runs."""
 
     @wraps(command)
     def with_effects(*arguments: Any, effects_files: tuple[Path, ...], **options: Any) -> Any:

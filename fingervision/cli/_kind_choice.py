@@ -1,4 +1,4 @@
-"""A choice among the kinds of model, listed only when needed."""
+"""Option type that accepts the name of a kind of model; the names are looked up only when needed."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import click
 
 
 class KindChoice(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click alone
-    """A kind of model, built in or installed; only names are read.
+    """Name of a kind of model, built in or from a plug-in; only names are looked up, and no plug-in is imported.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class KindChoice(click.ParamType):  # type: ignore[type-arg]  # generic in new v
         return (*kind_names(), *self._also)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Names for the help."""
+        """Return the allowed names for the help text."""
         return f"[{'|'.join(self._names())}]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:

@@ -1,4 +1,4 @@
-"""Convert options of `live` to the settings of the live view."""
+"""Convert the options of the command `live` to settings of the live view."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ def choices_of(
     tips: str,
     roi: str | None,
 ) -> "Choices":
-    """Read scale, height, direction and region from the options.
+    """Read scale, measuring height, direction of the tips, and region of interest from the options.
 
     Raises
     ------

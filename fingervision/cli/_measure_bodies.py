@@ -18,7 +18,7 @@ from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 def follow_bodies(
     source: FrameSource, drawing: Path, points: tuple[str, ...], task: Task, folder: Path, as_json: bool
 ) -> None:
-    """Measure the bodies, write bodies.csv, and print how often each was found."""
+    """Measure the bodies, write bodies.csv, and print in how many frames each body was found."""
     given = [parse_point(text) for text in points]
     how = prepared(source.description, task)
     frames = coded(source, how.description.coding)
@@ -35,7 +35,7 @@ def follow_bodies(
 
 
 def mechanism_of(path: Path) -> Mechanism:
-    """Read a mechanism.toml, or a gripper.toml as both its halves."""
+    """Read a mechanism.toml, or a gripper.toml as a mechanism of its two halves."""
     if is_mechanism(path):
         return read_mechanism(path)
     gripper = read_gripper(path)

@@ -1,4 +1,4 @@
-"""`fingervision calibrate response`: from an exposure series, a grey wedge, or the shape of straight edges."""
+"""`fingervision calibrate response`: camera response from an exposure series, a grey wedge or straight edges."""
 
 import json
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ MOST_FIELDS = 200
 def measure_response(
     items: Sequence[str], edges: bool, densities: str | None, roi: str | None, out: Path, as_json: bool
 ) -> None:
-    """Measure a response, write it and print its description.
+    """Measure the camera's response, write the response to a file, and print its description.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def measure_response(
 
 
 def _densities(words: str) -> list[float]:
-    """Densities from A:B:STEP or A,B,..."""
+    """Read optical densities in the form A:B:STEP or A,B,..."""
     refusal = UsageError(f"--densities must be A:B:STEP, such as 0.05:1.95:0.1, or a list A,B,..., but is {words}.")
     try:
         numbers = [float(part) for part in words.replace(":", ",").split(",")]

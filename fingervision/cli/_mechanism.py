@@ -1,4 +1,4 @@
-"""`fingervision model mechanism.toml`: any planar mechanism, by finite elements and by lumped flexures."""
+"""`fingervision model mechanism.toml`: model a planar mechanism with finite elements and with lumped flexures."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,7 +48,7 @@ def predict(
     mesh: bool,
     as_json: bool,
 ) -> None:
-    """Write the figures, mechanism.csv (and simulation.csv where a pair is called gap) and pictures, and print them."""
+    """Write and print the table of results; write mechanism.csv, simulation.csv (if a pair is named gap) and plots."""
     from fingervision.cli._model_figures import draw_mesh
     from fingervision.tables.read import read_drive
 
@@ -134,7 +134,7 @@ def predict(
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Add the drawing's file name to an error."""
+    """Add the name of the drawing's file to the message of an error."""
     try:
         yield
     except FingervisionError as error:
@@ -144,14 +144,14 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inputs of the static table: the drive's own inputs, or as many as a curve needs."""
+    """Inputs of the static table (mm): the inputs of the drive table, or enough inputs for a smooth curve."""
     if inputs.size < 2:
         raise UsageError(f"--drive must hold at least two different inputs, but holds {inputs.size}.")
     return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
 
 
 def _curve(states: list[MechanismState]) -> PchipInterpolator:
-    """Lengths and force over the input, in the column order of a motion; a contact may bend the curve sharply."""
+    """Lengths and force over the input, in the column order of a motion; contacts may cause kinks in these curves."""
     rows = [
         [*state.pairs_mm.values(), *(part for probe in state.probes_mm.values() for part in probe), state.force_n]
         for state in states

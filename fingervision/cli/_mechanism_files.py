@@ -1,4 +1,4 @@
-"""Tables and pictures of a mechanism drawn by bodies."""
+"""Tables and plots of a mechanism whose drawing lists its bodies (mechanism.toml)."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ _STYLES = ("-", "--", "-.")
 
 
 def write_figures(table: Mapping[str, Mapping[str, float]], path: Path) -> None:
-    """Write models.csv: one line per kind, with empty cells for figures that a kind lacks."""
+    """Write models.csv: one line per kind of model, with empty cells for results that a kind does not compute."""
     labels = list(dict.fromkeys(label for figures in table.values() for label in figures))
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -28,7 +28,7 @@ def write_figures(table: Mapping[str, Mapping[str, float]], path: Path) -> None:
 
 
 def write_states(states: Sequence[MechanismState], out: Path) -> None:
-    """Write mechanism.csv, and simulation.csv where a pair is called gap."""
+    """Write mechanism.csv, and also simulation.csv if a pair of probes is named gap."""
     columns: dict[str, list[float]] = {"input_mm": [s.input_mm for s in states], "force_n": [s.force_n for s in states]}
     for name in states[0].probes_mm:
         for place, axis in enumerate("xy"):
@@ -55,7 +55,7 @@ def _table(columns: dict[str, list[float]], path: Path) -> None:
 
 
 def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, large: bool) -> None:
-    """Draw the mechanism at one input, displacements to scale, coloured by stress."""
+    """Plot the deformed mechanism at one input, with displacements to scale and coloured by stress."""
     plate = model.plate
     moved: NDArray[np.float64] = state.displacement_mm
     stress = plate.at_corners(plate.von_mises_mpa(moved, large=large))
@@ -71,7 +71,7 @@ def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, l
 
 
 def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[MechanismState]], path: Path) -> None:
-    """Draw the pairs, or the probes where there is none, and force and stress over the input, by every kind."""
+    """Plot distances of probe pairs (or single probes), force and stress over the input, for every kind of model."""
     figure = Figure(figsize=(8.0, 8.5), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
     for place, (kind, rows) in enumerate(states.items()):

@@ -1,4 +1,4 @@
-"""Printed figures of a mechanism drawn by bodies, and sentences on the limits of its results."""
+"""Printed results of a mechanism whose drawing lists its bodies, and warnings about the limits of the results."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ _APART = 0.1
 
 
 def print_figures(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> None:
-    """Print one row per figure, one column per kind."""
+    """Print the table of results: one row per quantity, one column per kind of model."""
     if as_json:
         click.echo(json.dumps(table, indent=2))
         return
@@ -33,7 +33,7 @@ def warn(
     mechanism: Mechanism, model: MechanismModel, states: list[MechanismState], table: dict[str, dict[str, float]], *,
     contact: bool,
 ) -> None:  # fmt: skip
-    """Warn of limits of the results: yield, faces that penetrate each other, kinds that differ."""
+    """Warn of yielding, of faces that penetrate each other, and of differences between the kinds of model."""
     worst = max(states, key=lambda state: state.stress_mpa)
     if worst.stress_mpa > mechanism.material.yield_mpa:
         at_yield_mm = next(iter(table.values()))["input_at_yield_mm"]
@@ -57,9 +57,10 @@ def warn(
 
 
 def disagreements_of(table: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """Sentences on figures by which the second kind differs from the first by more than their model errors leave.
+    """Sentences on quantities in which the second kind of model differs from the first by more than the model errors.
 
-    Motions of probes and pairs are compared with the largest of them: a small one by itself has no relative error.
+    Differences of motions of probes and pairs are taken relative to the largest motion, because the relative error of a
+    very small motion has no meaning.
     """
     (first, ours), (second, theirs) = list(table.items())[:2]
     stated = sum(figures["model_error_force_percent"] for figures in (ours, theirs)) / 100.0
@@ -81,9 +82,9 @@ def disagreements_of(table: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 
 def add_endurance(mechanism: Mechanism, states: Sequence[MechanismState], figures: dict[str, float]) -> None:
-    """Add the number of cycles between the ends of the inputs, where the material's S-N line states it.
+    """Add the number of load cycles to failure over the range of inputs, if the material has an S-N line.
 
-    The sign of the stress follows the input.
+    The stress is assumed to change its sign with the input.
     """
     life = _life(mechanism, states)
     if life is not None and life.cycles is not None:
@@ -96,7 +97,7 @@ def _life(mechanism: Mechanism, states: Sequence[MechanismState]) -> Endurance |
 
 
 def say_endurance(kind: str, mechanism: Mechanism, states: Sequence[MechanismState]) -> None:
-    """Print how long the flexures endure cycles between the ends of the inputs."""
+    """Print the number of load cycles over the range of inputs that the flexures endure."""
     life = _life(mechanism, states)
     if life is not None:
         click.echo(

@@ -1,4 +1,4 @@
-"""Figures of the `model` command: the deformed body with its stress, and gap over input with differences."""
+"""Plots of the `model` command: the deformed body with its stress, and the gap over the input with differences."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,10 +26,10 @@ _PUBLISHED = (
 
 
 def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path: Path) -> None:
-    """Draw both halves at one input, with the physics of the model, displacements to scale, coloured by stress.
+    """Plot both halves at one input as the model computes them, with displacements to scale and coloured by stress.
 
-    Without contact, an input beyond the first touch would draw one finger through the other; the first touch is drawn
-    instead.
+    Without contact in the model, an input beyond the first touch would show the fingers penetrating each other; the
+    state at the first touch is then plotted instead.
     """
     onset_mm = contact_onset_mm(model.half, model.physics)
     beyond = onset_mm is not None and not model.physics.contact and input_mm < onset_mm
@@ -54,7 +54,7 @@ def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path:
 
 
 def draw_mesh(mesh: PlaneMesh, name: str, path: Path) -> None:
-    """Draw the triangles, with their number and quality in the title."""
+    """Plot the triangles of the mesh, with their number and quality in the title."""
     figure, axes = framed(mesh.nodes_mm.min(axis=1), mesh.nodes_mm.max(axis=1))
     axes.triplot(Triangulation(mesh.nodes_mm[0], mesh.nodes_mm[1], mesh.triangles[:3].T), color="0.3", linewidth=0.25)
     quality = mesh.quality()
@@ -68,10 +68,10 @@ def draw_mesh(mesh: PlaneMesh, name: str, path: Path) -> None:
 def draw_comparison(
     inputs: Array, answers: Mapping[str, Response], name: str, path: Path, *, with_published: bool
 ) -> None:
-    """Draw the gap over the input for every model, and the differences below.
+    """Plot the gap over the input for every model, and the differences between models below.
 
-    For the published gripper the published columns are shown too, and differences are from the published experiment;
-    otherwise they are from the first model.
+    For the published gripper, the published results are also plotted, and the differences are taken from the published
+    experiment; for any other gripper, the differences are taken from the first model.
     """
     figure = Figure(figsize=(8.0, 7.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))

@@ -26,14 +26,14 @@ _STYLES = ("-", "--", "-.")
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Frequencies from one to another, in Hz."""
+    """A band of frequencies, with its lower and upper limit in Hz."""
 
     first_hz: float
     last_hz: float
 
 
 def parse_band(text: str) -> Band:
-    """Read `A:B` in Hz.
+    """Read a frequency band `A:B` in Hz.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def parse_band(text: str) -> Band:
 def answer_frequencies(
     models: Mapping[str, Any], band: Band, damping: str, name: str, out: Path, *, as_json: bool
 ) -> None:
-    """Write frequency.csv and frequency.png of every kind of model with masses."""
+    """Write the frequency response of every kind of model with masses to frequency.csv and frequency.png."""
     found: dict[str, FrequencyResponse] = {}
     for kind, model in models.items():
         if isinstance(getattr(model, "half", None), DrivenBody):
@@ -77,7 +77,7 @@ def answer_frequencies(
 
 
 def modes_to(reduce: Callable[[int], ModalModel], highest_hz: float, unknowns: int) -> ModalModel:
-    """Choose the modes below a frequency, and one more."""
+    """Compute the modes below a frequency, and the next mode above it."""
     count = min(MODES, unknowns - 2)
     while True:
         reduced = reduce(count)
@@ -93,7 +93,7 @@ def modes_to(reduce: Callable[[int], ModalModel], highest_hz: float, unknowns: i
 
 
 def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -> FrequencyResponse:
-    """Compute the response over a band, resolved around every resonance."""
+    """Compute the response over a frequency band, with closely spaced frequencies around every resonance."""
     law = parse_damping(damping)
     for rad_s in (reduced.rad_s, free.rad_s):
         known = described(law, rad_s).size
@@ -108,7 +108,7 @@ def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -
 
 
 def peaks_of(answer: FrequencyResponse, column: str) -> str:
-    """Sentence on where the response peaks, with the drive's motion prescribed and with the drive free."""
+    """Sentence on the frequencies of resonance, with the drive's motion prescribed and with the drive free."""
     words = []
     for what, curve in (
         ("per input", answer.per_input[column]), ("per force", answer.per_force_mm_n[column]),
@@ -122,7 +122,7 @@ def peaks_of(answer: FrequencyResponse, column: str) -> str:
 
 
 def write_frequencies(found: Mapping[str, FrequencyResponse], columns: tuple[str, ...], path: Path) -> None:
-    """Write amplitude and phase of every length by input and by force, and of the drive by force."""
+    """Write amplitude and phase of every length per unit input and per unit force, and of the drive per unit force."""
     header = ["kind", "frequency_hz"]
     for column in columns:
         stem = column.removesuffix("_mm")
@@ -140,7 +140,7 @@ def write_frequencies(found: Mapping[str, FrequencyResponse], columns: tuple[str
 
 
 def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title: str, path: Path) -> None:
-    """Draw amplitude and phase by input (motion prescribed) and by force (drive free)."""
+    """Plot amplitude and phase per unit input (motion prescribed) and per unit force (drive free)."""
     figure = Figure(figsize=(10.0, 7.0), layout="constrained")
     (upper, upper_force), (lower, lower_force) = figure.subplots(2, 2, sharex=True, height_ratios=(3, 2))
     label = column.removesuffix("_mm").replace("_", " ")
@@ -166,7 +166,7 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
 
 
 def mechanism_frequencies(model: MechanismPlate, band: Band, damping: str, out: Path, *, as_json: bool) -> None:
-    """Write frequency.csv and frequency.png of a mechanism drawn by bodies."""
+    """Write frequency.csv and frequency.png of a mechanism whose drawing lists its bodies."""
     name = model.mechanism.name
     reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
     if not reduced.observed:
@@ -184,7 +184,7 @@ def mechanism_frequencies(model: MechanismPlate, band: Band, damping: str, out: 
 
 
 def main_column(reduced: ModalModel) -> str:
-    """Return the gap where there is one, else the length that changes most."""
+    """Return the name of the length to plot: the gap if there is one, otherwise the length that changes most."""
     if GAP in reduced.observed:
         return GAP
     return max(reduced.observed, key=lambda column: abs(reduced.observed[column].per_input))

@@ -1,4 +1,4 @@
-"""`fingervision model --object-mm`: gripping force on a part between the fingers, as a table and a figure."""
+"""`fingervision model --object-mm`: gripping force on a part between the fingers, as a table and a plot."""
 
 import csv
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ _BEYOND_MM = 1e-9
 
 
 def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm: float) -> Part | None:
-    """Read and check the part.
+    """Read and check the options that describe the part.
 
     Raises
     ------
@@ -53,9 +53,9 @@ def write_grip(
     gripper: Gripper, models: Mapping[str, Any], part: Part, inputs: NDArray[np.float64] | None, name: str, out: Path,
     *, errors: Mapping[str, float], as_json: bool,
 ) -> None:  # fmt: skip
-    """Write grip.csv and grip.png of every kind, and print how the part is held; small displacements.
+    """Write grip.csv and grip.png for every kind of model (small displacements), and print how the part is held.
 
-    `errors` are the relative model errors of the gripping force by kind.
+    `errors` are the relative model errors of the gripping force by kind of model.
     """
     rows: dict[str, NDArray[np.float64]] = {}
     said = []
@@ -81,14 +81,14 @@ def write_grip(
 
 @dataclass(frozen=True, slots=True)
 class PartOfPair:
-    """A part between the probes of a pair of a mechanism."""
+    """A part that is gripped between the two probes of a pair of a mechanism."""
 
     part: Part
     pair: str
 
 
 def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism: Mechanism) -> PartOfPair | None:
-    """Read and check the part, and find the pair that grips it: the one called gap, or the only one.
+    """Read and check the part, and find the pair of probes that grips it: the pair named gap, or the only pair.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism
 def write_pair_grip(
     models: Mapping[str, Any], asked: PartOfPair, inputs: NDArray[np.float64] | None, out: Path, *, as_json: bool
 ) -> None:
-    """Write grip.csv and grip.png of a mechanism's finite elements, and print how the part is held."""
+    """Write grip.csv and grip.png for the finite elements of a mechanism, and print how the part is held."""
     plate = models.get("finite_element")
     if not isinstance(plate, MechanismPlate):
         click.echo("A part between probes is answered by the finite elements: add --kind finite_element.", err=True)
@@ -165,7 +165,7 @@ def _stiff(part: Part) -> str:
 
 
 def _closing_limit_mm(gripper: Gripper, model: Any, touch_mm: float | None) -> float:
-    """Input by which the part is held well: 1.5 times as far as from rest to the touch of the fingers (mm)."""
+    """Closing limit of the input (mm): past the touch of the part by half the stroke that closes the empty fingers."""
     touch = model.half.first_touch_mm() if hasattr(model, "half") else model.first_touch_mm()
     reach = abs(touch) if touch is not None else 0.01 * gripper.body.height_mm
     return (touch_mm or 0.0) - 0.5 * reach
@@ -182,7 +182,7 @@ def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
 
 
 def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float, error: float) -> str:
-    """Sentence on when a part is touched, how fast the grip rises, and where the hinges would yield."""
+    """Sentence on the input at which the part is touched, the slope of the gripping force, and the input at yield."""
     limit = gripper.material.yield_mpa
     step = 0.2 * abs(model.half.first_touch_mm() or touch_mm)
     near = [model.stressed(grip_equilibrium(model.half, touch_mm - by, part)) for by in (0.0, step)]

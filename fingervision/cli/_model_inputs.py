@@ -1,4 +1,4 @@
-"""Inputs that the `model` command answers: those of a drive, or the paper's own range."""
+"""Inputs at which the `model` command computes results: those of a drive table, or the published range."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ _MOST_ROWS = 401
 
 
 def inputs_mm(drive: Path, columns: Path | None, gripper: Gripper) -> NDArray[np.float64]:
-    """Read the different inputs of a drive, and refuse those in another unit."""
+    """Read the distinct inputs of a drive table, and refuse inputs in another unit than mm."""
     inputs = np.unique(read_drive(drive, columns).input_mm)
     largest = float(np.abs(inputs).max())
     if 0.0 < largest < _METRES_BELOW_OF_HEIGHT * gripper.body.height_mm:
@@ -36,7 +36,7 @@ def inputs_mm(drive: Path, columns: Path | None, gripper: Gripper) -> NDArray[np
 
 
 def with_rows_between(inputs: NDArray[np.float64], figures: ModelFigures) -> NDArray[np.float64]:
-    """Add rows between a drive's inputs, and at the first touch, because a table is linear between its rows."""
+    """Add inputs between those of a drive table, and at the first touch, because tables are interpolated linearly."""
     low, high = float(inputs.min()), float(inputs.max())
     touch = figures.contact_input_mm
     bends = [touch] if touch is not None and low < touch < high else []

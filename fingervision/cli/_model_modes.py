@@ -1,4 +1,4 @@
-"""`fingervision model --modes`: natural frequencies, with their shapes as drawings and as a film."""
+"""`fingervision model --modes`: natural frequencies, with plots and a film of the mode shapes."""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -30,7 +30,7 @@ _MOST_FILM_MODES = 18
 def write_gripper_modes(
     models: Mapping[str, Any], wanted: ModesWanted, name: str, out: Path, *, film: bool, as_json: bool
 ) -> None:
-    """Write modes.csv for every kind with masses, and the pictures of the most trusted of them."""
+    """Write modes.csv for every kind of model with masses, and the plots of the most accurate of these kinds."""
     found = {
         kind: gripper_mode_shapes(model, wanted)
         for kind, model in models.items()
@@ -63,7 +63,7 @@ def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, 
 
 
 def _panels(shapes: Sequence[ModeShape], title: str) -> tuple[Figure, list[tuple[Axes, LineCollection, ModeShape]]]:
-    """Draw every mode in its own panel, one row per family; return the parts that move."""
+    """Plot every mode in its own panel, one row per family of modes; return the plotted lines to be animated."""
     families = [[s for s in shapes if s.family == f] for f in dict.fromkeys(s.family for s in shapes)]
     columns = min(_A_ROW, max(map(len, families)))
     if columns == 1:

@@ -1,4 +1,4 @@
-"""`fingervision model --drive` and `--frequency`: a mechanism in motion, as tables and figures."""
+"""`fingervision model --drive` and `--frequency`: dynamic response of a mechanism, as tables and plots."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ _STYLES = ("-", "--", "-.")
 
 
 def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
-    """Interpolate the drive linearly to a higher rate, where one is requested."""
+    """Interpolate the drive linearly to a higher sampling rate, if requested."""
     if rate_hz is None:
         return drive
     if not (isfinite(rate_hz) and rate_hz > 0.0):
@@ -63,7 +63,7 @@ class MotionAsked:
 
     @property
     def moves(self) -> bool:
-        """Whether a motion in time or frequency was requested."""
+        """Whether a response over time or over frequency was requested."""
         return self.drive is not None or self.modes is not None or self.band is not None
 
 
@@ -77,7 +77,7 @@ def motion_asked(
     *,
     film: bool,
 ) -> MotionAsked:
-    """Read the options.
+    """Read and check the options for the dynamic response.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def motion_asked(
 def move(
     models: Mapping[str, Any], asked: MotionAsked, name: str, folders: Mapping[str, Path], out: Path, *, as_json: bool
 ) -> None:
-    """Compute all requested motions of a gripper's models."""
+    """Compute all requested dynamic responses of a gripper's models."""
     if asked.drive is not None:
         follow_drive(models, asked.drive, asked.damping, name, folders, out, as_json=as_json)
     if asked.band is not None:
@@ -115,7 +115,7 @@ def move(
 def move_mechanism(
     model: MechanismPlate, asked: MotionAsked, static: PchipInterpolator | None, out: Path, *, as_json: bool
 ) -> None:
-    """Compute all requested motions of a mechanism drawn by bodies."""
+    """Compute all requested dynamic responses of a mechanism whose drawing lists its bodies."""
     name = model.mechanism.name
     if asked.drive is not None:
         mechanism_motion(model, asked.drive, asked.damping, static, out, as_json=as_json)
@@ -132,7 +132,7 @@ def follow_drive(
     models: Mapping[str, Any], drive: DriveHistory, damping: str, name: str, folders: Mapping[str, Path], out: Path,
     *, as_json: bool,
 ) -> None:  # fmt: skip
-    """Write response.csv of every kind with masses, and response.png of all of them."""
+    """Write response.csv for every kind of model with masses, and one response.png that compares these kinds."""
     motions: dict[str, Motion] = {}
     for kind, model in models.items():
         if not isinstance(getattr(model, "half", None), DrivenBody):
@@ -150,7 +150,7 @@ def follow_drive(
 
 
 def words_of(motion: Motion, column: str) -> str:
-    """Sentence on how far a mechanism vibrates, and with which damping."""
+    """Sentence on a mechanism's vibration amplitude and its damping."""
     pairs = ", ".join(
         f"{z:.3g} at {f:.4g} Hz" for z, f in zip(motion.damping_ratios[:3], motion.modes_hz[:3], strict=True)
     )
@@ -166,7 +166,7 @@ _SEEN_ROWS = 60
 
 
 def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Path) -> None:
-    """Draw input, one length, its difference from the static response, and the force over time."""
+    """Plot over time the input, one length, the difference of this length from the static response, and the force."""
     figure = Figure(figsize=(8.0, 9.0), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True)
     label = column.removesuffix("_mm").replace("_", " ")
@@ -200,7 +200,7 @@ def mechanism_motion(
     *,
     as_json: bool,
 ) -> None:
-    """Write response.csv and response.png of a mechanism drawn by bodies.
+    """Write response.csv and response.png of a mechanism whose drawing lists its bodies.
 
     With large rotation or contact, `static` gives the equilibria: the observed lengths in order, then the force.
     """

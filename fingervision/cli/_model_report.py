@@ -1,4 +1,4 @@
-"""Table of the `model` command, and sentences on the limits of its results."""
+"""Table of results of the `model` command, and warnings about the limits of these results."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from fingervision.models.yield_limit import input_at_yield_mm
 
 
 def write_table(rows: Mapping[str, Mapping[str, Any]], path: Path) -> None:
-    """Write models.csv: one line per kind, with empty cells for figures that a kind lacks."""
+    """Write models.csv: one line per kind of model, with empty cells for results that a kind does not compute."""
     names = list(next(iter(rows.values())))
     lines = [",".join(["kind", *names])]
     lines += [",".join([kind, *(_cell(row[name]) for name in names)]) for kind, row in rows.items()]
@@ -30,7 +30,7 @@ def _cell(value: float | None) -> str:
 
 
 def print_table(rows: Mapping[str, Mapping[str, Any]], *, as_json: bool) -> None:
-    """Print one row per figure, one column per kind."""
+    """Print the table of results: one row per quantity, one column per kind of model."""
     import json
 
     if as_json:
@@ -54,7 +54,7 @@ def say_what_limits(
     *,
     as_json: bool,
 ) -> None:
-    """Warn of stress beyond the yield, of fingers that penetrate each other, and of physics that a kind lacks."""
+    """Warn of stress beyond the yield stress, of fingers that penetrate each other, and of physics not in a model."""
     for kind in by_trust(models):
         if hasattr(models[kind], "loaded"):
             _warn_of_stress(gripper, models[kind], inputs)

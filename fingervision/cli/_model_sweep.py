@@ -1,4 +1,4 @@
-"""`fingervision model --vary`: a table and a plot over dimensions of the drawing."""
+"""`fingervision model --vary`: a table and a plot of the results over one or more dimensions of the drawing."""
 
 import json
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ def sweep(
 
 
 def sweep_mechanism(drawing: MechanismDrawing, texts: tuple[str, ...], out: Path, *, as_json: bool) -> None:
-    """Write vary.csv and vary.png of a mechanism drawn by bodies, and print the table."""
+    """Write vary.csv and vary.png of a mechanism whose drawing lists its bodies, and print the table."""
     variations = [parse_variation(text) for text in texts]
     values, columns, answers = mechanism_sweep_answers(
         lambda changes: drawing.mechanism(changes, absolute=True), variations
@@ -50,7 +50,7 @@ def sweep_mechanism(drawing: MechanismDrawing, texts: tuple[str, ...], out: Path
 
 
 def number_unit(name: str) -> str:
-    """Unit of a drawing's number; lengths named by the drawing itself are in mm."""
+    """Unit of a number in a drawing; lengths that the drawing defines in [lengths] are in mm."""
     return next((unit for end, unit in _ENDS.items() if name.endswith(end)), "mm" if "lengths." in name else "1")
 
 
@@ -84,7 +84,7 @@ def _write(
 def _draw(
     name: str, variations: Sequence[Variation], values: Array, columns: Sequence[str], answers: Array, path: Path
 ) -> None:
-    """Draw every column over the number that varies fastest; the first number colours the curves of a grid."""
+    """Plot every column over the number that varies fastest; colours show the first number if two numbers vary."""
     last = variations[-1]
     count = len(last.values)
     first = values[::count, 0]

@@ -1,4 +1,4 @@
-"""Figures of `fingervision model` with their uncertainty, where the drawing states that of its dimensions."""
+"""Results of `fingervision model` with their uncertainties, if the drawing states uncertainties of its dimensions."""
 
 import csv
 from collections.abc import Mapping
@@ -30,20 +30,20 @@ def write_uncertainty(
     found: Mapping[str, FigureUncertainty], rows: Mapping[str, Mapping[str, float | None]], name: str, out: Path,
     *, as_json: bool,
 ) -> None:  # fmt: skip
-    """Write uncertainty.csv and uncertainty.png, and print the most trusted kind's figures with the main contributions.
+    """Write uncertainty.csv and uncertainty.png, and print the most accurate model's results and main contributions.
 
     Parameters
     ----------
     found : mapping of str to FigureUncertainty
-        By the figure's name.
+        Uncertainty of every result, by the name of the result.
     rows : mapping of str to mapping
-        Every kind's own figures: the uncertainties stand beside them.
+        Results of every kind of model, written beside the uncertainties.
     name : str
-        Of the mechanism.
+        Name of the mechanism.
     out : Path
         Folder to write to.
     as_json : bool
-        Whether nothing is printed.
+        Whether the output is JSON, so that this function prints nothing.
     """
     with (out / "uncertainty.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -78,7 +78,7 @@ def _method(own: FigureUncertainty) -> str:
 
 
 def _draw(stated: Mapping[str, FigureUncertainty], row: Mapping[str, float | None], title: str, path: Path) -> None:
-    """Draw, for the main figures, how much each dimension contributes to the variance."""
+    """Plot, for the main results, the contribution of each dimension to the variance."""
     names = [figure for figure in _DRAWN if figure in stated] or list(stated)[: len(_DRAWN)]
     inputs = list(dict.fromkeys(n for figure in names for n, _ in stated[figure].shares))
     figure = Figure(figsize=(9.0, 1.6 + 0.5 * max(len(names), 1)), layout="constrained")

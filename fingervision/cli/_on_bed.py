@@ -1,4 +1,4 @@
-"""Options of every command that uses the bed."""
+"""Options shared by all commands that use the test bed."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ Command = Callable[..., Any]
 
 
 def bed_option(command: Command) -> Command:
-    """Add `--bed`: the word simulated, or the configuration file of a bed."""
+    """Add `--bed`: the word "simulated", or the configuration file of a test bed."""
     return click.option(
         "--bed", "bed_name", default="simulated", show_default=True, metavar="simulated|CONFIG.toml",
         help="The test bed: the word simulated, or its configuration file (see fingervision/testbed/README.md).",
@@ -17,7 +17,7 @@ def bed_option(command: Command) -> Command:
 
 
 def hide_option(command: Command) -> Command:
-    """Add `--hide`: effects that act in the simulated parts."""
+    """Add `--hide`: effects that are injected into the simulated parts of the test bed."""
     return click.option(
         "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]|SEALED.toml",
         help="Hide an effect of the catalogue in the simulated parts; repeatable.",

@@ -1,4 +1,4 @@
-"""References on the command line: IMAGE=SIZE_MM, slot:IMAGE=SIZE_MM."""
+"""Reference objects on the command line, in the form IMAGE=SIZE_MM or slot:IMAGE=SIZE_MM."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ def named_references(
     form: str = "SIZE_MM with a positive size",
     example: str = "ref5.png=5.000",
 ) -> list[tuple[str, Path, float]]:
-    """Kind, picture and value of every item; `form` and `example` state in an error what the value must be."""
+    """Read kind, picture and value of every item; an error states with `form` and `example` what the value must be."""
     return [_item(item, kind, form, example) for item in items]
 
 
@@ -35,7 +35,7 @@ def _item(item: str, kind: str, form: str, example: str) -> tuple[str, Path, flo
 
 
 def region_from(roi: str | None) -> tuple[int, int, int, int] | None:
-    """Read X,Y,W,H.
+    """Read a region of interest in the form X,Y,W,H (pixels).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Folder of a command's results, which never replaces those of another input."""
+"""Folder for a command's results; results of another input are never overwritten."""
 
 from pathlib import Path
 
@@ -6,14 +6,14 @@ import click
 
 
 def results_folder(out: Path, source: Path) -> Path:
-    """Return the folder of --out, or the default one; another if that has the results of another input.
+    """Return the folder of --out, or the default folder; if that has results of another input, a new name is chosen.
 
     Parameters
     ----------
     out : Path
         Value of --out.
     source : Path
-        The input.
+        The input file or folder of the command.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def results_folder(out: Path, source: Path) -> Path:
 
 
 def running_command() -> str:
-    """Return the present command line, for the provenance of a result."""
+    """Return the command line of this process, for the provenance of a result."""
     import shlex
     import sys
 

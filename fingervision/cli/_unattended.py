@@ -1,4 +1,4 @@
-"""Run a command for a program: its message and exit code are returned, and nothing is printed."""
+"""Run a command from within a program: message and exit code are returned, and nothing is printed."""
 
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -16,14 +16,14 @@ _ONE_AT_A_TIME = Lock()
 
 
 def perform(name: str, arguments: tuple[str, ...]) -> Ended:
-    """Run a command as the command line does.
+    """Run a command in the same way as the command line does.
 
     Parameters
     ----------
     name : str
         The command's name.
     arguments : tuple of str
-        As on a command line.
+        Arguments and options as on the command line.
     """
     said = StringIO()
     with _ONE_AT_A_TIME, redirect_stdout(StringIO()), redirect_stderr(said):

@@ -1,4 +1,4 @@
-"""Options of every command that measures pictures: scale, height, direction of the tips, region."""
+"""Options shared by all commands that measure pictures: scale, measuring height, tip direction, region of interest."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _take_settings(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Use a settings file for options that are not given."""
+    """Take the values of options that are not given from a settings file."""
     if path is None:
         return None
     from fingervision.storage.settings_toml import read_settings
@@ -64,7 +64,7 @@ OPTIONS = (
 
 
 def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add these options to a command."""
+    """Add the options of this module to a command."""
 
     @wraps(command)
     def with_one_scale(**options: Any) -> Any:
@@ -84,7 +84,7 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def region_of(words: str | None) -> "Region | None":
-    """Read --roi.
+    """Read the region of interest from the words of the option --roi.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`fingervision batch`: measure or diagnose many inputs, on every core of this machine or on a Dask cluster."""
+"""`fingervision batch`: measure or diagnose many inputs, on all cores of this computer or on a Dask cluster."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -47,7 +47,7 @@ def command() -> None:
 
 
 def _batch_of(name: str) -> click.Command:
-    """Make a batch command: the options of the single command, and those of a batch."""
+    """Make a batch command with the options of the single command and those of a batch."""
     single = cli.get_command(click.Context(cli), name)
     assert single is not None  # noqa: S101 - named below
     options = [
@@ -123,7 +123,7 @@ def _run(
 
 
 def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str]:
-    """Write options as on a command line; files with absolute paths for other machines."""
+    """Write options as on the command line; file names get absolute paths if other computers do the work."""
     words: list[str] = []
     for option, value in given.items():
         flag = option.opts[0]
@@ -136,7 +136,7 @@ def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str
 
 
 def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
-    """Hash of what determines the results besides the input: options, content of files that they name, version."""
+    """Hash of everything besides the input that determines the results: options, content of named files, version."""
     import hashlib
     import json
 
@@ -174,9 +174,9 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
 
 
 def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> None:
-    """Refuse invalid options, once and before any work.
+    """Refuse invalid options once, before any input is processed.
 
-    The command is called for an input that does not exist: its only error must be about that input.
+    The command is called with a nonexistent input; if the options are valid, the only error is that about the input.
     """
     from tempfile import TemporaryDirectory
 
@@ -195,7 +195,7 @@ def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> Non
 
 
 class _Bar:
-    """Progress with rate and time left, on a terminal only."""
+    """Progress bar with rate and remaining time, shown on a terminal only."""
 
     def __init__(self, name: str, total: int) -> None:
         import sys
@@ -227,7 +227,7 @@ class _Bar:
 
 
 def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
-    """Print the result, and errors on the error stream."""
+    """Print the results of the batch on standard output, and errors on standard error."""
     import json
 
     if as_json:

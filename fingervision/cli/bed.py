@@ -1,4 +1,4 @@
-"""`fingervision bed`: the test bed; every file `_bed_NAME.py` beside this one is the subcommand NAME."""
+"""`fingervision bed`: commands of the test bed; each module `_bed_NAME.py` in this package is the subcommand NAME."""
 
 import importlib
 import pkgutil
@@ -11,7 +11,7 @@ PREFIX = "_bed_"
 
 
 class BedCommands(click.Group):
-    """Subcommands found by their files' names, each imported when it is called."""
+    """Command group whose subcommands are found by module names, and imported when they are called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the subcommands, sorted."""
@@ -19,7 +19,7 @@ class BedCommands(click.Group):
         return sorted(module.name.removeprefix(PREFIX) for module in modules if module.name.startswith(PREFIX))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the subcommand's module, and no other."""
+        """Import only the module of the requested subcommand."""
         if cmd_name not in self.list_commands(ctx):
             return None
         command = importlib.import_module(f"{fingervision.cli.__name__}.{PREFIX}{cmd_name}").command

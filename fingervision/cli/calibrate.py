@@ -1,4 +1,4 @@
-"""`fingervision calibrate`: pixels to millimetres from a reference, with an uncertainty budget."""
+"""`fingervision calibrate`: scale in pixels per millimetre from a reference object, with an uncertainty budget."""
 
 import json
 from collections.abc import Callable, Sequence

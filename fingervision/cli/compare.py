@@ -1,4 +1,4 @@
-"""`fingervision compare`: where measurement and model disagree."""
+"""`fingervision compare`: find where measurement and model disagree."""
 
 from pathlib import Path
 
@@ -44,7 +44,7 @@ def command(
     columns: Path | None,
     as_json: bool,
 ) -> None:
-    """Say where a measured table and each of one or more models disagree beyond the noise."""
+    """Say where a measured table disagrees with one or more models by more than the noise."""
     import json
 
     from fingervision.diagnosis.report.comparison_files import PAGE

@@ -1,4 +1,4 @@
-"""`fingervision demo`: the whole procedure on the simulated bed, with each step in a line."""
+"""`fingervision demo`: the complete procedure on the simulated test bed, with one printed line per step."""
 
 from pathlib import Path
 

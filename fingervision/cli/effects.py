@@ -1,4 +1,4 @@
-"""`fingervision effects`: the catalogue, one line each, or one effect explained with its picture."""
+"""`fingervision effects`: list the catalogue of effects, one line each, or explain one effect with a plot."""
 
 from pathlib import Path
 

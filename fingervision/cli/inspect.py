@@ -1,4 +1,4 @@
-"""`fingervision inspect`: what limits the measurement with this set-up, what it costs, and what to change."""
+"""`fingervision inspect`: list what limits the measurement, the uncertainty that it causes, and what to change."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`fingervision live`: the camera's picture with the measured points, the gap and its history."""
+"""`fingervision live`: show the camera's picture with the measured points, the gap, and the gap over time."""
 
 from pathlib import Path
 

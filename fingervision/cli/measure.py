@@ -1,4 +1,4 @@
-"""`fingervision measure`: a recording in, the finger gap over time out."""
+"""`fingervision measure`: measure the finger gap over time in a recording."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -189,7 +189,7 @@ def _frames(words: str | None) -> tuple[int, int] | None:
 
 
 class _Bar:
-    """Progress with the time left, on a terminal only."""
+    """Progress bar with the remaining time, shown on a terminal only."""
 
     def __init__(self) -> None:
         from contextlib import ExitStack
@@ -218,7 +218,7 @@ class _Bar:
 
 
 def _report(measured: "Measured", as_json: bool) -> None:
-    """Print the result on standard output, and errors on the error stream."""
+    """Print the results on standard output, and errors on standard error."""
     from fingervision.domain.status import Status
     from fingervision.storage.summary_json import summary_text
 

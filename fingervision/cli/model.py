@@ -1,4 +1,4 @@
-"""Predict a gripper from its drawing: `fingervision model`."""
+"""`fingervision model`: predict the behaviour of a gripper or mechanism from its drawing."""
 
 import time
 from pathlib import Path
@@ -85,12 +85,12 @@ def command(
     vary: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Predict gap, force, stress and vibration from a drawing, by one kind of model or all kinds.
+    """Predict gap, force, stress and vibration from a drawing, with one kind of model or all kinds.
 
     Writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the paper's Figure 9, with
-    differences) and deformed.png (with finite elements). With --drive also response.csv, the gap and the force over
-    the drive's time, which compare and diagnose take as measured, and response.png. A mechanism drawn by bodies
-    (mechanism.toml) has its own table over the input, mechanism.csv.
+    differences) and deformed.png (with finite elements). With --drive, it also writes response.csv (gap and force over
+    the drive's time, a table that compare and diagnose accept as measured) and response.png. For a mechanism.toml, the
+    table over the input is mechanism.csv.
     """
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_inputs import inputs_mm, inputs_until_touch, with_rows_between

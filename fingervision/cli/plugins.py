@@ -1,4 +1,4 @@
-"""`fingervision plugins`: every part that can be added by plug-ins, and its origin."""
+"""`fingervision plugins`: list every part that plug-ins can add, and where it comes from."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ fingervision/plugins says what each part must define; fingervision.testing has t
 @click.option("--all", "every", is_flag=True, help="Also list built-in parts.")
 @click.option("--json", "as_json", is_flag=True, help="Print the list as JSON, with built-in parts.")
 def command(every: bool, as_json: bool) -> None:
-    """List the installed plug-ins, where each comes from, and which were left out and why."""
+    """List the installed plug-ins with their origin, and those that could not be used with the reason."""
     import json
 
     rows: list[dict[str, Any]] = []

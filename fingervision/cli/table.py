@@ -1,4 +1,4 @@
-"""`fingervision table`: how a foreign table was interpreted, and columns.toml to read it in the same way again."""
+"""`fingervision table`: show how a table of another program is interpreted, and write columns.toml to repeat it."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -132,7 +132,7 @@ def _print(found: "Account") -> None:
 
 
 def _draw(found: "Account", png: Path) -> None:
-    """Draw the curve as it was interpreted, with the file's name."""
+    """Plot the curve of the table as interpreted, with the file's name as title."""
     from fingervision.domain.errors import DataError, OutputError
 
     curve = found.curve()

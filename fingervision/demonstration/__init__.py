@@ -1,1 +1,1 @@
-"""The whole procedure on the simulated bed, from a hidden effect to the report that names it."""
+"""Demonstration of the complete procedure on the simulated test bed, from a hidden effect to its diagnosis."""

@@ -1,4 +1,4 @@
-"""The whole procedure on the simulated bed: hide an effect, run, measure, diagnose, and do the run proposed."""
+"""Demonstration on the simulated test bed: hide an effect, run, measure, diagnose, and execute the proposed run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,13 +42,13 @@ class Shown:
     Parameters
     ----------
     hidden : Hidden
-        The truth.
+        The effect that was hidden.
     report : DiagnosisReport
-        The last answer.
+        Report of the last diagnosis.
     page : Path
-        Its report.
+        Path of the report in HTML.
     runs : int
-        How many runs it took.
+        Number of runs that were made.
     """
 
     hidden: Hidden
@@ -58,7 +58,7 @@ class Shown:
 
     @property
     def among(self) -> bool:
-        """Whether the hidden effect is in the ambiguity set of the answer."""
+        """Whether the hidden effect is in the ambiguity set of the diagnosis."""
         return any(set(names) == set(self.hidden.effects) for names in self.report.alternatives)
 
     @property
@@ -75,10 +75,11 @@ def demonstrated() -> tuple[str, ...]:
 
 
 def drawn(seed: int) -> Hidden:
-    """Choose by a seed an effect, among those declared fit for a demonstration, and its size.
+    """Choose, by a seed, the effect to hide, among those declared suitable for a demonstration, and its size.
 
-    Each effect draws a random number from the seed and its name, and the highest one wins (rendezvous hashing: Thaler &
-    Ravishankar 1998, doi:10.1109/90.663936), so that a new effect changes only the seeds for which it wins.
+    A random number is drawn for each effect from the seed and the effect's name, and the effect with the highest number
+    is chosen (rendezvous hashing: Thaler & Ravishankar 1998, doi:10.1109/90.663936). A new effect therefore changes
+    only the choice for seeds by which the new effect itself is chosen.
     """
     rng = np.random.default_rng([seed, 7])
     name = max(demonstrated(), key=lambda name: float(np.random.default_rng([seed, crc32(name.encode())]).random()))
@@ -91,18 +92,18 @@ def drawn(seed: int) -> Hidden:
 
 
 def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
-    """Repeat diagnosis and proposed run until one explanation is left, or nothing more is proposed.
+    """Repeat diagnosis and proposed run until a single explanation remains, or no further run is proposed.
 
     Parameters
     ----------
     hidden : Hidden
-        What acts in the bed; nothing here looks at it before the end.
+        Effects hidden in the test bed; the demonstration does not use them before the end.
     seed : int
-        Of everything random.
+        Seed of all random numbers.
     out : Path
-        Folder; new or empty.
+        Output folder, new or empty.
     say : callable
-        Told each step in a line.
+        Function called with one line of text for each step.
 
     Raises
     ------
@@ -138,7 +139,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
 
 
 def _answer(table: Path, simulation: Path, out: Path, seed: int) -> tuple[Diagnosis, Path]:
-    """Diagnose, and write the files that `fingervision diagnose` writes."""
+    """Diagnose a table, and write the same files as `fingervision diagnose`."""
     model = read_model(simulation)
     done = diagnose(read_measured_table(table), model, seed=seed)
     with out_folder(out):

@@ -1,1 +1,1 @@
-"""The nouns: frozen records with their units, shared by every layer above."""
+"""Domain types: immutable records with stated units, used by all other packages."""

@@ -1,4 +1,4 @@
-"""How a board is wired to a motor controller and a force sensor; it differs from laboratory to laboratory."""
+"""Settings of a microcontroller board: its wiring to a motor controller and a force sensor, and its time limits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Role(IntEnum):
-    """What a pin is for. The numbers are those of the Arduino sketch of the board (`lines.h`)."""
+    """Function of a pin; the numbers are defined by the Arduino sketch of the board (`lines.h`)."""
 
     SELECT_0 = 0
     SELECT_1 = 1
@@ -27,14 +27,14 @@ NEEDED_TO_MOVE = (*SELECT, Role.DRIVE, Role.BUSY, Role.ALARM)
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line.
+    """One digital or analogue line between the board and a device.
 
     Parameters
     ----------
     pin : int
-        Arduino's number: 2 to 13 are D2 to D13, 14 to 19 are A0 to A5.
+        Pin number of the Arduino: 2 to 13 are D2 to D13, 14 to 19 are A0 to A5.
     active_high : bool
-        Whether the high level means yes.
+        Whether the high level means true.
     """
 
     pin: int
@@ -50,13 +50,15 @@ class BoardSettings:
     port : str
         Name of the serial port.
     lines : mapping of Role to Line
-        The wiring. All of `NEEDED_TO_MOVE` or none of them; a board without them is a force sensor only.
+        The wiring. It contains all of the roles `NEEDED_TO_MOVE` or none of them; a board without these roles serves as
+        a force sensor only.
     force_period_ms : int
-        Time between two samples of the force.
+        Time between two samples of the force, in ms.
     silence_ms : int
-        The board drops the drive line when it has heard nothing for so long.
+        Time without a received message, in ms, after which the board switches the drive line off.
     settle_ms : int
-        Time from the select lines to the drive line; with 0 they change in the same instant.
+        Time between setting the select lines and setting the drive line, in ms; 0 if all of them change at the same
+        instant.
     """
 
     port: str

@@ -1,4 +1,4 @@
-"""Where the bodies of a mechanism were seen in a frame."""
+"""Measured poses of the bodies of a mechanism in a video frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,21 +11,23 @@ OK, COVERED, OUT_OF_VIEW, NOT_FOUND, DAMAGED = "ok", "covered", "out_of_view", "
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenPose:
-    """Where a body, or a hinge, was seen in a frame, in the drawing's axes.
+    """Measured pose of a body, or angle of a hinge, in a video frame, in the axes of the drawing.
 
     Parameters
     ----------
     status : str
-        `ok`; `covered`: too little of its outline is seen; `out_of_view`; `not_found`: what was seen in its place is
-        not joined to the bodies that its flexures join it to, so that something like it was taken for it; `damaged`:
-        there is no picture.
+        `ok`; `covered`: too little of the body's outline is visible; `out_of_view`; `not_found`: the shape that was
+        found is not at the end of the body's flexures, so that it must be a similar but different object; `damaged`:
+        the picture of the frame cannot be used.
     x_mm, y_mm, angle_mrad : float or None
-        Counted from the drawing as it was laid on the first frame; a hinge has an angle alone.
+        Displacement and rotation relative to the drawing as it was aligned with the first video frame; a hinge has only
+        an angle.
     covariance : ndarray of float, shape (3, 3), or None
-        Of x and y in mm and the angle in mrad: of the body's edges in this frame, of where the drawing was laid, and of
-        the calibration (scale, edge bias, plane, tilt, lens); a scale that was merely stated has none.
+        Covariance of x and y in mm and the angle in mrad. It contains the uncertainty of the body's edges in this
+        frame, of the alignment of the drawing, and of the calibration (scale, edge bias, plane, tilt, lens); a scale
+        that was stated without an uncertainty contributes nothing.
     random : ndarray of float, shape (3, 3), or None
-        The part of it that differs from frame to frame.
+        The random part of the covariance, which differs from frame to frame.
     """
 
     status: str
@@ -38,7 +40,7 @@ class SeenPose:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramePoses:
-    """All bodies and hinges of one frame, by name."""
+    """Measured poses of all bodies and hinges in one video frame, by name."""
 
     frame: int
     time_s: float | None

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class Direction(StrEnum):
-    """Where the tips point in the image."""
+    """Direction in the image in which the finger tips point."""
 
     UP = "up"
     DOWN = "down"
@@ -13,5 +13,5 @@ class Direction(StrEnum):
 
     @property
     def is_vertical(self) -> bool:
-        """Whether the fingers lie along the image's columns (up or down)."""
+        """Whether the fingers are parallel to the image's columns (tips up or down)."""
         return self in (Direction.UP, Direction.DOWN)

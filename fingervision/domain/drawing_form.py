@@ -1,4 +1,4 @@
-"""How an effect acts in a mechanism given by its drawing, where poses of the bodies show which part differs."""
+"""Action of an effect on a drawn mechanism, if measured poses of the bodies show which part of the drawing differs."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,33 +12,34 @@ class DrawnPart(StrEnum):
     HINGE = "hinge"
     """The bending stiffness of one hinge."""
     LINK = "link"
-    """The length of one link: one of its ends sits off along it."""
+    """The length of one link: one end is displaced along the link."""
     PIVOT = "pivot"
     """The play of one pivot."""
     LINKS_ALIKE = "links alike"
-    """The lengths of a link and of its mirror image, by the same ratio."""
+    """The lengths of a link and of its mirror image, changed by the same ratio."""
     LINKS_OPPOSITE = "links opposite"
-    """The lengths of a link and of its mirror image, by opposite ratios."""
+    """The lengths of a link and of its mirror image, changed by opposite ratios."""
     INPUT = "input"
-    """No place: the scale of the recorded input, and with it every channel."""
+    """No part of the drawing: the scale of the recorded input, which affects every channel."""
     PICTURE = "picture"
-    """No place: the scale of the picture, and with it every length but no angle and no force."""
+    """No part of the drawing: the scale of the picture, which affects every length but no angle and no force."""
     CONSTANT = "constant"
-    """No place: a constant of every channel, which is fitted beside every explanation and is no candidate."""
+    """No part of the drawing: a constant offset of every channel, fitted with every explanation but never named."""
 
 
 @dataclass(frozen=True, slots=True)
 class DrawingForm:
-    """Action of one effect on a drawing: what it changes there, and by how much.
+    """Action of one effect on a drawing: the part that the effect changes, and the parameter that states by how much.
 
     Parameters
     ----------
     part : DrawnPart
-        What it changes.
+        Part of the drawing that the effect changes.
     parameter : Parameter
-        Its size.
+        Parameter that states the size of the change.
     reference : float
-        A size at which its signature is computed; for a pair of links it follows from that of the single link.
+        Size of the change for which the effect's signature is computed; for a pair of links, the size follows from that
+        for a single link.
     """
 
     part: DrawnPart

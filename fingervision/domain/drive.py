@@ -1,4 +1,4 @@
-"""The recorded input of a run: where the stage was, when."""
+"""The recorded input of a run: position of the stage over time."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ class DriveHistory:
     Parameters
     ----------
     time_s : ndarray of float, shape (n,)
-        Strictly increasing within each run.
+        Times, strictly increasing within each run.
     input_mm : ndarray of float, shape (n,)
-        Positive opens the gripper.
+        Displacement of the drive point; positive values open the gripper.
     run : tuple of str, length n, or None
-        Name of the run that each sample belongs to.
+        Name of the run to which each sample belongs.
     force_n : ndarray of float, shape (n,), or None
         Force at the drive.
     """

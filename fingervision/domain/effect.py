@@ -1,4 +1,4 @@
-"""A physical effect: something that happens between the recorded input and the measured points."""
+"""Physical effects that act between the recorded input and the measured points."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -24,7 +24,7 @@ REZEROED = "rezeroed"
 
 
 class Stage(StrEnum):
-    """Where in the measuring chain an effect acts."""
+    """Part of the measuring chain in which an effect acts: drive, mechanism or camera."""
 
     DRIVE = "drive"
     MECHANISM = "mechanism"
@@ -33,40 +33,43 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The samples over which effects are computed: what an effect may use besides the signal that it acts on.
+    """Samples over which effects are computed, with all data that an effect may use besides the signal it acts on.
 
     Parameters
     ----------
     input_mm : ndarray of float, shape (n,)
-        Recorded input; runs one after the other, sorted by time within each.
+        Recorded input, run after run, sorted by time within each run.
     time_s : ndarray of float, shape (n,), or None
-        Times; None where the table has none, and the order of rows then means nothing.
+        Times; None if the table has no times, in which case the order of rows has no meaning.
     runs : tuple of slice
         The samples of each run.
     rest_gap_mm : float
-        g0, the model's gap at input zero.
+        g0, the gap that the model predicts at input zero.
     opening_mm : float
         Largest absolute opening that the model predicts.
     closing_mm : float
-        Largest closing below the rest gap that the model predicts; 0 where it only opens.
+        Largest closing below the rest gap that the model predicts; 0 if the gripper only opens.
     shared_clock : bool
-        Whether times go on from run to run. Where they restart, the runs share no clock.
+        Whether times continue from run to run. If times restart with each run, the runs have no common clock.
     input_sigma_mm : float
         Standard uncertainty of one recorded input (noise, encoder step).
     input_step_mm : float
-        Step of the encoder; 0 where none shows.
+        Resolution step of the encoder; 0 if the recorded input shows no steps.
     both_edges : bool
-        Whether left and right were measured, or the gap alone.
+        Whether the positions of both fingers were measured (True), or only the gap (False).
     force : bool
         Whether a force was measured.
     rezeroed : tuple of bool
-        Which runs came after a re-zeroing of the stage that others came before; empty where none did.
+        For each run, whether it was recorded after a re-zeroing of the stage that followed earlier runs; empty without
+        a re-zeroing.
     dwell_s : float
-        Shortest time for which the stage stood before it was read; 0 where it was read on its way.
+        Shortest time for which the stage rested before its position was recorded, in s; 0 if positions were recorded
+        during the motion.
     commanded : bool
-        Whether the input is a command that keeps its value until it jumps.
+        Whether the input is a commanded position that is constant between jumps.
     bodies : bool
-        Whether effects with a place are tried by their forms with a table; a diagnosis looks for places by itself.
+        Whether effects that act on one part of the mechanism are tried with their formulas for a simulation table; a
+        diagnosis with measured poses of bodies searches for the part separately.
     """
 
     input_mm: Array
@@ -87,7 +90,7 @@ class History:
 
     @property
     def times(self) -> Array:
-        """Times of the samples, shape (n,); only for an effect that declares that it needs times."""
+        """Times of the samples (s), shape (n,); only for effects that declare `needs_times`."""
         if self.time_s is None:
             message = "an effect that needs times was run on a table without them."
             raise ValueError(message)
@@ -95,18 +98,18 @@ class History:
 
     @cached_property
     def clock_s(self) -> Array:
-        """Time since the table's first sample, shape (n,)."""
+        """Time since the first sample of the table (s), shape (n,)."""
         return np.asarray(self.times - self.times.min(), dtype=np.float64)
 
     @cached_property
     def sample_time_s(self) -> float:
-        """Median time between neighbouring samples of a run."""
+        """Median time between successive samples of a run (s)."""
         steps = np.concatenate([np.diff(self.times[run]) for run in self.runs])
         return float(np.median(steps)) if steps.size else 1.0
 
     @cached_property
     def input_span_mm(self) -> float:
-        """Range of the recorded input."""
+        """Difference between the largest and smallest recorded input (mm)."""
         return float(np.ptp(self.input_mm))
 
 
@@ -119,9 +122,10 @@ class InputPath:
     history : History
         The chain's history at every point of the path, of which there are m.
     rows : ndarray of int, shape (n,)
-        Where on the path each measured row lies.
+        Index of the path's point at which each measured row lies.
     owner : ndarray of int, shape (m,)
-        The measured row whose recorded input a point repeats; -1 where it has its own.
+        For each point, index of the measured row whose recorded input it repeats; -1 for a point with an input of its
+        own.
     """
 
     history: History
@@ -135,22 +139,22 @@ class InputPath:
 
 
 def effect_key(name: str, place: str = "", end: str = "") -> str:
-    """Spell an effect with its place: `hinge_stiffness_error@right hinge 2`; the bare name where it has none.
+    """Join an effect's name and place: `hinge_stiffness_error@right hinge 2`; without a place, return only the name.
 
     Parameters
     ----------
     name : str
-        In the catalogue.
+        Name of the effect in the catalogue.
     place : str
-        Hinge or link as the drawing calls it.
+        Name of the hinge or link in the drawing.
     end : str
-        Which end of a link sits off.
+        The end of a link that is displaced.
     """
     return name if not place else f"{name}@{place}" + (f"; {end}" if end else "")
 
 
 def split_key(key: str) -> tuple[str, str, str]:
-    """Split an effect's key into its name, its place, and the end of that place."""
+    """Split an effect's key into the effect's name, its place (a hinge or link), and the end of that link."""
     name, _, rest = key.partition("@")
     place, _, end = rest.partition("; ")
     return name, place, end
@@ -171,57 +175,65 @@ class Effect:
     stage : Stage
         Drive, mechanism or camera.
     order : float
-        Place in the chain within the stage: effects act in ascending order. The catalogue's own have whole tens
-        (`fingervision effects NAME` prints them), so that another may stand between two: one that acts on what the play
-        (60) has left, and before the jumps (70), has 65. By default last of its stage.
+        Position in the chain within the stage: effects act in ascending order. The built-in effects have multiples of
+        ten (`fingervision effects NAME` prints the number), so that a user-defined effect may be put between two of
+        them: an effect that acts after the play (60) and before the jumps (70) has, for example, 65. By default, the
+        effect acts last in its stage.
     words : str
-        What happens, in half a sentence.
+        Short description of the effect.
     formula : str
-        The definition with a simulation table.
+        Formula that defines the effect if the model is a simulation table.
     source : str
-        Where the law is from.
+        Source of the physical law.
     residual : str
-        How it looks in measured minus simulated.
+        Description of the residual (measured minus simulated gap) that the effect causes.
     parameters : tuple of Parameter
-        With bounds that hold for every table.
+        Parameters of the effect, with bounds that are valid for every table.
     needs_times, needs_shared_clock, needs_edges, needs_force : bool
-        Data without which the effect is excluded.
+        Kinds of data without which the effect is excluded from a diagnosis.
     needs_bodies : bool
-        Whether poses of bodies show it and the gap alone does not.
+        Whether the effect is visible only in measured poses of bodies, not in the gap.
     memory : bool
-        Whether the past counts.
+        Whether the effect depends on earlier samples of the run.
     start : str
-        What the state of an effect with memory is at a run's start, in words; empty where it is known. Such a start is
-        a nuisance of its run: a number from -1 to 1 under the key `start_key(run)`.
+        Description of the unknown state of an effect with memory at the start of a run; empty if the state is known.
+        The start state is a nuisance parameter of the run: a number from -1 to 1 under the key `start_key(run)`.
     curve : bool
-        Whether its form is a curve that is estimated as a whole; its parameters then only describe the curve.
+        Whether the effect is a curve that is estimated as a whole; the parameters then only describe this curve.
     narrow : callable or None
-        Bounds that follow from the data: `narrow(history)` gives the parameters to search, or the reason why
-        these data cannot show the effect.
+        Function for bounds that depend on the data: `narrow(history)` returns the parameters to search, or the reason
+        why these data cannot show the effect.
     foretold : mapping of str to (float, float)
-        Where a drawing foretells the effect: the ranges that its parameters then lie in.
+        Ranges of the effect's parameters that a drawing predicts; empty if a drawing predicts nothing.
     checks : mapping of FurtherCheck to bool
-        Checks beside the stage's motion in which it shows (True) or stays out (False); the others do not concern it.
+        Checks without a motion of the stage in which the effect is visible (True) or not visible (False); checks that
+        are not listed give no information on the effect.
     stands_at : tuple of str
-        Ends of the range (`closed`, `open`) at which the reading stands while the command moves on.
+        Ends of the range (`closed`, `open`) at which the measured value remains constant while the commanded position
+        still changes.
     delay_s : callable or None
-        For what is a delay or looks like one at slow motion: `delay_s(values)` gives it. An effect that has
-        `act_curved` is a delay, with the one parameter `delay_s`.
+        Function `delay_s(values)` that returns the delay of an effect that is a delay, or resembles a delay at slow
+        motion. An effect that has `act_curved` is a delay, with `delay_s` as its only parameter.
     wave : (str, str) or None
-        For a sine over the recorded input: the names of its amplitude and of its period, both in mm.
+        Names of the parameters amplitude and period (both in mm) of an effect that is a sine over the recorded input.
     drawn_with : mapping of str to float
-        Values for its picture in the catalogue, where a share of the range would not show how it looks.
+        Parameter values for the effect's plot in the catalogue, if the usual fraction of the range would not show its
+        shape.
     odd : tuple of str
-        Parameters that change their sign when the picture is mirrored.
+        Names of parameters that change sign when the picture is mirrored.
     in_picture : callable or None
-        For an effect of the camera that changes the picture itself: `in_picture(values)` says how. Without it a
-        simulated camera sees the two points moved, which for drifts and scales is the same.
+        Function `in_picture(values)` for a camera effect that changes the whole picture; it returns the change. Without
+        this function, a simulated camera only moves the two measuring points, which is equivalent for drifts and
+        scales.
     at_frames : bool
-        Whether it is defined on the samples: a simulation looks at it with the frames, not in between.
+        Whether the effect is defined on the samples, so that a simulation evaluates it at the times of the video frames
+        only, not between them.
     in_drawing : DrawingForm or None
-        How it acts beside a drawing whose bodies' poses were measured; None where these do not show it.
+        Action of the effect on a drawing if poses of its bodies were measured; None if such poses do not show the
+        effect.
     demonstrated : bool
-        Whether a few short runs can tell it from everything else: `fingervision demo` hides one of these.
+        Whether a few short runs can distinguish the effect from all others; `fingervision demo` hides one of these
+        effects.
     """
 
     name: str
@@ -272,7 +284,7 @@ class Effect:
 
 
 def start_key(run: int) -> str:
-    """Return the key of a run's start state among an effect's parameter values."""
+    """Return the key under which an effect's parameter values hold the start state of a run."""
     return f"start_{run + 1}"
 
 
@@ -282,10 +294,10 @@ def _start(words: str, run: int) -> Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveEffect(Effect):
-    """An effect on the input: `act(input_mm, history, values)` returns the input that the mechanism receives.
+    """An effect of the drive: `act(input_mm, history, values)` returns the input that the mechanism receives.
 
-    `act_curved` computes the same effect for a stage that moved along a curve, not a straight line, between two
-    samples; None where that makes no difference. Only delays need it.
+    `act_curved` computes the same effect for a stage whose position over time is curved, not linear, between two
+    samples; None for effects that do not depend on this. Only delays need `act_curved`.
     """
 
     act: DriveAct

@@ -1,4 +1,4 @@
-"""Errors that a user reads: one sentence that says what, what it must be, what it is, and what to do.
+"""Errors for users: each message says in one sentence what is wrong, what is expected, what was found, and what to do.
 
 Code that catches an error relies on its class and on the facts that it carries; the wording may change with any
 version.
@@ -59,11 +59,11 @@ class ArgumentError(UsageError, ValueError):
     argument : str
         Name of the argument in Python (`below_tip_mm`).
     must : str
-        What it must be, as it follows the word "must".
+        Condition that the value must meet, worded to follow the word "must".
     found : str
-        What it is, as it follows the word "but".
+        The value that was found, worded to follow the word "but".
     advice : str
-        What to do; empty where that is plain.
+        Advice on what to do; empty if that is obvious.
     """
 
     def __init__(self, argument: str, must: str, found: str, advice: str = "") -> None:
@@ -83,11 +83,11 @@ class UnknownNameError(ArgumentError):
     argument : str
         Name of the argument.
     name : str
-        What was given.
+        The unknown name that was given.
     known : iterable of str
         All known names.
     what : str
-        What the names stand for, with an article.
+        Kind of thing that the names denote, with an article.
     listing : str
         Advice if no known name is similar.
     """
@@ -105,7 +105,7 @@ class InputFileError(FingervisionError, OSError):
 
 
 class DataError(FingervisionError, ValueError):
-    """A file, a recording or an array can be read, but its content is not what it must be."""
+    """A file, a recording or an array can be read, but its content is not valid."""
 
 
 def unreadable(error: Exception) -> type[InputFileError] | type[DataError]:
@@ -128,7 +128,7 @@ class NoCalibrationError(FingervisionError, ValueError):
 
 
 class ModelError(FingervisionError):
-    """A model of the mechanism has no answer, such as no equilibrium, no mesh, or a body that can move freely."""
+    """A model of the mechanism has no solution: no equilibrium, no mesh, or a body that can move freely."""
 
 
 class DeviceError(FingervisionError):
@@ -144,7 +144,7 @@ class StateError(FingervisionError):
 
 
 class ProcessError(FingervisionError):
-    """A worker process, a cluster or the page's server cannot be started, or was lost."""
+    """A worker process, a cluster or the web server of the browser page cannot be started, or was lost."""
 
 
 class InstallationError(FingervisionError):
@@ -157,13 +157,13 @@ class MissingLibraryError(InstallationError, ImportError):
     Parameters
     ----------
     library : str
-        Its name.
+        Name of the library.
     extra : str
         The extra of this project that installs it.
     what : str
-        What needs it.
+        The part of fingervision that needs the library.
     instead : str
-        What to do without it, as it follows "or"; empty where there is nothing.
+        What to do without the library, worded to follow "or"; empty if there is no alternative.
     """
 
     def __init__(self, library: str, extra: str, what: str, instead: str = "") -> None:

@@ -1,4 +1,4 @@
-"""One picture of a recording, or the placeholder for a picture that is missing."""
+"""One video frame, or the placeholder for a frame that is missing."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,10 +13,10 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 class Coding(StrEnum):
-    """Compression between sensor and pixels, which tells which pixels share their errors.
+    """Compression between sensor and pixels, which determines the pixels whose errors are correlated.
 
-    A lossy codec that treats every picture by itself (JPEG) leaves errors that are shared over a few pixels; one that
-    predicts a picture from its neighbours (H.264) moves whole blocks.
+    A lossy codec that codes every picture independently (JPEG) causes errors that are correlated over a few pixels; a
+    codec that predicts a picture from neighbouring pictures (H.264) displaces whole blocks.
     """
 
     LOSSLESS = "lossless"
@@ -26,22 +26,22 @@ class Coding(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One picture with the time stamp that its source gave it.
+    """One video frame: its picture, with the time stamp from its source.
 
     Parameters
     ----------
     pixels : ndarray of uint8 or uint16, shape (height, width) or (height, width, 3)
         Grey levels, or red, green and blue.
     index : int
-        Place in the source, from 0.
+        Number of the frame in the source, from 0.
     time_s : float or None
-        Presentation time of the source; None where the source has no times.
+        Presentation time from the source, in s; None if the source has no times.
     coding : Coding
-        Whether a lossy codec stood between the sensor and these pixels: their errors are then correlated.
+        Compression between the sensor and these pixels; after a lossy codec, the errors of pixels are correlated.
     hangs_on_others : bool
-        Whether the picture is coded as a difference to others.
+        Whether the picture is coded as a difference from other pictures.
     quantiser : Quantiser or None
-        How coarsely the codec has rounded it, where the stream says so.
+        Quantiser steps of the codec for this picture; None if the stream does not state them.
     """
 
     pixels: Pixels
@@ -53,7 +53,7 @@ class Frame:
 
     @property
     def lossy(self) -> bool:
-        """Whether the pixels differ from what the sensor saw."""
+        """Whether a lossy codec has changed the pixels from the sensor's values."""
         return self.coding is not Coding.LOSSLESS
 
     @property
@@ -69,18 +69,18 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class LostFrame:
-    """A frame that the source announced and that cannot be measured.
+    """A video frame that the source announced and that cannot be measured.
 
     Parameters
     ----------
     index : int
-        Place in the source, from 0.
+        Number of the frame in the source, from 0.
     time_s : float or None
-        Presentation time, where it is known.
+        Presentation time in s; None if unknown.
     status : Status
         `Status.DAMAGED` or `Status.DUPLICATE`.
     words : str
-        What happened, in a sentence.
+        Sentence that states what happened to the frame.
     """
 
     index: int

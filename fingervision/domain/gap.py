@@ -1,4 +1,4 @@
-"""What is measured of the gap between two fingers in one frame."""
+"""Measurement of the gap between two fingers in one video frame."""
 
 from dataclasses import dataclass, replace
 from math import hypot
@@ -9,7 +9,7 @@ from fingervision.domain.status import Status
 
 @dataclass(frozen=True, slots=True)
 class FingerEdge:
-    """The inner edge of one finger at the measuring height, and the finger's tip, from which that height is counted.
+    """The inner edge of one finger at the measuring height, and the finger's tip, from which this height is measured.
 
     Pixel coordinates: x right, y down, the centre of the full frame's first pixel is (0, 0).
 
@@ -20,15 +20,15 @@ class FingerEdge:
     tip_px : float
         The tip's coordinate along the fingers' axis (y for tips up or down, x for tips left or right).
     u_across_px : float
-        Standard uncertainty of the measuring point across the fingers, the tip's share included.
+        Standard uncertainty of the measuring point across the fingers, including the contribution of the tip.
     u_tip_px : float
         Standard uncertainty of the tip along the fingers' axis.
     slope : float
-        How far the edge moves across per pixel towards the root, at the measuring point.
+        Slope of the edge at the measuring point: displacement across the fingers per pixel towards the finger's root.
     blur_px : float
-        Standard deviation sigma_e of the edge's Gaussian spread, the pixel's own width included.
+        Standard deviation sigma_e of the edge's Gaussian blur, including the width of the pixel.
     contrast : float
-        Grey levels between the two plateaus, on the frame's own scale.
+        Difference between the grey levels on the two sides of the edge, in grey levels of the frame.
     """
 
     x_px: float
@@ -43,16 +43,16 @@ class FingerEdge:
 
 @dataclass(frozen=True, slots=True)
 class HeldPart:
-    """A part that both fingers hold: positions of their inner edges half-way along the part.
+    """A part that both fingers hold: positions of the fingers' inner edges at half the length of the part.
 
     Parameters
     ----------
     left_x_px, left_y_px, right_x_px, right_y_px : float
-        The two places, at the same height along the fingers.
+        Positions of the two inner edges, at the same height along the fingers.
     u_width_px : float
-        Standard uncertainty of the width from frame to frame.
+        Random standard uncertainty of the width (from frame to frame).
     light_gap : bool
-        True for dark fingers on a light ground; False for light fingers on a dark one.
+        True for dark fingers on a light background; False for light fingers on a dark background.
     """
 
     left_x_px: float
@@ -89,29 +89,30 @@ class GapMeasurement:
     direction : Direction
         Where the tips point.
     u_gap_px : float
-        Standard uncertainty of `gap_px` from frame to frame.
+        Random standard uncertainty of `gap_px` (from frame to frame).
     light_gap : bool
-        True for dark fingers on a light ground; False for light fingers on a dark one.
+        True for dark fingers on a light background; False for light fingers on a dark background.
     u_shift_px : float
-        Standard uncertainty of `gap_px` for what may have moved the edges in every frame alike: a bright rim, light
-        just beyond the end of the scale, or what all rows of an edge share of their residuals although nobody says that
-        the picture was compressed. Zero where the edges show none of these.
+        Standard uncertainty of `gap_px` from causes that may have displaced the edges equally in every frame: a bright
+        rim, slight overexposure, or residuals that all rows of an edge share although the picture is not declared as
+        compressed. Zero if the edges show none of these.
     response_shift_px : float
-        How much larger `gap_px` is than it would be if the other camera response that is possible were the true one;
-        zero where the response is known.
+        Difference between `gap_px` and the gap for the alternative camera response that is also possible; zero if the
+        response is known.
     roughness_px : float
-        Standard deviation of the edges about their mean line where they are rough or printed with a texture; zero where
-        they stray no more than their noise. What is measured is the mean line; a contact is made by the crests.
+        Standard deviation of rough or textured edges about their mean lines; zero if the deviations do not exceed the
+        noise. The gap is measured between the mean lines, whereas the crests make contact.
     fields_apart_px : float
-        How far apart even and odd rows see the faster finger; zero where they agree. The gap is that of the middle.
+        Displacement of the faster finger between even and odd rows of an interlaced picture; zero if both sets of rows
+        agree. The gap is the mean of both.
     beside : str
-        What stands beside the edges or has moved them: wall, shadow, glare, motion, sharpening; empty where nothing is
-        seen.
+        Disturbance beside the edges, or which has displaced the edges: wall, shadow, glare, motion, sharpening; empty
+        if none was found.
     held : HeldPart or None
-        The part that is held, where one is seen.
+        The part that the fingers hold; None if no part was found.
     u_coding_px : float
-        As much of `u_gap_px` (in quadrature) is what the codec may have done to each edge as a whole; zero where its
-        quantiser is not known.
+        Contribution (in quadrature) to `u_gap_px` from displacements of a whole edge by the codec; zero if the
+        quantiser of the codec is not known.
     """
 
     left: FingerEdge
@@ -131,22 +132,22 @@ class GapMeasurement:
     def u_picture_px(self) -> float:
         """Standard uncertainty of `gap_px` from this picture alone, the same in every frame (pixels).
 
-        It combines the systematic part of the edges with the camera's unknown response.
+        The value combines the systematic uncertainty of the edges with that of the unknown camera response.
 
-        Of the response: the true gap lies between its values for the assumed and for the alternative response, a
-        rectangular distribution with the measured value at one end (after JCGM 100:2008, 4.3.7, which has the value in
+        For the response, the true gap lies between the values for the assumed and for the alternative response: a
+        rectangular distribution with the measured value at one end (after JCGM 100:2008, 4.3.7, where the value is in
         the middle).
         """
         return hypot(self.u_shift_px, self.response_shift_px / 3.0**0.5)
 
     @property
     def status(self) -> Status:
-        """A measurement is always `Status.OK`."""
+        """Status of a measurement, which is always `Status.OK`."""
         return Status.OK
 
     @property
     def gap_px(self) -> float:
-        """Distance between the two measuring points; slanted where the tips are at different heights."""
+        """Distance between the two measuring points (pixels); the line is inclined if the tips differ in height."""
         return hypot(self.right.x_px - self.left.x_px, self.right.y_px - self.left.y_px)
 
     def shifted(self, x_px: float, y_px: float) -> "GapMeasurement":
@@ -166,11 +167,11 @@ class NoGap:
     Parameters
     ----------
     status : Status
-        The reason, as it stands in the table.
+        The reason, as written in the column `status` of the table.
     words : str
         The reason in a sentence.
     held : HeldPart or None
-        The part that hides the inner edges, where its width is known all the same.
+        The part that hides the inner edges, if the width of the part could still be measured.
     """
 
     status: Status
@@ -178,5 +179,5 @@ class NoGap:
     held: HeldPart | None = None
 
     def shifted(self, x_px: float, y_px: float) -> "NoGap":
-        """Return the frame's state with the coordinates of a held part, if any, shifted by x_px and y_px."""
+        """Return a copy in which the coordinates of a held part, if any, are shifted by x_px and y_px."""
         return self if self.held is None else replace(self, held=self.held.shifted(x_px, y_px))

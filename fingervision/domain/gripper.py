@@ -1,4 +1,4 @@
-"""The gripper as its drawing states it: material, body, hinges, lever and links."""
+"""Drawing of a gripper: material, body, hinges, lever and links."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,11 +14,12 @@ class SNLine:
     Parameters
     ----------
     cycles : (float, float)
-        Where the line begins and ends, rising; nothing is said beyond.
+        Numbers of cycles at the start and end of the line, in ascending order; the line is not extrapolated.
     amplitude_mpa : (float, float)
-        Stress amplitudes there, falling.
+        Stress amplitudes at the start and end of the line, in descending order.
     stress_ratio : float
-        Smallest over largest stress of the cycles that the line was measured with; -1 is fully reversed, 0 pulsating.
+        Ratio of the smallest to the largest stress in the tests from which the line was obtained; -1 for fully
+        reversed, 0 for pulsating stress.
     """
 
     cycles: tuple[float, float]
@@ -33,17 +34,17 @@ class Material:
     Parameters
     ----------
     name : str
-        What it is called.
+        Name of the material.
     youngs_modulus_mpa, poisson_ratio : float
         Linear elastic constants.
     density_kg_m3 : float
         Mass per volume.
     yield_mpa : float
-        Stress beyond which the answer of an elastic model is wrong.
+        Yield stress, beyond which the result of an elastic model is invalid.
     thermal_expansion_per_k : float or None
-        Linear, where it is stated.
+        Coefficient of linear thermal expansion; None if not stated.
     sn_line : SNLine or None
-        Endurance, where it is stated.
+        S-N line of fatigue; None if not stated.
     """
 
     name: str
@@ -56,18 +57,18 @@ class Material:
 
     @property
     def shear_modulus_mpa(self) -> float:
-        """G = E / (2 (1 + nu))."""
+        """Shear modulus G = E / (2 (1 + nu)), in MPa."""
         return self.youngs_modulus_mpa / (2.0 * (1.0 + self.poisson_ratio))
 
     @property
     def density_t_mm3(self) -> float:
-        """Mass per volume in the unit that goes with mm, N, MPa and s."""
+        """Density in t/mm^3, the unit that is consistent with mm, N, MPa and s."""
         return self.density_kg_m3 * 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Overall size of the plate and where the gap is measured.
+    """Overall dimensions of the plate, and the height at which the gap is measured.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ class Body:
     rest_gap_mm : float
         Distance between the tips at rest.
     measured_below_tip_mm : float
-        Height of the measuring point below the top of the tip.
+        Distance of the measuring point below the top of the tip.
     """
 
     width_mm: float
@@ -93,11 +94,11 @@ class Hinge:
     Parameters
     ----------
     thickness_mm : float
-        Smallest height of material between the two notches.
+        Smallest thickness of material between the two notches.
     radius_mm : float
         Radius of the notches.
     web_mm : float
-        Height of the bar that the notches are cut into; at least the hinge's own thickness.
+        Height of the bar into which the notches are cut; at least the thickness of the hinge.
     """
 
     thickness_mm: float
@@ -112,15 +113,16 @@ class Lever:
     Parameters
     ----------
     l1_mm, l2_mm, l3_mm, l4_mm : float
-        The paper's link lengths: hinge 2 lies (-l2, -l1) from hinge 1, the drive point (-l4, -l3) from hinge 2.
+        Link lengths as named by Hricko and Havlik (2015): hinge 2 lies at (-l2, -l1) from hinge 1, and the drive point
+        at (-l4, -l3) from hinge 2.
     hinge1_mm, hinge2_mm : (float, float)
-        Centres of the notches.
+        Positions of the hinges: centres of the notches.
     hinge1_axis_deg, hinge2_axis_deg : float
-        Direction of each hinge's long axis from x.
+        Angle of each hinge's longitudinal axis from the x axis.
     drive_mm : (float, float)
         The drive point O_A on the symmetry axis.
     drive_face_y_mm, drive_face_half_width_mm : float
-        The face that the actuator pushes.
+        Height and half width of the face on which the actuator pushes.
     """
 
     l1_mm: float
@@ -143,15 +145,15 @@ class Links:
     Parameters
     ----------
     pillar_and_root_mm, drive_block_mm : (float, float, float, float)
-        Upright rectangles: x from, x to, y from, y to. The pillar is clamped at its lower face.
+        Axis-parallel rectangles: x from, x to, y from, y to. The pillar is clamped at its lower face.
     shuttle_from_mm, shuttle_to_mm, shuttle_width_mm : (float, float), (float, float), float
         Bar from the drive point through hinge 2.
     cross_bar_mm, finger_mm : (float, float, float, float)
         Bars: x, y of one end, x, y of the other.
     cross_bar_width_mm, finger_width_mm : float
-        Widths of those bars.
+        Widths of the cross bar and the finger bar.
     tip_polygon_mm : tuple of (float, float)
-        The tip; its inner face is the edge at the smallest x.
+        Corners of the tip; the inner face of the tip is the edge at the smallest x.
     """
 
     pillar_and_root_mm: tuple[float, float, float, float]
@@ -175,7 +177,8 @@ class Gripper:
     material, body, hinge, lever, links
         The five sections of `gripper.toml`.
     uncertainties : mapping of str to float
-        Standard uncertainty of a number in its own unit, by its dotted name (`hinge.thickness_mm`), where stated.
+        Stated standard uncertainties of numbers in the drawing, each in the unit of the number, by dotted name
+        (`hinge.thickness_mm`).
     """
 
     material: Material
@@ -187,13 +190,13 @@ class Gripper:
 
     @property
     def tip_corner_mm(self) -> PointMm:
-        """Top of the inner face: the point that touches the symmetry plane first when the fingers close."""
+        """Upper end of the tip's inner face: the point that touches the symmetry plane first when the fingers close."""
         inner_mm = min(x for x, _ in self.links.tip_polygon_mm)
         return inner_mm, max(y for x, y in self.links.tip_polygon_mm if x == inner_mm)
 
     @property
     def tip_heel_mm(self) -> PointMm:
-        """Foot of the inner face."""
+        """Lower end of the tip's inner face."""
         inner_mm = min(x for x, _ in self.links.tip_polygon_mm)
         return inner_mm, min(y for x, y in self.links.tip_polygon_mm if x == inner_mm)
 

@@ -1,4 +1,4 @@
-"""Loops compiled from C, called like Python functions; found where they were built, or built at first use."""
+"""Loops compiled from C and called like Python functions; the compiled library is built at first use if missing."""
 
 import os
 import sys
@@ -23,19 +23,20 @@ NAME = "_loops"
 def loop(name: str) -> Callable[..., Any]:
     """Return one of the compiled loops of the package's .c files.
 
-    The loop releases Python's global lock, so that other threads run meanwhile. The same input gives the same digits on
-    every machine, apart from the C library's own exp, log and erf: no sum is reordered for speed.
+    The loop releases Python's global interpreter lock, so that other threads can run at the same time. The same input
+    gives identical results on every computer, apart from exp, log and erf of the C library, because no sum is reordered
+    for speed.
 
     Parameters
     ----------
     name : str
-        Its name: that of the file, and what it does.
+        Name of the loop, which begins with the name of its .c file.
 
     Returns
     -------
     callable
-        Takes contiguous arrays of the very type that the loop asks for (`domain/loops.h`), and writes into those that
-        are its results.
+        Function that takes contiguous arrays of exactly the types of the loop's arguments (`domain/loops.h`), and
+        writes its results into the arrays provided for them.
 
     Raises
     ------
@@ -78,7 +79,7 @@ def _library() -> ModuleType:
 
 
 def _places() -> Iterator[Path]:
-    """Folders where the compiled library may lie: in the installation, beside the sources, or in the user's cache."""
+    """Folders in which the compiled library may be: in the installation, beside the sources, or in the user's cache."""
     yield loops_build.PACKAGE / "domain"
     yield loops_build.PACKAGE / "domain" / "__pycache__"
     own = os.environ.get("LOCALAPPDATA") if sys.platform == "win32" else os.environ.get("XDG_CACHE_HOME")

@@ -1,8 +1,8 @@
 """Build of the C loops: all .c files of the package are joined into one source and compiled into one library.
 
-The constants of a .c file come from the .py file of the same name, where each is stated once with its reason, and from
-the files that it names in a line `/* after NAME */`. Only the standard library is used here, because an installation
-builds the loops before any dependency is installed.
+The constants of a .c file are taken from the .py file of the same name, where each constant is stated once with its
+reason, and from the files that the .c file names in lines `/* after NAME */`. This module uses only the standard
+library, because an installation builds the loops before any dependency is installed.
 """
 
 import ast
@@ -30,11 +30,11 @@ Constant = Number | tuple["Constant", ...]
 
 
 class CannotBuildError(RuntimeError):
-    """There is no C compiler, or it failed."""
+    """There is no C compiler, or the compilation failed."""
 
 
 def loop_files() -> list[Path]:
-    """The .c files that hold loops, each beside the .py file that calls them."""
+    """List the .c files with loops; each is beside the .py file that calls its loops."""
     return [path for path in sorted(PACKAGE.rglob("*.c")) if path != PACKAGE / DOOR]
 
 
@@ -56,7 +56,7 @@ def build(target: Path) -> None:
     Parameters
     ----------
     target : Path
-        The library; its folder must exist.
+        Path of the library to create; the folder must exist.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def build(target: Path) -> None:
 
 
 def compiler() -> list[str] | None:
-    """Command of a C compiler; None where there is none."""
+    """Command of a C compiler; None if no compiler is installed."""
     chosen = os.environ.get("CC")
     if chosen:
         return shlex.split(chosen)
@@ -106,7 +106,7 @@ def _links() -> list[str]:
 
 
 def one_source() -> str:
-    """Join all loops into one C source, each with the constants of its own .py file."""
+    """Join all .c files into one C source, each with the constants of its .py file."""
     pieces, loops, done = [(PACKAGE / HEADER).read_text(encoding="utf-8")], [], set[Path]()
     prepared: list[str] = []
     waiting = loop_files()

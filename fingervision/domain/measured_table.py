@@ -1,4 +1,4 @@
-"""What was measured on the bench: gap and finger positions against the recorded input."""
+"""Measured table: gap and finger positions with the recorded input."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,16 +13,16 @@ from fingervision.domain.reference_slot import ReferenceSlot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """A user-named column: position (mm) or rotation (mrad) of a body or point of the mechanism.
+    """A user-named column of a table: position (mm) or rotation (mrad) of a body or point of the mechanism.
 
     Parameters
     ----------
     value : ndarray of float, shape (n,)
-        Readings; 0 where there is none.
+        Measured values; 0 in rows without a value.
     present : ndarray of bool, shape (n,)
-        Whether there is one.
+        Whether the row has a value.
     u : ndarray of float, shape (n,), or None
-        Standard uncertainties from row to row, where they are stated.
+        Random standard uncertainties of the values; None if not stated.
     """
 
     value: NDArray[np.float64]
@@ -32,7 +32,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedPath:
-    """Every row with an input, whether its gap was measured or not; run after run, each sorted by time.
+    """All rows with an input, with or without a measured gap; run after run, each run sorted by time.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class RecordedPath:
     runs : tuple of slice
         Rows of each run.
     rows : ndarray of int, shape (n,)
-        Those that have a gap too.
+        Indices of the rows that also have a gap.
     """
 
     input_mm: NDArray[np.float64]
@@ -52,35 +52,35 @@ class RecordedPath:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredTable:
-    """Rows of a measured table that have a gap, run after run, each sorted by time.
+    """Rows of a measured table that have a gap, run after run, each run sorted by time.
 
     Parameters
     ----------
     input_mm, gap_mm : ndarray of float, shape (n,)
         Recorded input and measured gap (`right_mm - left_mm` where both exist).
     midline_mm : ndarray of float, shape (n,), or None
-        The middle between the fingers; None where only the gap was measured.
+        Mean position of the two fingers; None if only the gap was measured.
     time_s : ndarray of float, shape (n,), or None
         Times.
     runs : tuple of slice
         Samples of each run.
     run_names : tuple of str
-        As in the table.
+        Names of the runs, as in the table.
     u_random_mm : ndarray of float, shape (n,), or None
-        The measurement's own random uncertainty of the gap.
+        Random standard uncertainty of the gap, as stated by the measurement.
     force_n : ndarray of float, shape (n,), or None
         Force at the drive.
     notes : tuple of str
-        What the reader mended or left out, a sentence each.
+        Corrections and omissions that the reader of the table made, one sentence each.
     slots : tuple of ReferenceSlot
-        Widths that are known, measured through the same camera.
+        Reference slots of known width that were measured with the same camera.
     path : RecordedPath or None
-        The rows with those that have an input and no gap; None where there are none of these, or no times.
+        All rows with an input, including those without a gap; None if every row has a gap, or without times.
     u_clock_s : float
-        Standard uncertainty of the offset between the input's clock and the gap's, where that was found from this
-        table's own motion; 0 where they share a clock, or nothing is stated.
+        Standard uncertainty (s) of the offset between the clocks of the input and the gap, if this offset was estimated
+        from the motion in this table; 0 if both have the same clock, or if no uncertainty is stated.
     channels : mapping of str to Channel
-        Columns of one's own, such as `right_finger.angle_mrad`.
+        User-named columns, such as `right_finger.angle_mrad`.
     """
 
     input_mm: NDArray[np.float64]

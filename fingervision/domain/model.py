@@ -15,32 +15,32 @@ from fingervision.domain.response import Response
 
 @runtime_checkable
 class Model(Protocol):
-    """Anything that predicts the static gap for each input."""
+    """A model that predicts the static gap for each input."""
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Answer statically at each input; positive inputs open the gripper.
+        """Compute the static response at each input; positive inputs open the gripper.
 
         Parameters
         ----------
         input_mm : ndarray of float, shape (n,)
-            Displacement of the drive point.
+            Displacements of the drive point.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class PhysicalLaw:
-    """How an effect of the catalogue acts in a model of a drawn gripper, instead of its general formula for tables.
+    """Action of an effect in a model built from a gripper's drawing, used instead of the formula for simulation tables.
 
     Parameters
     ----------
     act : callable
         `act(response, history, values)` gives the points and the force after the effect, as `PointEffect.act` does.
     adds : tuple of Parameter
-        What the drawing knows beside the catalogue's parameters (which half was changed); shapes, that change nothing
-        while the effect is at zero.
+        Additional parameters that exist only with a drawing (such as which half was changed); they have no influence
+        while the size of the effect is zero.
     foretold : mapping of str to (float, float)
-        Ranges in which the parameters lie where the gripper is as drawn; empty where the drawing foretells nothing.
+        Ranges of the parameters for a gripper that agrees with its drawing; empty if the drawing predicts nothing.
     """
 
     act: PointAct
@@ -50,11 +50,11 @@ class PhysicalLaw:
 
 @runtime_checkable
 class PhysicalModel(Model, Protocol):
-    """A parametric gripper in which a mechanism effect changes the physics, instead of the formula for tables."""
+    """A parametric gripper model in which mechanism effects act on the physics, not by the formula for tables."""
 
     @property
     def laws(self) -> Mapping[str, PhysicalLaw]:
-        """Laws by the effect's name in the catalogue."""
+        """Physical laws of effects, by the name of the effect in the catalogue."""
         ...
 
     @property
@@ -65,10 +65,11 @@ class PhysicalModel(Model, Protocol):
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalModel":
         """Return the gripper with some of its dimensions changed by the given amounts, each in its own unit.
 
-        It may take the ratio of a simpler model's answers, which is precise enough for derivatives.
+        The implementation may scale its response by the ratio of a simpler model's responses, which is accurate enough
+        for derivatives.
         """
         ...
 
     def drawn_anew(self, changes: Mapping[str, float]) -> "PhysicalModel":
-        """Return the same with its own answer computed anew, however long that takes."""
+        """Return the changed gripper as `redrawn` does, but with the response fully recomputed, which may take long."""
         ...

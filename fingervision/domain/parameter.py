@@ -1,4 +1,4 @@
-"""A number of a physical law: its unit, the values it may take, and how a search should step through them."""
+"""A parameter of a physical law: its unit, its bounds, and the starting values of a search."""
 
 from dataclasses import dataclass
 
@@ -15,29 +15,29 @@ class Parameter:
     name : str
         Name with its unit, as in every file (`play_mm`).
     unit : str
-        As printed; empty for a ratio.
+        Unit as printed; empty for a ratio.
     lower, upper : float
         Physical bounds: the range that is searched.
     words : str
-        Display name: what sentences, pages and figures call it. Files keep `name`.
+        Display name, used in sentences, browser pages and plots; data files use `name`.
     neutral : float or None
-        The value at which the effect changes nothing; None for a shape (a period, a time constant) that by itself
-        changes nothing while the effect's amplitude is at its neutral value.
+        The value at which the effect vanishes; None for a shape parameter (a period, a time constant), which has no
+        influence while the effect's amplitude has its neutral value.
     starts : int
-        How many starting values a search tries between the bounds; 1 for a parameter on which the prediction depends
-        nearly linearly.
+        Number of starting values between the bounds that a search tries; 1 for a parameter on which the prediction
+        depends nearly linearly.
     logarithmic : bool
-        Whether the starting values are spaced by a ratio.
+        Whether the starting values are spaced logarithmically.
     reciprocal : bool
         Whether the reciprocals of the starting values are evenly spaced (for periods).
     rugged : bool
         Whether the prediction jumps as this parameter changes, so that the search must scan its range.
     typical : float or None
-        Physical prior: a size that a well-run set-up rarely exceeds. It only decides which of several
-        explanations that the data cannot tell apart is named first.
+        Physical prior: a value that a carefully operated set-up rarely exceeds. The prior only determines which of
+        several indistinguishable explanations is named first.
     run : int or None
-        The run whose start state this is: a nuisance that is fitted beside the effect and is no part of an answer.
-        None for a parameter of the effect itself.
+        Index of the run whose start state this is, a nuisance parameter that is fitted together with the effect and is
+        not reported. None for a parameter of the effect itself.
     """
 
     name: str
@@ -59,7 +59,8 @@ class Parameter:
         Returns
         -------
         ndarray of float, shape (starts,)
-            One hundredth of the way from the neutral value where `starts` is 1, otherwise spread over the range.
+            If `starts` is 1, one value at a hundredth of the range from the neutral value; otherwise values spread over
+            the range.
         """
         if self.starts == 1:
             neutral = self.neutral if self.neutral is not None else 0.5 * (self.lower + self.upper)
@@ -85,9 +86,9 @@ class Estimate:
     value : float
         Best value.
     u : float or None
-        Standard uncertainty; None where the data give none (the value lies at a bound, or was set by hand).
+        Standard uncertainty; None if the data do not determine it (the value lies at a bound, or was set by the user).
     unit : str
-        As printed.
+        Unit as printed.
     """
 
     value: float

@@ -1,4 +1,4 @@
-"""How coarsely a codec has rounded each place of a picture."""
+"""Quantiser steps of a video codec over the picture."""
 
 from dataclasses import dataclass
 
@@ -11,16 +11,16 @@ BLOCK_PX = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quantiser:
-    """Quantiser steps of a codec: to which multiples it rounds the coefficients of its cosine transform.
+    """Quantiser steps of a codec, to multiples of which the coefficients of its cosine transform are rounded.
 
-    A coder sends no change that is less than a fraction of a step, so that an edge may be displaced by that much
-    unnoticed. The steps of other codecs, whose dead zone is another fraction, are given as the H.264 steps with the
-    same dead zone.
+    An encoder does not transmit changes that are smaller than a fraction of a step (the dead zone), so that an edge may
+    be displaced by a corresponding amount. The steps of other codecs, whose dead zone is another fraction, are stated
+    as the H.264 steps with the same dead zone.
 
     Parameters
     ----------
     step : ndarray of float32, shape (rows, columns)
-        Step of every block of 16 x 16 pixels, in grey levels of 8 bits, for a transform of unit gain.
+        Step of every block of 16 x 16 pixels, in 8-bit grey levels, for a transform of unit gain.
     first_px : (int, int)
         Column and row of the picture at which the first block begins.
     """
@@ -29,20 +29,20 @@ class Quantiser:
     first_px: tuple[int, int] = (0, 0)
 
     def near(self, x_px: float, y_px: float, across_px: float, along_px: float) -> float:
-        """Coarsest step within a rectangle about a place, `across_px` wide to either side and `along_px` high."""
+        """Largest step in a rectangle centred at a point, with half sides `across_px` and `along_px`."""
         rows, columns = self.step.shape
         left, right = (self._block(x_px + way - self.first_px[0], columns) for way in (-across_px, across_px))
         top, bottom = (self._block(y_px + way - self.first_px[1], rows) for way in (-along_px, along_px))
         return float(self.step[top : bottom + 1, left : right + 1].max())
 
     def seen_from(self, x_px: int, y_px: int) -> "Quantiser":
-        """Return the quantiser of the part of the picture that begins at this column and row."""
+        """Return the quantiser steps of the part of the picture that begins at this column and row."""
         return Quantiser(self.step, (self.first_px[0] - x_px, self.first_px[1] - y_px))
 
     def turned(self, quarters: int, width_px: int, height_px: int) -> "Quantiser":
-        """Return the quantiser of the picture turned anticlockwise by `quarters` right angles.
+        """Return the quantiser steps of the picture rotated anticlockwise by `quarters` right angles.
 
-        Width and height are those before the turn.
+        Width and height are those before the rotation.
         """
         found = self
         for _ in range(quarters % 4):

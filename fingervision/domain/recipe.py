@@ -1,4 +1,4 @@
-"""A recipe: the motions and measurements that the test bed shall execute."""
+"""A recipe: the motions and measurements that the test bed is to execute."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -13,13 +13,13 @@ class Recipe(Generic[Step]):
     Parameters
     ----------
     name : str
-        What it is called.
+        Name of the recipe.
     below_force_n : float
-        The force that it must not go beyond; the bed's own limit holds as well.
+        Force limit of the recipe; the limit of the test bed applies as well.
     steps : tuple
-        In order, each as its kind reads it.
+        Steps in order, each in the form that its kind of step defines.
     text : str
-        The whole file, kept with the run.
+        Text of the complete recipe file, stored with the run.
     """
 
     name: str

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ReferenceSlot:
-    """One reference slot and the width that was measured of it.
+    """One reference slot with its true and its measured width.
 
     Parameters
     ----------
     size_mm, u_size_mm : float
-        Its width, and the standard uncertainty of that.
+        True width of the slot, and its standard uncertainty.
     measured_mm, u_random_mm : float
-        Width in the pictures, and its random standard uncertainty.
+        Width measured in the pictures, and its random standard uncertainty.
     """
 
     size_mm: float

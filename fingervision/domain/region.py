@@ -1,4 +1,4 @@
-"""A rectangle of the frame."""
+"""Rectangular region of a video frame."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ class Region:
     x_px, y_px : int
         First column and row.
     width_px, height_px : int
-        Size.
+        Number of columns and rows.
     """
 
     x_px: int

@@ -9,7 +9,7 @@ from fingervision.domain.parameter import Estimate
 
 
 class Verdict(StrEnum):
-    """The four answers."""
+    """The four possible results of a diagnosis."""
 
     AGREES = "agrees"
     NAMED = "named"
@@ -24,17 +24,17 @@ class NamedEffect:
     Parameters
     ----------
     name, stage : str
-        As in the catalogue.
+        Name and stage of the effect in the catalogue.
     parameters : mapping of str to Estimate
-        By their keys, which every file uses.
+        Estimated parameters by key; data files use the same keys.
     points : tuple of (float, float)
-        The curve of a map, input and error in mm.
+        Points (input and error, in mm) of the curve of an effect that is a curve.
     place : str
-        The hinge or link that it is the effect of, as the drawing calls it; empty where the effect has no place.
+        Name in the drawing of the hinge or link that has the effect; empty for an effect without a place.
     end : str
-        The end of a link that sits off; likewise.
+        The end of a link that is displaced; empty for any other effect.
     shown : mapping of str to str
-        Display names by key, as the effect's own file declares them; for sentences, pages and figures.
+        Display names by key, as declared in the module of the effect; used in sentences, browser pages and plots.
     """
 
     name: str
@@ -46,13 +46,13 @@ class NamedEffect:
     shown: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def display_name(self, key: str) -> str:
-        """Return the name of a parameter that people read; its key where no such name is declared."""
+        """Return the display name of a parameter; if none is declared, its key."""
         return self.shown.get(key, key)
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A region where the residual cannot be noise: channel, variable, limits, size, significance, and a sentence."""
+    """A region in which the residual is significant: channel, variable, limits, size, significance, and a sentence."""
 
     channel: str
     variable: str
@@ -66,9 +66,9 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """RMS of measured minus predicted gap in mm, without the constant of the midline.
+    """RMS of measured minus predicted gap in mm, without the constant offset of the midline.
 
-    `unseen` is the same with each run predicted from the other runs.
+    The values `unseen` are from cross-validation: each run is predicted from a fit to the other runs.
     """
 
     before_rms_mm: float
@@ -81,7 +81,7 @@ class Disagreement:
 
 @dataclass(frozen=True, slots=True)
 class NextRun:
-    """The run that would best separate the open explanations: its steps, and its expected chi-square gain."""
+    """The run that would best distinguish the remaining explanations: its steps, and its expected chi-square gain."""
 
     name: str
     steps: tuple[Mapping[str, object], ...]
@@ -95,8 +95,9 @@ class NextRun:
 class DiagnosisReport:
     """The result of a diagnosis, with the fields of report.json.
 
-    `explained_share` is 1 - (after / before)^2, `standing_share` after / before, both of the disagreement without the
-    runs' scatter and outliers; `pure_error_mm` is the scatter of repeats of the gap, None where nothing repeats.
+    `explained_share` is 1 - (after / before)^2 and `standing_share` is after / before, where `before` and `after` are
+    the RMS disagreement without outliers and the scatter between runs; `pure_error_mm` is the standard deviation of
+    replicates of the gap, None without replicates.
     """
 
     verdict: Verdict

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """Positions of both fingers' measuring points over a history, and the force at the drive where it is known.
+    """Positions of the measuring points of both fingers over an input history, and the drive force if known.
 
     Parameters
     ----------
     left_mm, right_mm : ndarray of float, shape (n,)
-        Across the fingers, origin at the image centre; `left` is the smaller.
+        Positions across the fingers, with the origin at the image centre; `left` is the smaller coordinate.
     force_n : ndarray of float, shape (n,), or None
-        Force at the drive.
+        Force at the drive; None if unknown.
     """
 
     left_mm: NDArray[np.float64]
@@ -33,21 +33,21 @@ class Response:
         return 0.5 * (self.left_mm + self.right_mm)
 
     def with_gap(self, gap_mm: NDArray[np.float64]) -> "Response":
-        """Return the response with another gap and the same midline: both fingers move equally and oppositely."""
+        """Return the response with another gap and the same midline: the fingers move by equal and opposite amounts."""
         half_mm = 0.5 * (gap_mm - self.gap_mm)
         return Response(self.left_mm - half_mm, self.right_mm + half_mm, self.force_n)
 
     def plus(self, more: "Response") -> "Response":
-        """Add the displacements of `more` to the measuring points, and its force where both have one."""
+        """Add the displacements of `more` to the measuring points, and its force if both responses have forces."""
         both = self.force_n is not None and more.force_n is not None
         force_n = self.force_n + more.force_n if both else self.force_n  # type: ignore[operator]
         return Response(self.left_mm + more.left_mm, self.right_mm + more.right_mm, force_n)
 
     def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
-        """Move both points by `by_mm`, to the right where it is positive."""
+        """Return the response with both points moved by `by_mm`; positive values move them to the right."""
         return Response(self.left_mm + by_mm, self.right_mm + by_mm, self.force_n)
 
     def at(self, rows: NDArray[np.intp]) -> "Response":
-        """Select samples; `rows` of shape (k,)."""
+        """Return the response at selected samples; `rows` has shape (k,)."""
         force_n = None if self.force_n is None else self.force_n[rows]
         return Response(self.left_mm[rows], self.right_mm[rows], force_n)

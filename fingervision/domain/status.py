@@ -1,10 +1,10 @@
-"""The status of a frame: it has a gap, or a reason why it has none."""
+"""Status of a video frame: the frame has a gap, or the status states the reason why not."""
 
 from enum import StrEnum
 
 
 class Status(StrEnum):
-    """Status of a frame, in the order in which the reasons are tested; the first that applies is given."""
+    """Status of a video frame; the reasons are tested in this order, and the first that applies is stated."""
 
     OK = "ok"
     DAMAGED = "damaged"

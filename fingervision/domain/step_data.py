@@ -1,6 +1,6 @@
 """Step data: the blocks stored in a motor controller, each of which is one motion.
 
-Both ways of stating a block, cycle time and speed, are those of section 3 of Hricko & Havlik (2015).
+The two ways of defining a block, by cycle time or by speed, follow section 3 of Hricko and Havlik (2015).
 """
 
 from collections.abc import Mapping
@@ -11,14 +11,14 @@ MOST_STEPS = 15
 
 
 class Coordinates(StrEnum):
-    """Whether a block's target position is absolute, or relative to where the motion starts."""
+    """Whether the target position of a block is absolute, or relative to the start of the motion."""
 
     ABSOLUTE = "absolute"
     RELATIVE = "relative"
 
 
 class Operation(StrEnum):
-    """What a block does at its target: hold the position, or push with a limited force."""
+    """Action of a block at its target: hold the position, or push with a limited force."""
 
     MOVING = "moving"
     PUSHING = "pushing"
@@ -26,12 +26,12 @@ class Operation(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CycleTime:
-    """Motion stated by its duration; speed and acceleration follow from it.
+    """Motion defined by its duration, from which speed and acceleration follow.
 
     Parameters
     ----------
     positioning_time_s : float
-        From the start to the stand at the target.
+        Time from the start of the motion to rest at the target.
     """
 
     positioning_time_s: float
@@ -39,14 +39,14 @@ class CycleTime:
 
 @dataclass(frozen=True, slots=True)
 class SpeedEntry:
-    """Motion stated by its speed and acceleration; its duration follows from them.
+    """Motion defined by its speed and accelerations, from which the duration follows.
 
     Parameters
     ----------
     speed_mm_s : float
-        Speed between speeding up and slowing down; a short motion does not reach it.
+        Constant speed between acceleration and deceleration; a short motion does not reach this speed.
     acceleration_mm_s2, deceleration_mm_s2 : float
-        Both positive.
+        Magnitudes of acceleration and deceleration, both positive.
     """
 
     speed_mm_s: float
@@ -56,22 +56,22 @@ class SpeedEntry:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One block.
+    """One block of step data: one motion of the controller.
 
     Parameters
     ----------
     target_mm : float
-        Where to, or with relative coordinates how far.
+        Target position, or displacement if coordinates are relative.
     load_kg : float
-        Mass that is moved along.
+        Moved mass.
     entry : CycleTime or SpeedEntry
-        How the motion is timed.
+        Timing of the motion: by its duration, or by its speed and accelerations.
     coordinates : Coordinates
-        What the target counts from.
+        Whether the target is absolute or relative.
     operation : Operation
-        Moving or pushing.
+        Operation at the target: moving or pushing.
     pushing_force_n : float or None
-        Force to push with; there is one where, and only where, the operation is pushing.
+        Pushing force; given if, and only if, the operation is pushing.
     """
 
     target_mm: float
@@ -88,18 +88,18 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class StepData:
-    """All blocks of a controller, and the order in which they run.
+    """All blocks of a controller, and the order in which they are executed.
 
     Parameters
     ----------
     name : str
-        What the blocks are for.
+        Name that states the purpose of the blocks.
     steps : mapping of int to Step
-        Blocks by their numbers, 1 to 15.
+        Blocks by number, 1 to 15.
     sequence : tuple of int
-        Numbers in the order of running; a number may come again.
+        Numbers of the blocks in the order of execution; a number may occur more than once.
     start_mm : float
-        Position before the first.
+        Position before the first block.
     """
 
     name: str

@@ -1,7 +1,7 @@
-"""Physical effects, one per file, named as in the catalogue: every module that holds an `EFFECT` is an entry.
+"""Physical effects, one per module, named as in the catalogue: every module that defines `EFFECT` is an entry.
 
-Effects from other distributions (entry points of the group `fingervision.effects`), from files, and from this session
-are entries of the catalogue too.
+The catalogue also contains effects from other distributions (entry points of the group `fingervision.effects`), from
+files, and from the present session.
 """
 
 import importlib
@@ -42,19 +42,20 @@ def catalogue() -> dict[str, Effect]:
 
 
 def origin_of(name: str) -> Origin:
-    """State where an effect of the catalogue comes from."""
+    """Return the origin of an effect: this package, another distribution, a file, or the present session."""
     return _catalogue()[1][name]
 
 
 def that_show(check: FurtherCheck) -> tuple[str, ...]:
-    """Names of the effects that are visible in a check, in the catalogue's order."""
+    """Names of the effects that are visible in a check, in the order of the catalogue."""
     return tuple(name for name, effect in catalogue().items() if effect.checks.get(check) is True)
 
 
 def register(effect: Effect) -> Effect:
-    """Add an effect to the catalogue of this process, and give it back.
+    """Add an effect to the catalogue of this process, and return the effect.
 
-    A registered effect is replaced when another of the same name is registered, because a notebook cell may run twice.
+    A registered effect is replaced if another effect of the same name is registered, because a notebook cell may run
+    twice.
 
     Raises
     ------
@@ -69,12 +70,12 @@ def register(effect: Effect) -> Effect:
 
 
 def withdraw(name: str) -> None:
-    """Remove a registered effect; nothing happens where there is none."""
+    """Remove a registered effect; nothing happens if no effect of that name is registered."""
     REGISTRY.remove(name)
 
 
 def added_effects(paths: tuple[Path, ...]) -> AbstractContextManager[None]:
-    """Add the effects of some files while a `with` block lasts."""
+    """Add the effects defined in files for the duration of a `with` block."""
     return REGISTRY.with_files(paths)
 
 
@@ -91,7 +92,7 @@ def _catalogue() -> tuple[dict[str, Effect], dict[str, Origin]]:
 
 
 def _place(effect: Effect, *, built_in: bool) -> tuple[int, float, bool, str]:
-    """Sort key in the chain: stage, then `order`; at equal order built-in effects come first, then the name decides."""
+    """Sort key in the measuring chain: stage, then `order`, then built-in effects before others, then the name."""
     return list(Stage).index(effect.stage), effect.order, not built_in, effect.name
 
 

@@ -1,4 +1,4 @@
-"""One finger opens more than the other."""
+"""Assembly asymmetry: one finger opens more than the other."""
 
 from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values

@@ -1,4 +1,4 @@
-"""Backlash: after a reversal of the motion the output moves only when the play is taken up."""
+"""Backlash: after a reversal of the motion, the output moves only after the play is taken up."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from fingervision.effects.play_operator import play
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: after a reversal the output moves only when the play is taken up."""
+    """Apply the effect: after a reversal, the output moves only after the play is taken up."""
     out = np.empty_like(input_mm)
     for index, run in enumerate(history.runs):
         out[run] = play(input_mm[run], values["play_mm"], values.get(start_key(index), 0.0))

@@ -15,7 +15,7 @@ def act(response: Response, history: History, values: Values) -> Response:
 
 
 def act_curved(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect to points that moved along curves, not straight lines, between the frames."""
+    """Apply the effect to points whose positions over time are curved, not linear, between the frames."""
     return _stamped(response, history, values, curved=True)
 
 
@@ -29,7 +29,7 @@ def _stamped(response: Response, history: History, values: Values, *, curved: bo
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     return delay_that_shows(history, EFFECT.parameters[0])
 
 

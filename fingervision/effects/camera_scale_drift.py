@@ -1,4 +1,4 @@
-"""Drift of the camera's scale: focus or zoom creeps."""
+"""Camera scale drift: the scale changes slowly because focus or zoom creeps."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: focus or zoom creeps, so that the scale drifts."""
+    """Apply the effect: the scale changes slowly because focus or zoom creeps."""
     return replace(
         response,
         left_mm=response.left_mm * (1.0 + values["rate_per_s"] * history.clock_s),

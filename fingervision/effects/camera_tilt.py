@@ -1,4 +1,4 @@
-"""Camera tilt: the fingers' plane is not parallel to the sensor, which gives keystone distortion."""
+"""Camera tilt: the plane of the fingers is not parallel to the sensor, which causes keystone distortion."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the plane is tilted, which gives keystone distortion."""
+    """Apply the effect: the plane of the fingers is tilted, which causes keystone distortion."""
     return replace(
         response,
         left_mm=response.left_mm / (1.0 + values["k_per_mm"] * response.left_mm),

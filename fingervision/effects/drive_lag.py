@@ -12,12 +12,12 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def act_curved(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect to a stage that moved along curves, not straight lines, between the recorded inputs."""
+    """Apply the effect to a stage whose position over time is curved, not linear, between the recorded inputs."""
     return late(input_mm, history, values["delay_s"], curved=True)
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     return delay_that_shows(history, EFFECT.parameters[0])
 
 

@@ -1,4 +1,4 @@
-"""Edge bias: the threshold or blooming of the sensor moves both edges."""
+"""Edge bias: the threshold or sensor blooming displaces both edges."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
@@ -7,7 +7,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: threshold or blooming moves both edges."""
+    """Apply the effect: threshold or sensor blooming displaces both edges."""
     return response.with_gap(response.gap_mm + values["offset_mm"])
 
 

@@ -9,7 +9,7 @@ from fingervision.domain.errors import UnknownNameError
 
 
 class EffectList(ModuleType):
-    """Type of the package of the effects, which also acts as a list of them in the order in which they act.
+    """Type of the package of effects, which is also a list of the effects in the order of the measuring chain.
 
     Examples
     --------

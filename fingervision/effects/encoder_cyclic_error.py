@@ -9,7 +9,7 @@ from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: a position error that repeats with the period of the encoder's scale."""
+    """Apply the effect: add a position error that repeats with the period of the encoder's scale."""
     if values["amplitude_mm"] == 0.0:
         return input_mm
     phase = 2.0 * np.pi * input_mm / values["period_mm"] + values["phase_rad"]
@@ -17,7 +17,7 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     steps = np.abs(np.diff(np.sort(history.input_mm)) if history.time_s is None else np.diff(history.input_mm))
     moving = steps[steps > max(4.0 * history.input_sigma_mm, 1e-3 * history.input_span_mm / len(steps))]
     shortest_mm = 4.0 * float(np.median(moving)) if moving.size else np.inf

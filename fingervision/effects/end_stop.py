@@ -15,7 +15,7 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     lowest, highest = float(history.input_mm.min()), float(history.input_mm.max())
     upper, lower = EFFECT.parameters
     return (

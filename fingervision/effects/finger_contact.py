@@ -1,4 +1,4 @@
-"""The fingers meet."""
+"""Finger contact: the fingers touch each other, so that the gap does not close further."""
 
 from dataclasses import replace
 
@@ -11,13 +11,13 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the fingers meet."""
+    """Apply the effect: the fingers touch each other, so that the gap does not close further."""
     missing_mm = np.maximum(values["floor_mm"] - response.gap_mm, 0.0)
     return response.with_gap(response.gap_mm + (1.0 - values["remaining_slope"]) * missing_mm)
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     lowest_mm = max(0.0, history.rest_gap_mm - history.closing_mm)
     if history.closing_mm <= 0.0:
         return "the gripper is never closed below its rest gap"

@@ -20,7 +20,7 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     fraction, reach = EFFECT.parameters
     return fraction, replace(reach, lower=0.02 * history.input_span_mm, upper=0.6 * history.input_span_mm)
 

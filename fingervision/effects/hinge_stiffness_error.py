@@ -1,4 +1,4 @@
-"""Hinge stiffness error (modulus, hinge thickness): the force differs, the gap hardly."""
+"""Hinge stiffness error (Young's modulus, hinge thickness): the force differs, while the gap hardly differs."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the force differs (modulus, hinge thickness), the gap hardly."""
+    """Apply the effect: the force differs (Young's modulus, hinge thickness), while the gap hardly differs."""
     return (
         response if response.force_n is None else replace(response, force_n=(1.0 + values["ratio"]) * response.force_n)
     )

@@ -7,7 +7,7 @@ from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the zero of the input is wrong, until the stage is referenced again."""
+    """Apply the effect: the zero of the recorded input is wrong until the stage is re-zeroed."""
     out = input_mm + values["offset_mm"]
     for run, rezeroed in zip(history.runs, history.rezeroed, strict=False):
         if rezeroed:

@@ -21,7 +21,7 @@ def act(response: Response, history: History, values: Values) -> Response:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     reach, cross = EFFECT.parameters
     return replace(reach, lower=0.5 * history.opening_mm, upper=1000.0 * history.opening_mm, neutral=None), cross
 

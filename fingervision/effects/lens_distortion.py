@@ -1,4 +1,4 @@
-"""Lens distortion: radial, about the image centre."""
+"""Lens distortion: radial distortion of the picture about the image centre."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: radial distortion about the image centre."""
+    """Apply the effect: radial distortion of the picture about the image centre."""
     return replace(
         response,
         left_mm=response.left_mm * (1.0 + values["k_per_mm2"] * response.left_mm**2),

@@ -1,4 +1,4 @@
-"""Link length error: a link is longer or shorter than drawn, so that a hinge or measuring point sits elsewhere."""
+"""Link length error: a link is longer or shorter than in the drawing, which displaces a hinge or measuring point."""
 
 from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
@@ -7,7 +7,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Reduce the opening by the ratio by which the lever's short arm is longer; in a table no single link is known."""
+    """Reduce the opening by the ratio by which the lever's short arm is longer; tables do not describe single links."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     return response.with_gap(history.rest_gap_mm + opening_mm / (1.0 + values["ratio"]))
 

@@ -1,4 +1,4 @@
-"""Out-of-plane motion: the tips come nearer to the camera, or go farther from it, as they open."""
+"""Out-of-plane motion: the tips move towards the camera or away from it as they open."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the tips come nearer to the camera, or go farther from it, as they open."""
+    """Apply the effect: the tips move towards the camera or away from it as they open."""
     return replace(
         response,
         left_mm=response.left_mm / (1.0 - values["relative_per_mm"] * (response.gap_mm - history.rest_gap_mm)),

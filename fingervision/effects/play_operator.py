@@ -9,7 +9,7 @@ _play, _sliders = loop("play_operator_play"), loop("play_operator_sliders")
 def play(input_mm: Array, width_mm: float, start: float) -> Array:
     """Output of a play of full width `width_mm` for one run's input; shape (n,).
 
-    Initially the output lies `start` half widths above the first input; -1 and 1 are the two ends of the play.
+    The initial output lies `start` half widths above the first input; -1 and 1 are the two ends of the play.
     """
     return filled(_play, input_mm, width_mm, start)
 
@@ -17,7 +17,7 @@ def play(input_mm: Array, width_mm: float, start: float) -> Array:
 def drawn_sliders(input_mm: Array, reach_mm: float, count: int, start: float) -> Array:
     """Sum of the extensions of elastic sliders with reaches of k / count of `reach_mm`, along one run's input; (n,).
 
-    The extension of slider k is the difference between the input and the output of a play of twice its reach. The
-    initial extension is the fraction `start` of the reach for all sliders.
+    The extension of slider k is the difference between the input and the output of a play operator whose full width is
+    twice the slider's reach. The initial extension of every slider is the fraction `start` of its reach.
     """
     return filled(_sliders, input_mm, reach_mm, count, start)

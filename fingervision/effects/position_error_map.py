@@ -1,4 +1,4 @@
-"""Position error map: the stage has the same error at the same position in both directions."""
+"""Position error map: the stage has a position error that depends on the position but not on the direction."""
 
 from collections.abc import Sequence
 
@@ -22,14 +22,15 @@ def covariance(inputs_mm: Array, length_mm: float) -> Array:
 
 
 def without_line(inputs_mm: Array, read: Array | None = None) -> Array:
-    """Projector that removes mean and straight line from values at the given inputs; shape (k, k).
+    """Projector that removes the mean and the linear trend from values at the given inputs; shape (k, k).
 
     Parameters
     ----------
     inputs_mm : ndarray of float, shape (k,)
-        Where the values stand.
+        Inputs at which the values are given.
     read : ndarray of float, shape (n, k), or None
-        What each of n places takes of each value: mean and line are those over the places. None for the inputs.
+        Weights by which values at n further positions are interpolated from the k values; mean and trend are then taken
+        over these positions. None to take them over the inputs.
     """
     line = np.stack([np.ones_like(inputs_mm), inputs_mm - inputs_mm.mean()], axis=1)
     weight = np.eye(inputs_mm.size) if read is None else read.T @ read
@@ -37,7 +38,7 @@ def without_line(inputs_mm: Array, read: Array | None = None) -> Array:
 
 
 def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict[str, float]:
-    """Parameter values of the effect that encode its curve, point by point."""
+    """Encode the points of the effect's curve as parameter values."""
     out: dict[str, float] = {}
     for k, (at, error) in enumerate(zip(inputs_mm, errors_mm, strict=True), start=1):
         out |= {f"point_{k}_input_mm": float(at), f"point_{k}_error_mm": float(error)}
@@ -45,9 +46,9 @@ def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict
 
 
 def curve_points(values: Values) -> tuple[Array, Array]:
-    """Inputs and errors of the curve that the parameter values encode, each of shape (k,).
+    """Decode inputs and errors of the effect's curve from parameter values, each of shape (k,).
 
-    Empty where they encode none.
+    The arrays are empty if the values encode no curve.
     """
     count = sum(key.endswith("_error_mm") for key in values)
     inputs, errors = ([values[f"point_{k}_{what}_mm"] for k in range(1, count + 1)] for what in ("input", "error"))
@@ -55,9 +56,9 @@ def curve_points(values: Values) -> tuple[Array, Array]:
 
 
 def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float) -> tuple[Array, Array]:
-    """Return the curve that stands for a map of which only RMS and correlation length are known.
+    """Return a representative curve for a map of which only RMS and correlation length are known.
 
-    Always the same curve.
+    The same arguments always give the same curve.
     """
     at = np.linspace(low_mm, high_mm, TYPICAL_NODES)
     root = np.linalg.cholesky(covariance(at, length_mm) + 1e-9 * np.eye(at.size))
@@ -66,7 +67,7 @@ def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: add the stage's error at each position; constant beyond the curve's last point."""
+    """Apply the effect: add the stage's error at each position; beyond its ends, the curve is constant."""
     at, errors = curve_points(values)
     if not at.size:
         if values["rms_mm"] == 0.0:
@@ -77,7 +78,7 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     places = np.unique(np.round(history.input_mm / max(1e-6 * history.input_span_mm, 1e-300)))
     if places.size < FEWEST_PLACES:
         return f"a map must be seen at {FEWEST_PLACES} different inputs at least, but the table has {places.size}"

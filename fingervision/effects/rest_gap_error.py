@@ -1,4 +1,4 @@
-"""Rest gap error: the fingers rest at another gap than stated."""
+"""Rest gap error: the gap of the fingers at rest differs from that of the model."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
@@ -7,7 +7,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the fingers rest at another gap than stated."""
+    """Apply the effect: the gap of the fingers at rest differs from that of the model."""
     return response.with_gap(response.gap_mm + values["offset_mm"])
 
 

@@ -1,4 +1,4 @@
-"""Px/mm is off."""
+"""Scale error: the scale of the picture (px/mm) is wrong by a constant factor."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the scale (px/mm) is wrong by a factor."""
+    """Apply the effect: the scale of the picture (px/mm) is wrong by a constant factor."""
     return replace(
         response,
         left_mm=response.left_mm * (1.0 + values["ratio"]),

@@ -22,9 +22,9 @@ _follow = loop("slew_limit_follow")
 
 
 def follow(input_mm: Array, time_s: Array, speed_mm_s: float) -> Array:
-    """Output of a stage that follows one run's input at no more than `speed_mm_s`, shape (n,).
+    """Output of a stage that follows the input of one run at a speed of at most `speed_mm_s`; shape (n,).
 
-    Exact for an input that is linear between its samples.
+    The result is exact for an input that is linear between its samples.
     """
     return filled(_follow, input_mm, np.ascontiguousarray(time_s), speed_mm_s)
 
@@ -38,9 +38,10 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
-    """Mean speeds over `WINDOW` samples of one direction; over fewer, the steps of the encoder would dominate.
+    """Mean speeds over `WINDOW` samples of one direction; over fewer samples, encoder steps would dominate.
 
-    `jumps` marks moves, shape (n - 1,), that are a command's jump instead of a motion; stretches with one are excluded.
+    `jumps`, shape (n - 1,), marks steps between samples that are jumps of a command instead of a motion; windows that
+    contain a jump are excluded.
     """
     if input_mm.size <= WINDOW:
         return np.zeros(0)
@@ -53,7 +54,7 @@ def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     if history.dwell_s > 0.0:
         return "the stage is taken to have arrived and waited before each reading, however slowly it went"
     moving: list[Array] = []

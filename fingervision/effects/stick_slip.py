@@ -1,4 +1,4 @@
-"""Moves in jumps."""
+"""Stick-slip: the output sticks and then moves in jumps."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ _stick = loop("stick_slip_stick")
 
 
 def stick(input_mm: Array, jump_mm: float) -> Array:
-    """Output that stays until one run's input has moved on by more than `jump_mm`; shape (n,)."""
+    """Output that stays constant until the input of one run has moved away by more than `jump_mm`; shape (n,)."""
     return filled(_stick, input_mm, jump_mm)
 
 
@@ -25,7 +25,7 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     smallest_mm = max(2.0 * history.input_step_mm, 6.0 * history.input_sigma_mm)
     if smallest_mm >= 0.5:
         return "the recorded input is too noisy to show jumps of less than 0.5 mm"

@@ -1,4 +1,4 @@
-"""Structural resonance: the structure rings after fast moves."""
+"""Structural resonance: the structure vibrates after fast motions."""
 
 from dataclasses import replace
 
@@ -15,13 +15,13 @@ _ring = loop("structural_resonance_ring")
 def ring(signal: Array, time_s: Array, frequency_hz: float, damping_ratio: float) -> Array:
     """Response of a second-order system to one run's signal, at rest at the first sample; shape (n,).
 
-    Exact for a signal that is linear between its samples.
+    The result is exact for a signal that is linear between its samples.
     """
     return filled(_ring, signal, np.ascontiguousarray(time_s), frequency_hz, min(damping_ratio, 0.9999))
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the structure rings after fast moves."""
+    """Apply the effect: the structure vibrates after fast motions."""
     if values["frequency_hz"] == 0.0:  # no resonance given
         return response
     opening_mm = response.gap_mm - history.rest_gap_mm
@@ -32,7 +32,7 @@ def act(response: Response, history: History, values: Values) -> Response:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Bound the parameters by what these data can show."""
+    """Narrow the bounds of the parameters to what the given data can show."""
     highest_hz = 0.4 / history.sample_time_s
     if highest_hz <= 0.5:
         return f"the sample rate of {1.0 / history.sample_time_s:.3g} Hz is too low to show 0.5 Hz and more"

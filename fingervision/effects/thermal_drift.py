@@ -1,4 +1,4 @@
-"""Thermal drift: a slow symmetric change of the gap, whatever the input."""
+"""Thermal drift: a slow symmetric change of the gap over time, independent of the input."""
 
 from dataclasses import replace
 
@@ -10,14 +10,14 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: a slow symmetric change of the gap, whatever the input."""
+    """Apply the effect: a slow symmetric change of the gap over time, independent of the input."""
     if values["amplitude_mm"] == 0.0:
         return response
     return response.with_gap(response.gap_mm - values["amplitude_mm"] * np.expm1(-history.clock_s / values["tau_s"]))
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Exclude time constants so short that the drift is over before the second reading: it would be an offset."""
+    """Exclude time constants so short that the drift ends before the second reading and would be a constant offset."""
     amplitude, tau = EFFECT.parameters
     if history.sample_time_s >= tau.upper:
         return f"readings are {history.sample_time_s:.3g} s apart, and a warming would be over between two of them"

@@ -1,4 +1,4 @@
-"""Delay of a signal by a time, interpolated along straight lines or a curve between its samples."""
+"""Time delay of a signal, with linear or curved interpolation between its samples."""
 
 from dataclasses import replace
 
@@ -15,18 +15,19 @@ FEWEST = 4
 
 
 def late(signal: Array, history: History, delay_s: float, *, curved: bool = False) -> Array:
-    """Delay a signal; before its run's start it is taken as constant.
+    """Delay a signal; before the start of a run, the signal is assumed to be constant.
 
     Parameters
     ----------
     signal : ndarray of float, shape (n,)
-        One value a sample.
+        One value per sample.
     history : History
         Runs and times.
     delay_s : float
-        How long ago.
+        Delay by which the returned signal is late.
     curved : bool
-        Whether it went along a curve between its samples (Akima 1970, which keeps corners), or along straight lines.
+        Whether the signal is interpolated between its samples along a curve (Akima 1970, which preserves corners) or
+        linearly.
 
     Returns
     -------
@@ -44,9 +45,10 @@ def late(signal: Array, history: History, delay_s: float, *, curved: bool = Fals
 
 
 def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...] | str:
-    """Bound a delay by what the data can show; none is visible where the stage stood still longer than the delay.
+    """Narrow the bounds of a delay to what the data can show; delays shorter than the stage's rests are invisible.
 
-    Under step commands the prediction changes in jumps when the delay passes from one sample to the next.
+    With step commands, the prediction changes in jumps as a function of the delay, whenever the delay passes a sample
+    time.
     """
     if history.dwell_s <= delay.upper:
         return (replace(delay, rugged=True, starts=COMMANDED_STARTS) if history.commanded else delay,)

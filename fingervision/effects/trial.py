@@ -1,4 +1,4 @@
-"""Check that an object is a valid effect, by its fields and by its answer on a few samples."""
+"""Check that an object is a valid effect, by its fields and by its response on a few samples."""
 
 from dataclasses import replace
 from functools import partial
@@ -19,14 +19,14 @@ SAMPLES = 12
 
 
 class EffectAnswerError(FingervisionError):
-    """An effect from outside the package failed, or returned an invalid response, at some parameters.
+    """An effect from outside the package failed or returned an invalid response at certain parameter values.
 
     Parameters
     ----------
     name : str
-        The effect.
+        Name of the effect.
     words : str
-        What it did.
+        Description of the failure.
     """
 
     def __init__(self, name: str, words: str) -> None:
@@ -35,7 +35,7 @@ class EffectAnswerError(FingervisionError):
 
 
 def effects_in(held: object) -> dict[str, Effect]:
-    """Return the effects that a module holds at its top level, or the effect that an object is; each is tried first.
+    """Return the effects that a module defines at its top level, or the object if it is an effect, after a trial.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def guarded(effect: DriveEffect | PointEffect) -> Effect:
 
 
 def trial_history() -> History:
-    """Twelve samples of two runs with times, both edges and a force."""
+    """Return a history of twelve samples in two runs, with times, both edges and a force."""
     way = np.array([0.0, 0.4, 0.8, 1.2, 0.6, 0.1])
     return History(
         input_mm=np.concatenate([way, way - 0.2]),

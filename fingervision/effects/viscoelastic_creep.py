@@ -1,4 +1,4 @@
-"""Viscoelastic creep: the opening goes on changing under a constant input."""
+"""Viscoelastic creep: the opening continues to change under a constant input."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values, start_key
 from fingervision.domain.parameter import Parameter
@@ -12,7 +12,7 @@ between two readings, and what relaxes faster than between them depends on when 
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the opening goes on changing under a constant input."""
+    """Apply the effect: the opening continues to change under a constant input."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     crept_mm = opening_mm.copy()
     for tau_s in TAUS_S:
@@ -28,7 +28,7 @@ def act(response: Response, history: History, values: Values) -> Response:
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
-    """Exclude time constants much shorter than the stage's rest before each reading: such creep is over by then."""
+    """Exclude time constants much shorter than the stage's rest before each reading, whose creep would be complete."""
     kept = tuple(p for p, tau_s in zip(EFFECT.parameters, TAUS_S, strict=True) if tau_s >= SLOWER * history.dwell_s)
     if not kept:
         return f"the stage stood for {history.dwell_s:.3g} s or longer before each reading: creep is over by then"

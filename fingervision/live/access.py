@@ -1,4 +1,4 @@
-"""Access to the page: its tokens, its password for other machines, and TLS where a certificate is given."""
+"""Access to the browser page: tokens, password for other computers, and TLS if a certificate is given."""
 
 import ssl
 from dataclasses import dataclass
@@ -19,18 +19,18 @@ ENCRYPTED = "The page is served beyond this machine, over TLS: whoever has the p
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Settings of who may reach the page, and how.
+    """Settings that determine who can reach the browser page, and how.
 
     Parameters
     ----------
     host : str
-        Address that is bound.
+        Network address to which the server is bound.
     port : int
-        0 takes any free one.
+        Port number; 0 selects any free port.
     password : str
-        Asked of everybody; empty asks for none.
+        Password required from every user; empty for no password.
     certificate, key : Path or None
-        For TLS.
+        Certificate and private key for TLS.
     """
 
     host: str = "127.0.0.1"
@@ -41,19 +41,19 @@ class Access:
 
     @property
     def scheme(self) -> str:
-        """As addresses begin."""
+        """URL scheme of the page: http or https."""
         return "http" if self.certificate is None else "https"
 
     @property
     def warning(self) -> str:
-        """Security warning for the user; empty if the page is reachable only from this machine."""
+        """Security warning for the user; empty if the page is reachable only from this computer."""
         if self.host in LOOPBACK_NAMES:
             return ""
         return PLAIN if self.certificate is None else ENCRYPTED
 
 
 def access(host: str, port: int, password_file: Path | None, certificate: Path | None, key: Path | None) -> Access:
-    """Check the settings for reaching the page.
+    """Check the settings for access to the browser page.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Changes of a camera's settings while it runs, handed to the thread that reads it."""
+"""Changes of a camera's settings during operation, passed to the thread that reads the camera."""
 
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
@@ -22,7 +22,7 @@ class _Wanted:
 
 
 class Adjustments:
-    """Settings of the camera of one live view; any thread asks, the reading thread acts between two frames."""
+    """Changes of camera settings: any thread may request them, and the reading thread applies them between frames."""
 
     def __init__(self) -> None:
         self.controls: tuple[CameraControl, ...] = ()
@@ -32,7 +32,7 @@ class Adjustments:
         self._lock = Lock()
 
     def ask(self, name: str, value: float) -> tuple[CameraControl, CameraControl]:
-        """Ask for another value and wait until the camera has taken it; gives the control before and after.
+        """Request a new value of a setting and wait until the camera has it; return the control before and after.
 
         Raises
         ------
@@ -58,12 +58,12 @@ class Adjustments:
         return wanted.found
 
     def begin(self, source: object) -> list[str]:
-        """Take over a source that was opened (again); what was chosen before is asked anew.
+        """Use a source that was opened (again), and apply the settings that were chosen before.
 
         Returns
         -------
         list of str
-            A sentence for each value that it does not take again.
+            One sentence for each value that the source does not accept again.
         """
         said = []
         self.controls = controls_of(source)
@@ -80,7 +80,7 @@ class Adjustments:
         return said
 
     def act(self, source: object) -> None:
-        """Do what was asked; called by the thread that reads the source, between two frames."""
+        """Apply the requested changes; called between two frames by the thread that reads the source."""
         while True:
             try:
                 wanted = self._wanted.get_nowait()

@@ -1,4 +1,4 @@
-"""A fingervision command in a process of its own at the lowest priority, so that it never slows the live view."""
+"""Execution of a fingervision command in a separate process of lowest priority, so that the live view is not slowed."""
 
 import os
 import subprocess
@@ -22,12 +22,12 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 class BackgroundCommand:
-    """One execution of the command line.
+    """One execution of a fingervision command.
 
     Parameters
     ----------
     *arguments : str or Path
-        As after `fingervision`.
+        Command-line arguments, as written after `fingervision`.
 
     Raises
     ------
@@ -56,7 +56,7 @@ class BackgroundCommand:
 
     @property
     def exit_code(self) -> int | None:
-        """Exit code; None while the command runs."""
+        """Exit code of the command; None while it runs."""
         return self._process.poll()
 
     @property
@@ -66,12 +66,12 @@ class BackgroundCommand:
 
     @property
     def complaint(self) -> str:
-        """Last sentence on the error stream, without the program's name."""
+        """Last sentence that the command wrote to standard error, without the program's name."""
         lines = [line for line in self._error.read_text(encoding="utf-8").splitlines() if line.strip()]
         return lines[-1].removeprefix("fingervision: ").removeprefix("Error: ") if lines else ""
 
     def stop(self) -> None:
-        """End the command, if it runs."""
+        """End the command if it is still running."""
         if self._process.poll() is None:
             self._process.terminate()
             try:

@@ -1,4 +1,4 @@
-"""Additions to a live measurement: a bed, its input, a model."""
+"""Additions to a live measurement: a test bed, a log of the drive, a model, gauges."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,22 +17,22 @@ from fingervision.testbed.run.run_metadata import SIMULATION, write_expected
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """Options for what is added to the measurement.
+    """Options for the additions to the measurement.
 
     Parameters
     ----------
     model : Path or None
-        Predicts the gap.
+        File of the model that predicts the gap.
     kind : str
-        Which model answers for a gripper.toml.
+        Kind of model to build from a gripper.toml.
     drive : Path or None
-        The stage's log, of a live source.
+        Log of the stage that drives the observed gripper; for a live source.
     drive_offset_s : float
-        Added to its times.
+        Offset added to the times of the log.
     allow_motion : bool
-        Whether the page may move a bed.
+        Whether users of the browser page may move the test bed.
     gauges : Path or None
-        File of gauges of one's own, read where it exists and saved to.
+        File of user-defined gauges, which is read if it exists, and to which changes are saved.
     """
 
     model: Path | None = None
@@ -44,7 +44,7 @@ class Beside:
 
 
 def stand_beside(session: Session, beside: Beside) -> None:
-    """Add bed, input and model to a session.
+    """Add the test bed, the drive log, the model and the gauges to a session.
 
     Raises
     ------

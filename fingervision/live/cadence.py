@@ -1,4 +1,4 @@
-"""Regularity of the frames: rate, jitter, and missing frames."""
+"""Regularity of the frame times: rate, jitter, and missing frames."""
 
 from collections import deque
 from itertools import pairwise
@@ -23,7 +23,7 @@ FORGIVEN_SHARE = 0.02
 
 
 class Cadence:
-    """Statistics of the frames' times; one thread adds, any thread may read."""
+    """Statistics of frame times; one thread adds times, and any thread may read the statistics."""
 
     def __init__(self) -> None:
         self._lock = RLock()
@@ -42,7 +42,7 @@ class Cadence:
             self._due_s = None
 
     def add(self, time_s: float) -> None:
-        """Add a frame's time."""
+        """Add the time of a frame."""
         with self._lock:
             self._add(time_s)
 
@@ -88,7 +88,7 @@ class Cadence:
 
     @property
     def rate_hz(self) -> float | None:
-        """Frame rate over the last hundred frames."""
+        """Frame rate over the last hundred frames (Hz)."""
         times = self._last_hundred()
         if len(times) < 2 or times[-1] <= times[0]:
             return None
@@ -96,7 +96,7 @@ class Cadence:
 
     @property
     def jitter_s(self) -> float | None:
-        """Standard deviation of the time between frames, over the last hundred frames."""
+        """Standard deviation of the time between frames (s), over the last hundred frames."""
         steps = [after - before for before, after in pairwise(self._last_hundred())]
         if len(steps) < 2:
             return None

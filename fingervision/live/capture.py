@@ -1,4 +1,4 @@
-"""Capture of frames for the measurement, without losing any; a source that is interrupted is opened again."""
+"""Capture of frames for the measurement without loss; an interrupted source is opened again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,18 +24,18 @@ Open = Callable[[], LiveSource]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrival:
-    """A frame with its time in the live view.
+    """A frame on its arrival, with its time in the live view.
 
     Parameters
     ----------
     item : Frame or LostFrame
-        `time_s` since the start, `index` counted over all cuts.
+        The frame; `time_s` counts from the start of the live view, and `index` continues over interruptions.
     arrived_s : float
-        On the host's monotonic clock.
+        Time of arrival by the computer's monotonic clock.
     packets : tuple of OwnPacket
-        The camera's own, on the same time.
+        Coded packets from the camera, with times on the same time scale.
     driven : Driven or None
-        What moved the gripper, where the source knows it.
+        State of the drive at the frame's time; None if the source does not provide it.
     """
 
     item: Frame | LostFrame
@@ -46,7 +46,7 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """An event for the user: its name, and a sentence."""
+    """An event that is reported to the user: its name and a sentence."""
 
     name: str
     words: str
@@ -54,18 +54,18 @@ class Happening:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """Marks the end of a recording."""
+    """Marker for the end of a recording."""
 
 
 class Capture:
-    """Reads a source in a thread of its own.
+    """Reads a source in a separate thread.
 
     Parameters
     ----------
     first : LiveSource
-        The open source.
+        The opened source.
     again : callable, optional
-        Opens it again after a cut; None where an end is an end (a file).
+        Function that opens the source again after an interruption; None for a file, whose end is final.
     """
 
     def __init__(self, first: LiveSource, again: Open | None) -> None:
@@ -82,19 +82,19 @@ class Capture:
         self._thread = Thread(target=self._read, name="capture", daemon=True)
 
     def start(self) -> None:
-        """Begin to read frames, used or not, because waiting pictures would otherwise arrive late and all at once."""
+        """Begin to read frames, even if not used yet, because queued frames would arrive late and all at once."""
         if self._again is not None:
             self._thread.start()
 
     def begin(self) -> None:
-        """Pass on the frames from now on; a recording is read from its first frame."""
+        """Pass frames to the measurement from now on; a recording is read from its first frame."""
         self._timeline = Timeline(monotonic())
         self._begun.set()
         if self._again is None:
             self._thread.start()
 
     def stop(self) -> None:
-        """End reading; frames that wait are kept."""
+        """End reading; queued frames are kept."""
         self._stopped.set()
         self.source.close()
 

@@ -1,4 +1,4 @@
-"""Settings that the user chooses for a live view, and may change while it runs."""
+"""Settings of a live view that the user may change while the view runs."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,19 +23,19 @@ class Choices:
     Parameters
     ----------
     scale : Scale or None
-        None as long as nobody has said; the picture is then shown and nothing measured.
+        Scale of the picture; None until the user states it: the picture is then shown without a measurement.
     scale_file : Path or None
-        The calibration that the scale was read from.
+        Calibration file from which the scale was read.
     below_tip_mm : float
-        Height of measuring.
+        Measuring height: distance below the finger tips.
     direction : Direction or None
-        Where the tips point; None finds out.
+        Direction in which the tips point; None for automatic detection.
     region : Region or None
-        The part of the frame that is looked at.
+        Region of interest; None for the complete frame.
     fingers_are_dark : bool or None
-        Whether the fingers are darker than the ground; None finds out.
+        Whether the fingers are darker than the background; None for automatic detection.
     zero_mm : float
-        What is taken off the gap where it is shown; never in a file.
+        Value subtracted from the displayed gap; files contain the gap without this subtraction.
     least_mm, greatest_mm : float or None
         Tolerance limits.
     """
@@ -51,10 +51,10 @@ class Choices:
     greatest_mm: float | None = None
 
     def changed(self, **changes: Any) -> tuple["Choices", bool]:
-        """Change settings; return also whether that removed the zero.
+        """Return changed settings, and whether the change removed the zero.
 
-        A zero is a gap measured with a certain scale, height, direction and region; after a change of these it would no
-        longer apply, and is removed.
+        The zero is a gap measured with a certain scale, height, direction and region; a change of one of these makes
+        the zero invalid, so that it is removed.
         """
         moves_zero = bool(MOVES_ZERO & set(changes))
         if self.zero_mm and moves_zero:
@@ -64,7 +64,7 @@ class Choices:
 
     @property
     def task(self) -> Task | None:
-        """Settings of the measurement, once the scale is known."""
+        """Return the settings of the measurement; None until the scale is known."""
         if self.scale is None:
             return None
         return Task(
@@ -118,12 +118,12 @@ class Choices:
         Parameters
         ----------
         gap_mm, u_mm : float or None
-            The gap and its standard uncertainty; the expanded one, with k = 2, guards the limits.
+            The gap and its standard uncertainty; the guard bands at the limits are the expanded uncertainty (k = 2).
 
         Returns
         -------
         str
-            "pass", "fail", "unsure" near a limit, or "" without limits or gap.
+            "pass", "fail", "unsure" (near a limit), or "" (without limits or gap).
         """
         if gap_mm is None or (self.least_mm is None and self.greatest_mm is None):
             return ""

@@ -1,4 +1,4 @@
-"""Check whether the light is suitable for measuring: clipped, too dark, or changing."""
+"""Check of the illumination in the picture: overexposed, too dark, or fluctuating."""
 
 from collections import deque
 from typing import Any
@@ -19,14 +19,14 @@ CHANGE_SHARE, FRAMES_LOOKED_AT = 0.05, 50
 
 
 class Exposure:
-    """Checks the light from frame to frame."""
+    """Checks the illumination from frame to frame."""
 
     def __init__(self) -> None:
         self._ground: deque[float] = deque(maxlen=FRAMES_LOOKED_AT)
         self.words = ""
 
     def add(self, frame: Frame) -> None:
-        """Add a frame; `words` then states what is wrong, or is empty."""
+        """Add a frame; afterwards `words` states the problem, or is empty."""
         sparse: Any = np.ascontiguousarray(frame.pixels[::STEP_PX, ::STEP_PX])
         grey = to_grey(sparse)
         scale = full_scale(grey)

@@ -1,4 +1,4 @@
-"""Measurement of one frame of a live view, and its table row."""
+"""Measurement of single frames of a live view, and their table rows."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,16 +14,16 @@ from fingervision.vision.pipeline import measure_frame
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """The newest frame with its result.
+    """The most recent frame with its result.
 
     Parameters
     ----------
     frame : Frame
         The picture.
     outcome : GapMeasurement, NoGap or None
-        None as long as there is no scale.
+        Result of the measurement; None until the scale is known.
     row : GapRow or None
-        As in gaps.csv.
+        Row of the frame as in gaps.csv; None until the scale is known.
     """
 
     frame: Frame
@@ -39,9 +39,9 @@ class FrameMeasurement:
     frame_size_px : (int, int)
         Width and height of the frames.
     files : tuple of Path
-        What a recording is made of, which may say how its levels are coded; empty for a live source.
+        Files of a recording, whose metadata may state the coding of grey levels; empty for a live source.
     fingers_are_dark : bool or None
-        Where it is known of the recording; None finds out in every frame.
+        Whether the fingers are darker than the background; None to detect this in every frame.
     """
 
     def __init__(
@@ -58,18 +58,18 @@ class FrameMeasurement:
         Parameters
         ----------
         item : Frame or LostFrame
-            As it came.
+            The frame as received.
         choices : Choices
-            What the user chose.
+            Settings chosen by the user.
 
         Returns
         -------
         item : Frame or LostFrame
-            The same, or that its picture is damaged.
+            The same frame, or a lost frame if the picture proved to be damaged.
         outcome : GapMeasurement, NoGap or None
-            What it says; None of a lost frame, and as long as there is no scale.
+            Result of the measurement; None for a lost frame, and until the scale is known.
         row : GapRow or None
-            As in gaps.csv; None as long as there is no scale.
+            Row of the frame as in gaps.csv; None until the scale is known.
         """
         task = choices.task
         if task is None:

@@ -1,4 +1,4 @@
-"""How long the disk space suffices for a recording at its present rate."""
+"""Time for which the disk space suffices for a recording at its present data rate."""
 
 import shutil
 from pathlib import Path
@@ -8,14 +8,14 @@ LEAST_S, LEAST_BYTES = 2.0, 1_000_000
 
 
 def minutes_left(folder: Path, seconds: float) -> float | None:
-    """Minutes until a recording's disk is full; None until its rate is known.
+    """Minutes until the disk of a recording is full; None until the data rate is known.
 
     Parameters
     ----------
     folder : Path
-        The recording's.
+        Folder of the recording.
     seconds : float
-        How long it has been written.
+        Duration of the recording so far.
     """
     try:
         written = sum(file.stat().st_size for file in folder.iterdir())

@@ -1,4 +1,4 @@
-"""Access control of the page's server: only this machine's own pages, with the token, under the bound host name."""
+"""Access control of the page's server: it admits only pages of this server that have a token (and any password)."""
 
 import asyncio
 import base64
@@ -40,23 +40,23 @@ GUESS_COSTS_S = 1.0
 class Guard:
     """Lets allowed requests through, and adds headers that isolate the page from other sites.
 
-    The Host must be a name of this server (so that a foreign site cannot redirect its own name here), the Origin must
-    be the same (so that no other page may open a socket), and the token must be in the address.
+    The header Host must be a name of this server (so that another site cannot redirect its own name to this server),
+    the header Origin must be the same (so that no other page can open a socket), and the address must contain a token.
 
     Parameters
     ----------
     app : ASGI application
-        What is guarded.
+        Application to which allowed requests are passed.
     host : str
-        Address that was bound.
+        Network address to which the server is bound.
     port : int
-        Its port.
+        Port of the server.
     tokens : mapping of str to str
-        What every address must hold one of, and the role that it gives (`WRITER` or `VIEWER`).
+        Tokens, one of which every address must contain, with the role that each grants (`WRITER` or `VIEWER`).
     password : str
-        Asked of everybody and for everything, where it is not empty.
+        Password required for every request; empty for no password.
     scheme : str
-        Of the page's address: http or https.
+        Scheme of the page's address: http or https.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Guard:
 
 
 def is_password(header: str, password: str) -> bool:
-    """Whether an Authorization header (HTTP Basic, any user) holds the password; compared in constant time."""
+    """Whether an Authorization header (HTTP Basic, any user) contains the password; compared in constant time."""
     kind, _, coded = header.partition(" ")
     try:
         given = base64.b64decode(coded, validate=True).partition(b":")[2] if kind.lower() == "basic" else b""

@@ -1,4 +1,4 @@
-"""Limits for idle connections: few at a time from one address, and each only for a short time."""
+"""Limits for idle connections: few at a time from one address, each for a short time only."""
 
 import asyncio
 from collections import defaultdict
@@ -11,16 +11,16 @@ HALF_OPEN_AT_ONCE, ASKS_WITHIN_S = 16, 5.0
 
 
 class PatientProtocol(H11Protocol):
-    """Uvicorn's HTTP protocol, which closes connections that send no request in time.
+    """HTTP protocol of Uvicorn that closes connections on which no request arrives in time.
 
-    Idle connections would use up the places of other clients. If one address has too many open connections, its oldest
-    is closed in favour of the newest.
+    Idle connections would otherwise use up the number of connections available to other clients. If one address has too
+    many open connections, the oldest of them is closed in favour of the newest.
     """
 
     half_open: ClassVar[defaultdict[str, dict["PatientProtocol", asyncio.TimerHandle]]] = defaultdict(dict)
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Wait for a request, for a limited time."""
+        """Start the time limit for the first request of a new connection."""
         super().connection_made(transport)
         peer = transport.get_extra_info("peername")
         self._address = str(peer[0]) if peer else ""
@@ -38,7 +38,7 @@ class PatientProtocol(H11Protocol):
             self.heard()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        """Pass the connection on to the socket's protocol, which has its own time limit."""
+        """Pass the connection to the WebSocket protocol, which has a time limit of its own."""
         self.heard()
         super().handle_websocket_upgrade(event)
 
@@ -48,7 +48,7 @@ class PatientProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def heard(self) -> None:
-        """Wait no longer."""
+        """End the time limit, because a request has arrived."""
         waiting = self.half_open[self._address]
         timer = waiting.pop(self, None)
         if timer is not None:

@@ -1,4 +1,4 @@
-"""The last minutes of the gap, in a fixed amount of memory."""
+"""Measured rows of the last minutes, in a fixed amount of memory."""
 
 from collections.abc import Iterator
 from dataclasses import astuple, replace
@@ -18,12 +18,12 @@ COLUMNS_KEPT = 16
 
 
 class History:
-    """A ring buffer of rows.
+    """Ring buffer of measured rows.
 
     Parameters
     ----------
     kept : int
-        Rows that are kept.
+        Number of rows that are kept.
     """
 
     def __init__(self, kept: int = ROWS_KEPT) -> None:
@@ -33,7 +33,7 @@ class History:
         self._lock = Lock()
 
     def add(self, row: GapRow) -> None:
-        """Add a row; the oldest is dropped."""
+        """Add a row; if the buffer is full, the oldest row is dropped."""
         cells = [*astuple(row)[:COLUMNS_KEPT], row.input_mm, row.force_n]
         cells[2] = STATUSES.index(row.status)
         with self._lock:
@@ -42,11 +42,11 @@ class History:
 
     @property
     def oldest(self) -> int:
-        """Number of the oldest kept row, counted from the first row ever."""
+        """Number of the oldest row in the buffer, counted from the first row of the measurement."""
         return max(0, self.count - len(self._cells))
 
     def rows(self, after: int = 0, before: int | None = None) -> Iterator[GapRow]:
-        """Kept rows with numbers from `after` up to but excluding `before`, counted from the first row ever."""
+        """Rows in the buffer with numbers from `after` to `before` - 1, counted since the start of the measurement."""
         with self._lock:
             last = self.count if before is None else min(before, self.count)
             asked = np.arange(max(after, self.count - len(self._cells)), last)

@@ -1,4 +1,4 @@
-"""Gauges on a live source: measured in every frame, followed from where they were drawn."""
+"""Gauges on a live source: measured in every frame and tracked from the position at which they were drawn."""
 
 from collections import OrderedDict, deque
 from collections.abc import Mapping
@@ -25,17 +25,18 @@ FRAMES_COUNTED = 100
 
 
 class LiveGauges:
-    """Measures a board's gauges in the measuring thread.
+    """Measures the gauges of a gauge board in the measuring thread.
 
-    An unchanged gauge continues from its present position; a new or changed one begins where it is drawn, in the next
-    frame. If the measurement lags behind, frames are measured without gauges, and the page states how many.
+    An unchanged gauge continues from its present position; a new or changed gauge starts in the next frame at the
+    position at which it was drawn. If the measurement lags behind, some frames are measured without gauges, and the
+    page states their number.
 
     Parameters
     ----------
     session : Session
-        What measures.
+        The live measurement.
     board : GaugeBoard
-        Its gauges.
+        The board with the gauges.
     """
 
     def __init__(self, session: Session, board: GaugeBoard) -> None:
@@ -49,13 +50,13 @@ class LiveGauges:
 
     @property
     def first(self) -> int | None:
-        """Number of the frame in which gauges are drawn; here any frame will do."""
+        """Number of the frame in which gauges are drawn; in a live source, any frame."""
         seen = self._session.seen
         return None if seen is None else seen.frame.index
 
     @property
     def trouble(self) -> str:
-        """Reason why there are no readings, or fewer than frames."""
+        """Reason why there are no readings, or fewer readings than frames."""
         if self._session.choices.task is None:
             return NO_SCALE
         if self._failure:
@@ -68,12 +69,12 @@ class LiveGauges:
         return ""
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Readings of one version of the board's gauges in a frame; None where they are unknown."""
+        """Readings in a frame of a given version of the gauges; None if unknown."""
         found = self._read.get(frame)
         return found[1] if found is not None and found[0] == version else None
 
     def see(self, item: Frame | LostFrame, row: GapRow | None) -> None:
-        """Measure the gauges in the next frame; an error in a gauge does not end the measurement."""
+        """Measure the gauges in the next frame; an error of a gauge does not end the measurement of the gap."""
         task = self._session.choices.task
         if task is None or not self._board.gauges:
             return

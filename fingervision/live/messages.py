@@ -1,4 +1,4 @@
-"""Messages for users of the live view: numbered, kept for some time, sent to listeners at once."""
+"""Messages for users of the live view: numbered, kept for some time, and sent to listeners at once."""
 
 from collections import deque
 from collections.abc import Callable
@@ -9,7 +9,7 @@ MESSAGES_KEPT = 50
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A sentence for the user, numbered from 1."""
+    """A message for the user, with a number counted from 1."""
 
     number: int
     name: str
@@ -20,7 +20,7 @@ MessageListener = Callable[[Message], None]
 
 
 class Messages:
-    """The messages so far."""
+    """The most recent messages, and the listeners that receive new messages."""
 
     def __init__(self) -> None:
         self.kept: deque[Message] = deque(maxlen=MESSAGES_KEPT)

@@ -1,4 +1,4 @@
-"""Printing in a thread of its own, so that a slow or missing reader delays neither measuring nor recording."""
+"""Printing in a separate thread, so that a slow or missing reader delays neither measurement nor recording."""
 
 import os
 from contextlib import suppress
@@ -13,14 +13,14 @@ PATIENCE_S = 2.0
 
 
 class Outlet:
-    """Prints to one stream.
+    """Prints text to one stream.
 
     Parameters
     ----------
     stream : text stream or None
-        Standard output or error; None where it was closed before the program began.
+        Standard output or standard error; None if the stream was closed before the program began.
     waiting : int
-        Lines that may wait for the reader.
+        Largest number of queued lines.
     """
 
     def __init__(self, stream: TextIO | None, waiting: int = LINES_WAITING) -> None:
@@ -43,7 +43,7 @@ class Outlet:
             self.left_out += 1
 
     def close(self) -> None:
-        """Print the queued text, as far as the reader takes it in time."""
+        """Print the queued text, as far as the reader accepts it in time."""
         self._ending.set()
         self._thread.join(PATIENCE_S)
         if self._thread.is_alive():
@@ -68,7 +68,7 @@ class Outlet:
                 return
 
     def _let_go(self) -> None:
-        """Redirect the stream to nothing, so that Python neither fails nor waits when it flushes it at the end."""
+        """Redirect the stream to the null device, so that Python neither fails nor waits at the final flush."""
         if self._stream is None:
             return
         with suppress(OSError, ValueError):

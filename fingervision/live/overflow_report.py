@@ -1,4 +1,4 @@
-"""Report frames that arrived faster than they could be measured: counted by the capture, reported at intervals."""
+"""Report of frames that were lost because they arrived faster than they could be measured."""
 
 from collections.abc import Callable
 from time import monotonic
@@ -9,14 +9,14 @@ SAID_EVERY_S = 10.0
 
 
 class OverflowReport:
-    """Reports how many frames were lost since the last report.
+    """Reports, at intervals, the number of frames lost since the last report.
 
     Parameters
     ----------
     capture : Capture
-        Counts them.
+        Capture that counts the lost frames.
     tell : callable
-        Takes a name and a sentence.
+        Function that reports an event by a name and a sentence.
     """
 
     def __init__(self, capture: Capture, tell: Callable[[str, str], None]) -> None:

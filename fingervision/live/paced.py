@@ -1,4 +1,4 @@
-"""A recording played in real time, as if it came from a camera."""
+"""Playback of a recording in real time, as if the frames came from a camera."""
 
 from collections.abc import Iterator
 from threading import Event
@@ -11,7 +11,7 @@ from fingervision.frames.source import Description, FrameSource
 
 
 class PacedRecording:
-    """Yields each frame at its time; frames without times as fast as they are measured.
+    """Yields each frame of a recording at its time; frames without times are yielded as fast as they are measured.
 
     Parameters
     ----------
@@ -28,11 +28,11 @@ class PacedRecording:
 
     @property
     def description(self) -> Description:
-        """What is known of the recording."""
+        """Description of the recording."""
         return self._source.description
 
     def received(self) -> Iterator[Received]:
-        """Yield the frames at their times, from the first to the last."""
+        """Yield the frames, from the first to the last, at their times."""
         started_s = monotonic()
         first_s: float | None = None
         for item in self._source:
@@ -45,5 +45,5 @@ class PacedRecording:
             yield Received(item, monotonic())
 
     def close(self) -> None:
-        """End the iteration."""
+        """End the iteration over frames."""
         self._closed.set()

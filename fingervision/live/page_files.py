@@ -1,4 +1,4 @@
-"""Files of the page, one script per topic; a file panel_NAME.js is loaded as a panel without being listed anywhere."""
+"""Files of the browser page, one script per topic; every file panel_NAME.js is loaded as a panel automatically."""
 
 from functools import cache
 from pathlib import Path
@@ -10,13 +10,13 @@ LAST = "live.js"
 
 @cache
 def files() -> frozenset[str]:
-    """Names of the served files; any other name is not found."""
+    """Names of the files that the server delivers; any other name gives the error "not found"."""
     return frozenset(path.name for path in PAGE.iterdir() if path.is_file() and path.name != "index.html")
 
 
 @cache
 def index() -> str:
-    """HTML of the page, with the scripts of its panels, and the starting script last."""
+    """HTML text of the page, with the scripts of its panels, and the start script last."""
     panels = sorted(name for name in files() if name.startswith("panel_") and name.endswith(".js"))
     tags = "\n".join(f'<script type="module" src="/page/{name}"></script>' for name in (*panels, LAST))
     return (PAGE / "index.html").read_text(encoding="utf-8").replace(SCRIPTS, tags)

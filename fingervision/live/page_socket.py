@@ -1,6 +1,6 @@
-"""Socket of one page: a new state is sent when the page has received the previous one.
+"""WebSocket of one browser page: a new state is sent once the page has received the previous state.
 
-Requests are checked and counted.
+Requests from the page are checked and counted.
 """
 
 import asyncio
@@ -34,20 +34,20 @@ TAKE_OVER = "take_over"
 
 
 class PageSocket:
-    """Serves one page until either side closes the connection.
+    """Serves one browser page until either side closes the connection.
 
     Parameters
     ----------
     page : WebSocket
-        Not yet accepted.
+        WebSocket connection of the page, not yet accepted.
     view : View
-        What is shown.
+        The live measurement or recording that is shown.
     watch : PictureWatch
-        Says when there is a new picture.
+        Notifies of new pictures.
     pen : Pen
-        Who may change what.
+        Administration of write access.
     steps : list
-        Takes in the pictures of the steps that were asked for.
+        List to which requested pictures of the measuring steps are appended.
     """
 
     def __init__(
@@ -59,9 +59,9 @@ class PageSocket:
         self.ending = False
 
     async def serve(self) -> None:
-        """Send and receive.
+        """Send states and receive requests.
 
-        If either fails, the connection is closed, and the page connects again if it still exists.
+        If sending or receiving fails, the connection is closed; a page that is still open connects again.
         """
         page = self._page
         await page.accept()
@@ -86,7 +86,7 @@ class PageSocket:
         return {"viewer": self._is_viewer, "holds_pen": not self._is_viewer and self._pen.may_write(self)}
 
     async def _send(self) -> None:
-        """Send the newest state, then wait until the page has received it, so that nothing queues up."""
+        """Send the newest state, then wait until the page has received it, so that states do not queue up."""
         view, known = self._view, known_by(self._page)
         shown: Seen | None = None
         pictured_s = float("-inf")
@@ -151,7 +151,7 @@ class PageSocket:
 
 
 def known_by(page: WebSocket) -> Known:
-    """Rows and messages that a returning page has already; invalid numbers count as zero."""
+    """Numbers of rows and messages that a reconnecting page already has; invalid numbers count as zero."""
     asked = page.query_params
     numbers = [asked.get(name, "") for name in ("rows", "messages")]
     if not all(number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS for number in numbers):
@@ -160,7 +160,7 @@ def known_by(page: WebSocket) -> Known:
 
 
 def request_of(text: str) -> dict[str, Any]:
-    """Parse a message as a request; an invalid one is an empty request."""
+    """Parse a message as a request; an invalid message becomes an empty request."""
     try:
         request = json.loads(text)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Token in the page's address: stored in the output folder, so that a page finds the server again after a restart."""
+"""Token in the page's address, stored in the output folder so that a page can reconnect after a restart."""
 
 import os
 import re
@@ -13,14 +13,14 @@ BYTES = 18
 
 
 def kept_token(out: Path, file_name: str = FILE) -> str:
-    """Read the folder's token, or create one that only this user can read.
+    """Read the token of a folder, or create a token file that only this user can read.
 
     Parameters
     ----------
     out : Path
         The folder.
     file_name : str
-        `FILE` for whoever works the live view, `VIEWER_FILE` for those who look on.
+        `FILE` for users who control the live view, `VIEWER_FILE` for users who only watch.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Write access to the live view: one page at a time has it, the user's other pages look on until they take over."""
+"""Write access to the live view: one page at a time has it, and other pages only watch until they take it over."""
 
 from fingervision.domain.errors import StateError
 
@@ -6,7 +6,7 @@ HELD = "Another page works this live view: press Take over to work it here."
 
 
 class Pen:
-    """Tracks which page may change settings; used only by the server's thread.
+    """Administers which page may change settings; used only by the thread of the server.
 
     The first page that sends a request has write access, until it closes or another page takes over.
     """
@@ -35,6 +35,6 @@ class Pen:
         self._holder = page
 
     def let_go(self, page: object) -> None:
-        """Give it back."""
+        """Release the write access of a page."""
         if self._holder is page:
             self._holder = None

@@ -1,4 +1,4 @@
-"""Calibration from a reference in the live picture: the user marks it, and states its size."""
+"""Calibration from a reference object in the live picture, whose region and size the user states."""
 
 from calib.errors import CalibrationError
 from calib.known_widths import KnownSize, find_widths
@@ -21,16 +21,16 @@ def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_m
     frame : Frame
         The picture.
     region : Region
-        Where the reference is.
+        Rectangle that contains the reference object.
     kind : str
         "bar" or "slot".
     size_mm, u_size_mm : float
-        Its size and the standard uncertainty of that.
+        Size of the reference object, and the standard uncertainty of this size.
 
     Returns
     -------
     Calibration
-        With a single size: the edge bias stays in the budget.
+        Calibration from a single size, so that the uncorrected edge bias is a contribution to the budget.
 
     Raises
     ------

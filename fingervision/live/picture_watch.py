@@ -1,4 +1,4 @@
-"""Waiting for a new picture: one check of the view serves all pages."""
+"""Notification of new pictures, with a single check of the view for all pages."""
 
 import asyncio
 
@@ -11,7 +11,7 @@ LOOK_EVERY_S = 0.01
 
 
 class PictureWatch:
-    """Draws each new picture once and wakes all pages that wait for it; used within one event loop.
+    """Renders each new picture once, and wakes all pages that wait for it; used within one event loop.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class PictureWatch:
         Parameters
         ----------
         shown : Seen or None
-            What the page has.
+            Picture that the page already has; None if it has none.
         timeout_s : float
             The longest wait, in seconds.
         """

@@ -1,4 +1,4 @@
-"""One message to the page: everything new since the last one, and the newest picture with the measured edges."""
+"""One message to the browser page: all news since the last message, and the newest picture with measured edges."""
 
 import json
 import struct
@@ -30,14 +30,14 @@ _NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What a page has received: version, and numbers of rows and messages.
+    """What a page has received so far: identity of the view, and numbers of rows and messages.
 
     Parameters
     ----------
     identity : str
-        Of the view that the rows are counted in; empty for a page that has nothing.
+        Identity of the view to which the row numbers refer; empty for a page without data.
     rows, messages : int
-        How many it has.
+        Number of rows and of messages that the page has.
     """
 
     identity: str = ""
@@ -59,18 +59,18 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
     Parameters
     ----------
     view : View
-        What is shown.
+        The live measurement or recording that is shown.
     known : Known
-        What the page has.
+        Data that the page has already.
     seen : Seen or None
-        The picture to send; None sends none.
+        The picture to send; None for no picture.
     about : mapping, optional
-        What this page alone is told.
+        Data for this page only.
 
     Returns
     -------
     Next
-        Its content: length of the head (4 bytes, big end first), the head in JSON, the picture as JPEG or nothing.
+        The message: length of the header (4 bytes, big-endian), the header in JSON, and the picture as JPEG, if any.
     """
     identity, count = view.identity, view.row_count
     is_same = known.identity == identity and known.rows <= count
@@ -96,7 +96,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
 
 
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
-    """Rows for the chart: time, gap, its standard uncertainty, frame, reason for a missing gap, and the model's gap."""
+    """Rows for the chart: time, gap, standard uncertainty, frame, reason for a missing gap, and the model's gap."""
     model = view.features.get("model")
     predicted = [None] * len(rows) if model is None else model.predicted_mm(rows)
     return [
@@ -117,7 +117,7 @@ def _u_mm(row: GapRow) -> float | None:
 
 
 def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
-    """Values of the picture's row."""
+    """Measured values of the picture's row."""
     choices = view.choices
     if seen is None or seen.row is None:
         return None
@@ -150,14 +150,14 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
 
 
 def draw_beforehand(view: View) -> None:
-    """Draw the picture that the next messages will need, unless the measurement lags behind."""
+    """Render in advance the picture for the next messages, unless the measurement lags behind."""
     seen = view.seen
     if seen is not None and not view.in_a_hurry:
         _PICTURES.of(seen, view.choices.zero_mm)
 
 
 def is_short(view: View, known: Known) -> bool:
-    """Whether the next message is quickly composed: few rows, and no model to evaluate."""
+    """Whether the next message can be composed quickly: few rows, and no model to evaluate."""
     return (
         known.identity == view.identity
         and view.row_count - known.rows < ROWS_IN_A_MOMENT
@@ -166,12 +166,12 @@ def is_short(view: View, known: Known) -> bool:
 
 
 def state_has_changed() -> None:
-    """Make the next messages read the view's state again, after a command was executed."""
+    """After the execution of a command, ensure that the next messages contain a fresh state of the view."""
     _STATES.forget()
 
 
 class _Pictures:
-    """The newest picture, drawn only once for all pages."""
+    """The newest picture, rendered only once for all pages."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -186,7 +186,7 @@ class _Pictures:
 
 
 class _States:
-    """State of a view, composed once for all pages that request it at about the same time."""
+    """State of a view, composed once for all pages that need it at about the same time."""
 
     def __init__(self) -> None:
         self._lock = Lock()

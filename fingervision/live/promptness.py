@@ -1,4 +1,4 @@
-"""Thread priority for the measurement, on a machine that is busy with other programs."""
+"""Thread priority for the measurement on a computer that is busy with other programs."""
 
 import os
 import sys
@@ -12,11 +12,11 @@ NICENESS = -10
 
 
 def be_prompt() -> None:
-    """Raise the priority of this thread, and of those that it starts.
+    """Raise the priority of the calling thread, and of threads that it starts.
 
-    All threads that run Python should call it, because a thread that waits for Python's lock waits for the thread that
-    holds it. Only users with permission (root, or a limit set with ulimit -e) get the priority; for others nothing
-    changes.
+    All threads that run Python code should call this function, because a thread that waits for Python's global
+    interpreter lock depends on the thread that holds it. The priority is raised only for users with permission (root,
+    or a limit set with ulimit -e).
     """
     sys.setswitchinterval(SWITCH_S)
     with suppress(AttributeError, OSError):

@@ -1,4 +1,4 @@
-"""Recording in a thread of its own, so that a slow disk never delays the measurement."""
+"""Recording in a separate thread, so that a slow disk does not delay the measurement."""
 
 from queue import Empty, Full, Queue
 from threading import Thread
@@ -19,12 +19,12 @@ DISK_EVERY_S = 1.0
 
 
 class Recorder:
-    """Writes frames to a run folder, in a thread of its own.
+    """Writes frames to a run folder in a separate thread.
 
     Parameters
     ----------
     run : RunFolder
-        An open run.
+        Folder of the run, opened for writing.
     """
 
     def __init__(self, run: RunFolder) -> None:
@@ -40,7 +40,7 @@ class Recorder:
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether the disk lags behind."""
+        """Whether writing to the disk lags behind."""
         return self._waiting.qsize() > FRAMES_UNTIL_HURRY
 
     def add(self, what: RecordedFrame | tuple[str, str]) -> None:
@@ -76,7 +76,7 @@ class Recorder:
         )
 
     def _look_at_the_disk(self) -> None:
-        """Check whether the folder was deleted, which no write reports, and how long the disk space suffices."""
+        """Check whether the folder was deleted (writing does not report this), and how long disk space suffices."""
         if monotonic() - self._looked_s < DISK_EVERY_S:
             return
         self._looked_s = monotonic()

@@ -1,4 +1,4 @@
-"""Folder of a run: video, gaps, events and settings, valid whenever the program ends."""
+"""Folder of a recorded run: video, gaps, events and settings, valid whenever the program ends."""
 
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -32,21 +32,21 @@ class RecordedFrame:
 
 
 class RunFolder:
-    """Writes a run while it is recorded.
+    """Writes the files of a run during the recording.
 
-    Every frame is passed to the system at once, and rows of the table within a second, so that a process that is killed
-    loses at most a second.
+    Frames are passed to the operating system at once, and rows of the table within a second, so that at most one second
+    is lost if the process is killed.
 
     Parameters
     ----------
     out : Path
-        Folder that runs lie in; the run's own is named by its beginning.
+        Folder that contains the folders of runs; each of these is named by the start time of its run.
     description : Description
-        The source.
+        Description of the source.
     task : Task
-        What is measured, and how.
+        Settings of the measurement.
     template : av.VideoStream or None
-        See `RecordedVideo`.
+        Coded stream of the camera, see `RecordedVideo`.
 
     Raises
     ------
@@ -71,11 +71,11 @@ class RunFolder:
 
     @property
     def is_there(self) -> bool:
-        """Whether the written files still lie in the folder; the system goes on writing to deleted files."""
+        """Whether the written files still exist; the operating system would continue to write to deleted files."""
         return (self.path / EVENTS).exists()
 
     def add(self, frame: RecordedFrame) -> None:
-        """Write one frame: first the mark if it is lost, then its picture, then its row."""
+        """Write one frame: first the entry in lost.csv if the frame is lost, then its picture, then its row."""
         if isinstance(frame.item, LostFrame):
             lost_at_s = self._video.time_s(frame.item, frame.packets)
             if lost_at_s is not None:
@@ -88,7 +88,7 @@ class RunFolder:
         self.frames += 1
 
     def event(self, name: str, words: str) -> None:
-        """Append an event at the time of the last frame."""
+        """Append an event with the time of the last frame."""
         self._files.event({"time_s": round(self._last_s, 6), "event": name, "words": words})
 
     def close(self, why: str) -> None:

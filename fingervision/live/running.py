@@ -1,4 +1,4 @@
-"""A live view from start to end: measurement, page or terminal, and an orderly end at any signal."""
+"""Operation of a live view: measurement, browser page or terminal, and an orderly end at any signal."""
 
 import signal
 import sys
@@ -28,20 +28,20 @@ from fingervision.live.terminal import JsonLines, StatusLine, told
 
 @dataclass(frozen=True, slots=True)
 class Showing:
-    """Where the live view is shown.
+    """Output of the live view.
 
     Parameters
     ----------
     page : bool
-        In a browser.
+        Whether the live view is shown in a browser page.
     json_lines : bool
-        One line a frame on standard output.
+        Whether one line of JSON per frame is written to standard output.
     way : Access
-        How the page is reached.
+        Settings for access to the page.
     record : bool
         Whether a run is recorded from the first frame.
     browser : bool
-        Whether the page is opened in the browser, where a person sits at the terminal.
+        Whether the page is opened in the browser automatically if the program runs in a terminal.
     """
 
     page: bool
@@ -52,7 +52,7 @@ class Showing:
 
 
 def look_through(recording: Recorded, out: Path, showing: Showing, beside: Beside, gauges: Path | None = None) -> None:
-    """Show a recording in the page until the user ends it; `gauges` names a gauge file and opens its panel.
+    """Show a recording in the browser page until the user ends it; `gauges` names a gauge file and opens its panel.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def is_terminal(stream: TextIO | None) -> bool:
 
 @contextmanager
 def _until_signalled() -> Iterator[Event]:
-    """Turn Ctrl-C and SIGTERM into an event, so that recordings are ended properly."""
+    """Convert Ctrl-C and SIGTERM to an event, so that recordings are ended properly."""
     signalled = Event()
 
     def note(number: int, frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""The gaps shown in the page, saved as a table."""
+"""Saving of the gaps that the browser page shows."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ SAVED_GAPS = "live_gaps.csv"
 
 
 def save_gaps(view: View) -> Path:
-    """Save the kept gaps in the form of gaps.csv; of a recording, the table that `measure` wrote.
+    """Save the stored gaps in the format of gaps.csv; for a recording, save the table that `measure` wrote.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Server of the page: its files, a socket for the live view, and the gaps as a file. Bound to loopback."""
+"""Web server of the browser page: its files, a WebSocket for the live view, and the gaps as a file."""
 
 import asyncio
 import errno
@@ -65,16 +65,16 @@ def bound(host: str, port: int) -> socket.socket:
 
 
 class Page:
-    """Serves one view.
+    """Serves one live view or recording to browser pages.
 
     Parameters
     ----------
     view : View
-        What is shown.
+        The live measurement or recording that is shown.
     listening : socket.socket
-        See `bound`.
+        Bound socket, from `bound`.
     way : Access, optional
-        How it may be reached.
+        Settings for access to the page.
     """
 
     def __init__(self, view: View, listening: socket.socket, way: Access | None = None) -> None:
@@ -128,7 +128,7 @@ class Page:
         return path
 
     def serve(self, until: Event) -> None:
-        """Serve until `until` is set."""
+        """Serve pages until the event `until` is set."""
         thread = Thread(target=self._run, name="page", daemon=True)
         thread.start()
         while not until.wait(0.2) and thread.is_alive():

@@ -1,4 +1,4 @@
-"""The live measurement: every frame is measured as it arrives, and its result is kept for the pages."""
+"""The live measurement: every frame is measured on arrival, and the results are kept for browser pages."""
 
 import secrets
 from collections import Counter, deque
@@ -44,14 +44,14 @@ PictureListener = Callable[[Frame | LostFrame, GapRow | None], None]
 
 
 class Session:
-    """Measures in a thread of its own.
+    """Measures the frames of a source in a separate thread.
 
     Parameters
     ----------
     capture : Capture
-        Not yet started.
+        Capture of the source, not yet started.
     choices : Choices
-        What the user chose.
+        Settings chosen by the user.
     out : Path
         Folder for runs and snapshots.
     """
@@ -90,7 +90,7 @@ class Session:
                 self.say("camera", note)
 
     def start(self) -> None:
-        """Begin to measure, once the source is ready."""
+        """Start the measurement as soon as the source is ready."""
         self.capture.start()
         rehearse()
         self.capture.begin()
@@ -98,7 +98,7 @@ class Session:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the measurement; a recording under way is ended properly."""
+        """End the measurement; a running recording is completed properly."""
         self.capture.stop()
         self._stopped.set()
         self._thread.join()
@@ -121,25 +121,25 @@ class Session:
 
     @property
     def oldest_row(self) -> int:
-        """Number of the first row that is still kept."""
+        """Number of the oldest row that is still stored."""
         return self.history.oldest
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row sent to a new page: that of two minutes ago."""
+        """Number of the first row that is sent to a new page: the row of two minutes ago."""
         return max(self.oldest_row, self.history.count - ROWS_SHOWN)
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from number `first` up to but excluding `last`."""
+        """Rows with numbers from `first` to `last` - 1."""
         return self.history.rows(first, last)
 
     def state(self) -> dict[str, Any]:
-        """State of source and measurement, for the page."""
+        """Return the state of source and measurement, for the browser page."""
         return state_of_session(self)
 
     @property
     def messages(self) -> deque[Message]:
-        """The latest messages."""
+        """The most recent messages."""
         return self._messages.kept
 
     @property
@@ -217,12 +217,12 @@ class Session:
 
     @property
     def recording(self) -> Recorder | None:
-        """The recording under way; None without one."""
+        """The running recording; None without a recording."""
         return self._recorder
 
     @property
     def silent_s(self) -> float:
-        """Time since the last frame (s); 0 while frames arrive as usual."""
+        """Time without a frame (s); 0 while frames arrive regularly."""
         if self.ended.is_set():
             return 0.0
         since_s = monotonic() - self._frame_at_s
@@ -231,7 +231,7 @@ class Session:
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether measurement or disk lags behind, so that previews should not be drawn."""
+        """Whether measurement or disk lags behind, so that previews should not be rendered."""
         recorder = self._recorder
         lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
         return lags or (recorder is not None and recorder.in_a_hurry)

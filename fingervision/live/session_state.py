@@ -1,4 +1,4 @@
-"""State of a live measurement, and of any view's settings, as sent to the page."""
+"""State of a live measurement and of its settings, as sent to the browser page."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def state_of_choices(choices: Choices) -> dict[str, Any]:
-    """Scale, region, height, zero and tolerance, for the page."""
+    """Return scale, region, height, zero and tolerance, for the browser page."""
     scale, region = choices.scale, choices.region
     return {
         "zero_mm": choices.zero_mm,
@@ -27,7 +27,7 @@ def state_of_choices(choices: Choices) -> dict[str, Any]:
 
 
 def state_of_session(session: "Session") -> dict[str, Any]:
-    """Source, rate, losses and recording, for the page."""
+    """Return source, frame rate, losses and recording, for the browser page."""
     cadence, recorder, description = session.cadence, session.recording, session.description
     jitter_s = cadence.jitter_s
     return {

@@ -18,12 +18,12 @@ LOOK_EVERY_S = 0.005
 
 
 class SetUp:
-    """One inspection.
+    """One inspection of the set-up.
 
     Parameters
     ----------
     view : View
-        With a scale.
+        The live measurement, whose scale must be known.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class SetUp:
 
     @property
     def is_busy(self) -> bool:
-        """Whether an inspection is under way."""
+        """Whether an inspection is running."""
         return self._thread.is_alive()
 
     def _look(self) -> None:

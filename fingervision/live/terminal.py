@@ -16,7 +16,7 @@ DRIVE_COLUMNS = ("run", "input_mm", "force_n")
 
 
 class JsonLines:
-    """Prints one line per frame, with the columns of gaps.csv; null is an empty cell.
+    """Prints one line of JSON per frame, with the columns of gaps.csv; null represents an empty cell.
 
     Parameters
     ----------
@@ -28,13 +28,13 @@ class JsonLines:
         self._outlet = outlet
 
     def add(self, row: GapRow, arrived_s: float) -> None:
-        """Write one row."""
+        """Print one row."""
         cells = {name: cell for name, cell in asdict(row).items() if name not in DRIVE_COLUMNS}
         self._outlet.put(json.dumps(cells) + "\n")
 
 
 class StatusLine:
-    """Prints gap, status and rate in a line that is overwritten.
+    """Prints gap, status and frame rate in a line that is overwritten.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class StatusLine:
     outlet : Outlet
         Standard output.
     in_place : bool
-        Whether it is a terminal.
+        Whether the output is a terminal, so that the line can be overwritten.
     """
 
     def __init__(self, session: Session, outlet: Outlet, *, in_place: bool) -> None:
@@ -51,7 +51,7 @@ class StatusLine:
         self._printed_at_s = float("-inf")
 
     def add(self, row: GapRow, arrived_s: float) -> None:
-        """Print the row if the interval has passed."""
+        """Print the row if the display interval has passed."""
         if monotonic() - self._printed_at_s < (EVERY_S if self._in_place else EVERY_S_ELSEWHERE):
             return
         self._printed_at_s = monotonic()
@@ -77,6 +77,6 @@ class StatusLine:
 
 
 def told(message: Message, outlet: Outlet, *, in_place: bool) -> None:
-    """Print a message of the session."""
+    """Print a message of the live measurement."""
     # What stands in place, and the ^C of whoever ends it, gives way.
     outlet.put(f"{CLEARED if in_place else ''}fingervision: {message.words}\n")

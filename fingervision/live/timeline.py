@@ -1,4 +1,4 @@
-"""Common time of the live view: the source's time steps, joined across interruptions by the computer's clock."""
+"""Time scale of the live view: times of the source, joined across interruptions by the computer's clock."""
 
 from fingervision.storage.recorded_video import TICKS_PER_S
 
@@ -12,7 +12,7 @@ class Timeline:
     Parameters
     ----------
     started_s : float
-        The host's monotonic clock at the start.
+        Reading of the computer's monotonic clock at the start.
     """
 
     def __init__(self, started_s: float) -> None:
@@ -25,19 +25,19 @@ class Timeline:
         self._offset_s = None
 
     def at(self, source_s: float, arrived_s: float) -> tuple[float, float]:
-        """Place a frame.
+        """Compute the time of a frame in the live view.
 
         Parameters
         ----------
         source_s : float
-            On the source's clock.
+            Time of the frame by the clock of the source.
         arrived_s : float
-            On the host's.
+            Time of arrival by the computer's clock.
 
         Returns
         -------
         time_s, jump_s : float
-            Time since the start, a whole number of microseconds; how far the source's clock jumped, 0 as a rule.
+            Time since the start, a whole number of microseconds; jump of the source's clock, usually 0.
         """
         jump_s = 0.0
         if self._last is not None and self._offset_s is not None:
@@ -56,5 +56,5 @@ class Timeline:
         return time_s, jump_s
 
     def on_this(self, source_s: float) -> float:
-        """Convert another time of the source, that of a packet, to the live view's time."""
+        """Convert another time of the source, such as that of a packet, to the time of the live view."""
         return round((source_s + (self._offset_s or 0.0)) * TICKS_PER_S) / TICKS_PER_S

@@ -1,4 +1,4 @@
-"""Protocol of what the page shows: a continuous source, or a recording; both have the same interface."""
+"""Protocol of the views that the browser page can show: a live measurement or a recording."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ class View(Protocol):
     choices : Choices
         Settings that the user chose.
     features : dict
-        Additions to the measurement (a model, a bed) by name, where the commands of that topic find them.
+        Additions to the measurement (a model, a test bed) by name, for the commands of each topic.
     """
 
     out: Path
@@ -31,32 +31,32 @@ class View(Protocol):
 
     @property
     def identity(self) -> str:
-        """A number that changes when rows are counted from the beginning."""
+        """Number that changes when the numbering of rows starts again."""
         ...
 
     @property
     def description(self) -> Description:
-        """The source."""
+        """Description of the source."""
         ...
 
     @property
     def seen(self) -> Seen | None:
-        """The picture that is shown."""
+        """The displayed frame with its result."""
         ...
 
     @property
     def messages(self) -> deque[Message]:
-        """The latest messages."""
+        """The most recent messages."""
         ...
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether previews should not be drawn now."""
+        """Whether the measurement lags behind, so that previews should not be rendered."""
         ...
 
     @property
     def table(self) -> Path | None:
-        """The complete table as a file, where there is one."""
+        """File of the complete table; None if there is none."""
         ...
 
     @property
@@ -66,16 +66,16 @@ class View(Protocol):
 
     @property
     def oldest_row(self) -> int:
-        """Number of the first row that is still kept."""
+        """Number of the oldest row that is still stored."""
         ...
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row sent to a page that has none."""
+        """Number of the first row that is sent to a new page."""
         ...
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from number `first` up to but excluding `last`."""
+        """Rows with numbers from `first` to `last` - 1."""
         ...
 
     def choose(self, **changes: Any) -> None:
@@ -87,5 +87,5 @@ class View(Protocol):
         ...
 
     def state(self) -> dict[str, Any]:
-        """State of source and measurement, for the page."""
+        """Return the state of source and measurement, for the browser page."""
         ...

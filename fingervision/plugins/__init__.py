@@ -1,4 +1,4 @@
-"""Plug-ins: parts that other distributions and single files add, found, checked and listed with where they come from.
+"""Plug-ins: parts added by other distributions or single files, which are found, checked and listed with their origin.
 
-README.md beside this file says what an author of a plug-in must know.
+README.md in the folder of this package is the guide for authors of plug-ins.
 """

@@ -1,4 +1,4 @@
-"""An entry of a registry: a part with its origin, or a plug-in that was left out with the reason."""
+"""Entries of a registry: a part with its origin, or a plug-in that cannot be used with the reason."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -19,16 +19,16 @@ class Entry(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A plug-in that was left out.
+    """A plug-in that cannot be used.
 
     Parameters
     ----------
     name : str
-        As its distribution registers it.
+        Name under which the distribution registers the plug-in.
     origin : Origin
-        Where it comes from.
+        Origin of the plug-in.
     sentence : str
-        Why, and what to do.
+        Sentence that states the reason and what to do.
     """
 
     name: str

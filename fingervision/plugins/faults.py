@@ -1,10 +1,10 @@
-"""Error classes of plug-ins; each message names the plug-in and says what to do."""
+"""Error classes of plug-ins; each message names the plug-in and states what to do."""
 
 from fingervision.domain.errors import FingervisionError, UsageError
 
 
 class PluginError(FingervisionError):
-    """A plug-in cannot be used; all other plug-ins and parts still can."""
+    """A plug-in cannot be used; all other plug-ins and parts can still be used."""
 
 
 class PluginImportError(PluginError):
@@ -16,7 +16,7 @@ class PluginTimeoutError(PluginError):
 
 
 class PluginShapeError(PluginError):
-    """A plug-in is not what its group requires: another type, a missing method, or an array of another shape."""
+    """A plug-in does not meet the requirements of its group: wrong type, missing method, or array of wrong shape."""
 
 
 class PluginNameError(PluginError):
@@ -24,12 +24,12 @@ class PluginNameError(PluginError):
 
 
 class PluginVersionError(PluginError):
-    """A plug-in needs another version of fingervision than this one."""
+    """A plug-in needs another version of fingervision than the installed version."""
 
 
 class MisfitError(ValueError):
-    """The second part of a sentence that begins with a plug-in's name: `must ..., but ...`, without a full stop."""
+    """A part is invalid; the message completes a sentence after the plug-in's name: `must ..., but ...`."""
 
 
 class PluginFileError(UsageError):
-    """The plug-in file does not exist, or holds nothing that can be plugged in."""
+    """The plug-in file does not exist, or defines no part."""

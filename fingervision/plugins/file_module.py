@@ -21,7 +21,7 @@ def check_file(path: Path, what: str) -> Origin:
     path : Path
         The file.
     what : str
-        What it is to hold, for the sentence: `effects`, `an actuator`.
+        Expected content for the error message, such as `effects` or `an actuator`.
 
     Raises
     ------
@@ -48,16 +48,16 @@ def check_file(path: Path, what: str) -> Origin:
 
 
 def needs(who: str, specifier: str) -> str:
-    """Return the error for something that needs another version of fingervision."""
+    """Return the error for a plug-in that needs another version of fingervision."""
     from fingervision import __version__
 
     return f"{who} needs fingervision {specifier}, but this is {__version__}: install the version that it asks for."
 
 
 def load_file(path: Path) -> ModuleType:
-    """Import a file under a module name of its own, so that two files of the same name do not collide.
+    """Import a file under a unique module name, so that two files of the same name do not collide.
 
-    A file whose content has changed is imported anew.
+    A file whose content has changed is imported again.
     """
     whole = path.resolve()
     digest = hashlib.sha256(f"{whole}\n".encode() + whole.read_bytes()).hexdigest()[:16]

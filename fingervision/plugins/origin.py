@@ -1,18 +1,18 @@
-"""Origin of a part: the package itself, another distribution, a file, or this session."""
+"""Origin of a part: this package, another distribution, a file, or the present session."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a part comes from.
+    """Origin of a part.
 
     Parameters
     ----------
     words : str
-        As listed: `built in`, `fv-creeping-foot 1.2`, `./mine.py`, `this session`.
+        Origin as listed: `built in`, `fv-creeping-foot 1.2`, `./mine.py`, `this session`.
     remedy : str
-        What a user can do to be without the part, as the end of a sentence.
+        Action by which a user can remove the part, as the end of a sentence.
     """
 
     words: str
@@ -20,7 +20,7 @@ class Origin:
 
     @property
     def built_in(self) -> bool:
-        """Whether it is part of the package."""
+        """Whether the part is built in."""
         return self is BUILT_IN
 
     def __str__(self) -> str:

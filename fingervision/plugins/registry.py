@@ -1,7 +1,7 @@
-"""One registry for every kind of part: built-in files, entry points of other distributions, files, this session.
+"""Registry of parts of one kind: built-in modules, entry points of other distributions, files, the present session.
 
-Built-in parts are the modules of a package. A part from elsewhere is imported when it is first requested, under a time
-limit, and checked. One that cannot be used is left out with a sentence, and does not affect the others.
+Built-in parts are the modules of a package. Any other part is imported when it is first requested, under a time limit,
+and checked. A part that cannot be used is omitted and reported with a sentence, and does not affect other parts.
 """
 
 import logging
@@ -37,15 +37,15 @@ class Registry(Generic[T]):
     group : str
         Group of entry points: `fingervision.effects`.
     noun : str
-        What one is called in a sentence: `effect`.
+        Word for a part of this kind in messages, such as `effect`.
     built_in : callable
-        Gives the names of the built-in parts, in order, without importing them.
+        Function that returns the names of the built-in parts, in order, without importing them.
     load : callable
-        Imports a built-in part by its name.
+        Function that imports a built-in part by its name.
     parts_of : callable
-        Gives the parts by name that an imported object or module holds, in order (one without a name of its own under
-        the empty name: it has the one under which it is registered); raises MisfitError where it is not
-        what the group asks for. It runs within the time limit.
+        Function that returns the parts in an imported object or module by name, in order; it raises MisfitError if the
+        requirements of the group are not met, and runs within the time limit. A part without a name is returned under
+        the empty name, and is then known by the name under which it is registered.
     """
 
     def __init__(
@@ -71,18 +71,18 @@ class Registry(Generic[T]):
 
     @property
     def version(self) -> int:
-        """A counter that increases whenever the parts may have changed."""
+        """Counter that increases whenever the parts may have changed."""
         return self._version
 
     def names(self) -> tuple[str, ...]:
-        """List the names of all parts: built in, installed, added. Nothing is imported."""
+        """List the names of all built-in, installed and added parts, without an import."""
         found = dict.fromkeys(
             (*self._built_in(), *(p.name for p in self._entry_points()), *(e.name for e in self._added))
         )
         return tuple(name for name in found if not any(name == refused for refused, _ in self._refused))
 
     def get(self, name: str) -> Entry[T]:
-        """Return one part; only this one is imported.
+        """Return one part; no other part is imported.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Registry(Generic[T]):
         return found
 
     def entries(self) -> tuple[Entry[T], ...]:
-        """Import all parts, and return those that can be used: built in, installed, added."""
+        """Import all built-in, installed and added parts, and return those that can be used."""
         own = [self.get(name) for name in self._built_in()]
         if importing():
             return tuple(own)
@@ -116,12 +116,12 @@ class Registry(Generic[T]):
         return (*own, *(entry for entry in installed if entry is not None), *self._added)
 
     def refusals(self) -> tuple[Refusal, ...]:
-        """Import all installed plug-ins, and list those that are left out, each with its sentence."""
+        """Import all installed plug-ins, and list those that cannot be used, each with the reason."""
         self.entries()
         return tuple(self._refused.values())
 
     def add(self, name: str, value: T, origin: Origin = SESSION) -> None:
-        """Add a part for this process; the same object counts once, and another one of this session is replaced.
+        """Add a part for this process; an earlier part of this session with the same name is replaced.
 
         Raises
         ------
@@ -146,11 +146,11 @@ class Registry(Generic[T]):
         Parameters
         ----------
         held : object
-            A part, or a module that holds some.
+            A part, or a module that contains parts.
         who : str
-            How a sentence about it begins.
+            Beginning of an error message, which names the object.
         origin : Origin
-            Where it comes from.
+            Origin of the object.
 
         Raises
         ------
@@ -160,7 +160,7 @@ class Registry(Generic[T]):
         return watched(who, origin, lambda: self._parts_of(held))
 
     def remove(self, name: str) -> None:
-        """Remove a part that was added; nothing happens where there is none."""
+        """Remove an added part; nothing happens if no such part was added."""
         self._added = [entry for entry in self._added if entry.name != name]
         self._version += 1
 
@@ -182,7 +182,7 @@ class Registry(Generic[T]):
 
     @contextmanager
     def with_files(self, paths: tuple[Path, ...]) -> Iterator[None]:
-        """Add the parts of some files while a `with` block lasts."""
+        """Add the parts defined in files for the duration of a `with` block."""
         before = list(self._added)
         try:
             for path in {path.resolve(): path for path in reversed(paths)}.values():  # a file named twice counts once
@@ -208,7 +208,7 @@ class Registry(Generic[T]):
         return _origin(self._points_of(name)[0])
 
     def _of_points(self, points: list[EntryPoint]) -> Entry[T] | None:
-        """Return what the entry points of one name refer to; None where it is left out."""
+        """Return the part to which the entry points of one name refer; None if it cannot be used."""
         name = points[0].name
         if name in self._loaded and not self._loaded[name].origin.built_in:
             return self._loaded[name]

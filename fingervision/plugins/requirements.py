@@ -1,4 +1,4 @@
-"""Which fingervision a plug-in needs: as its distribution states it, or a file's inline script metadata (PEP 723)."""
+"""Required versions of fingervision, stated by a plug-in's distribution or by inline script metadata (PEP 723)."""
 
 import re
 import tomllib
@@ -13,13 +13,13 @@ SCRIPT = re.compile(r"(?m)^# /// script\s*$\s(?P<content>(?:^#(?:| .*)$\s)+?)^# 
 def unmet(requires: Iterable[str]) -> str | None:
     """Return the first requirement on fingervision that this version does not meet, such as `>=0.9`.
 
-    None if it meets all.
+    Return None if all requirements are met.
 
     Parameters
     ----------
     requires : iterable of str
-        Requirements as in PEP 508 (`fingervision>=0.2`); those on other distributions, and what is no requirement, are
-        the installer's affair.
+        Requirements as in PEP 508 (`fingervision>=0.2`); requirements on other distributions and invalid requirements
+        are ignored here.
     """
     from packaging.requirements import InvalidRequirement, Requirement
 
@@ -39,7 +39,7 @@ def unmet(requires: Iterable[str]) -> str | None:
 
 
 def stated_in(source: str) -> tuple[str, ...]:
-    """Read the requirements in a file's inline script metadata; empty where it has none or they are not TOML."""
+    """Read the requirements in a file's inline script metadata; empty if there are none or they are not valid TOML."""
     found = SCRIPT.search(source)
     if found is None:
         return ()

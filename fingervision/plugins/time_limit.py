@@ -1,4 +1,4 @@
-"""Run foreign code under a time limit."""
+"""Run the code of plug-ins under a time limit."""
 
 import ctypes
 import os
@@ -23,7 +23,7 @@ class OutOfTimeError(Exception):
 
 
 class _EndNow(BaseException):
-    """Raised inside code that exceeds its time limit; not an `Exception`, so that no `except Exception` catches it."""
+    """Raised inside code beyond its time limit; not an `Exception`, so that `except Exception` does not catch it."""
 
 
 def longest_s() -> float:
@@ -47,17 +47,17 @@ def longest_s() -> float:
 
 
 def within(seconds: float, act: Callable[[], T]) -> T:
-    """Run a function in a thread of its own under a time limit, and return its result.
+    """Run a function in a separate thread under a time limit, and return the function's result.
 
     Code that still runs at its time limit is ended by an exception raised inside it. Code that waits inside a compiled
-    function cannot be ended in this way: it goes on in the background and does not keep the program from ending.
+    function cannot be ended in this way; it continues in the background and does not prevent the program from ending.
 
     Parameters
     ----------
     seconds : float
-        Longest time.
+        Time limit.
     act : callable
-        Without arguments.
+        Function without arguments.
 
     Raises
     ------

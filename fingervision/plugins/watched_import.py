@@ -1,4 +1,4 @@
-"""Import foreign code within a time limit, and report in one sentence what went wrong."""
+"""Import the code of plug-ins within a time limit, and report a failure in one sentence."""
 
 import threading
 from collections.abc import Callable
@@ -24,16 +24,16 @@ def importing() -> bool:
 
 
 def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
-    """Run foreign code within its time limit, and turn whatever it raises into a plug-in error of one sentence.
+    """Run a plug-in's code within its time limit, and convert any exception to a plug-in error of one sentence.
 
     Parameters
     ----------
     who : str
-        How the sentence begins: `The effect sticky of fv-demo 1.2`.
+        Beginning of the sentence, such as `The effect sticky of fv-demo 1.2`.
     origin : Origin
-        Where it comes from: what to do about it.
+        Origin of the plug-in, which determines the advice in the message.
     act : callable
-        Imports and checks it.
+        Function that imports and checks the plug-in.
 
     Raises
     ------

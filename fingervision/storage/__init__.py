@@ -1,1 +1,1 @@
-"""Reading and writing of every file format."""
+"""Reading and writing of all data files: tables, drawings, settings, runs and results."""

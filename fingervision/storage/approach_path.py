@@ -1,4 +1,4 @@
-"""The path that an axis travelled between readings at targets, from the direction of approach of each reading."""
+"""Reconstruct the path of an axis between readings at target positions, from the direction of approach of each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ no target is approached over a longer way than its neighbours."""
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A reading at a target: position (None: missing), direction (+1 from below, -1 from above), cycle, time."""
+    """One reading at a target: position (None if missing), direction (+1 from below, -1 from above), cycle, time."""
 
     target_mm: float
     position_mm: float | None
@@ -32,7 +32,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class PathRow:
-    """A row of a measured table; a row without a gap only belongs to the path of the input."""
+    """A row of a measured table; a row without a gap is only a point on the path of the input."""
 
     input_mm: float
     gap_mm: float | None
@@ -42,19 +42,19 @@ class PathRow:
 
 
 def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tuple[str, ...]]:
-    """Put readings into the order of travel, with an extra row beyond the target wherever the path has been there.
+    """Sort readings in the order of travel, and add a row beyond a target wherever the axis must have overshot it.
 
     Parameters
     ----------
     readings : sequence of Reading
-        In any order, each target once a run, cycle and side.
+        Readings in any order; each target occurs once per run, cycle and direction.
 
     Returns
     -------
     rows : tuple of PathRow
-        Runs one after the other, times rising within each.
+        Rows, run after run, with increasing times within each run.
     notes : tuple of str
-        What was assumed, a sentence each.
+        Assumptions that were made, one sentence each.
     """
     timed = all(reading.time_s is not None for reading in readings)
     notes = []
@@ -95,7 +95,7 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
 
 
 def _against(ordered: Sequence[Reading]) -> tuple[int, int]:
-    """Number of moves to another target that contradict the direction stated there, and number of all moves."""
+    """Number of moves between targets that contradict the stated direction of approach, and number of all moves."""
     moves = [(b.target_mm - a.target_mm) * b.side for a, b in pairwise(ordered) if a.run == b.run]
     return sum(move < 0.0 for move in moves), sum(move != 0.0 for move in moves)
 
@@ -105,12 +105,12 @@ def _time(reading: Reading) -> float:
 
 
 def _travel(reading: Reading) -> tuple[int, int, float]:
-    """Sort key: cycle, from below before from above, in the direction of travel."""
+    """Sort key: cycle, then approaches from below before those from above, then the direction of travel."""
     return reading.cycle, -reading.side, reading.side * reading.target_mm
 
 
 def _with_overshoots(ordered: Sequence[Reading], beyond: float, timed: bool) -> tuple[list[PathRow], list[float]]:
-    """Rows of a run and their times; an added row is halfway in time between its neighbours."""
+    """Rows of a run with their times; the time of an added row is the mean of the neighbouring times."""
     path: list[PathRow] = []
     times: list[float] = []
     clock = [_time(reading) for reading in ordered]

@@ -1,4 +1,4 @@
-"""Arithmetic in drawings: lengths that are computed from other lengths by name."""
+"""Arithmetic expressions in drawings: numbers that are computed from named lengths."""
 
 import ast
 import math
@@ -25,16 +25,16 @@ LARGEST = 1e5
 
 
 def number(raw: Any, names: Mapping[str, float], what: str) -> float:
-    """Read a number, or an expression of numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg.
+    """Read a number, or evaluate an expression of numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg.
 
     Parameters
     ----------
     raw : object
-        As the file has it.
+        The value as read from the file.
     names : mapping of str to float
-        What names stand for.
+        Values of the names that an expression may contain.
     what : str
-        The number and its file, for errors.
+        Description of the number and its file, for error messages.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""The file bodies.csv: poses of a mechanism's bodies and angles of its hinges by frame.
+"""The file bodies.csv: poses of a mechanism's bodies and angles of its hinges in every video frame.
 
-The same columns in gaps.csv.
+This module also adds such columns to gaps.csv.
 """
 
 import csv
@@ -22,7 +22,7 @@ PARTS = ("x_mm", "y_mm", "angle_mrad")
 
 
 def write_bodies(path: Path, poses: Sequence[FramePoses]) -> None:
-    """Write bodies.csv; an empty cell means no value."""
+    """Write bodies.csv; empty cells represent missing values."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
@@ -47,16 +47,16 @@ def _cells(pose: SeenPose) -> list[str]:
 
 
 def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, str]) -> None:
-    """Add the poses of every frame to its row of gaps.csv, as channels that compare and diagnose read.
+    """Add the poses in every frame to the frame's row of gaps.csv, as channels for `compare` and `diagnose`.
 
     Parameters
     ----------
     gaps : Path
-        gaps.csv of the same recording.
+        The file gaps.csv of the same recording.
     poses : sequence of FramePoses
-        Of every frame.
+        Poses in every frame.
     names : mapping of str to str
-        Bodies and hinges that become channels, and what their columns are called.
+        Names of the bodies and hinges that become channels, with the names of their columns.
 
     Raises
     ------

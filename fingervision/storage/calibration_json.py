@@ -1,4 +1,4 @@
-"""The file calibration.json: a scale with its covariance, its budget and the references from which it was made."""
+"""The file calibration.json: a scale with its covariance, its uncertainty budget and its reference objects."""
 
 import json
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ SAME_U = 0.01
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:
-    """Write a calibration; a failure leaves no incomplete file.
+    """Write a calibration; if writing fails, no incomplete file remains.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def _no_constant(name: str) -> NoReturn:
 
 
 class _Reader:
-    """Content of a file, with error messages for invalid parts."""
+    """Reader of the values of a calibration file, with error messages for invalid values."""
 
     def __init__(self, path: Path, content: object) -> None:
         self._path = path

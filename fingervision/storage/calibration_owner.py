@@ -1,4 +1,4 @@
-"""Ownership of a calibration's file and pictures: an older calibration is replaced, any other file is not."""
+"""Protection of files against overwriting: a calibration may replace only an older calibration and its pictures."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ def refuse_foreign(out: Path) -> None:
 
 
 def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
-    """Write a calibration picture, of red, green and blue, beside the calibration.
+    """Write a picture of a calibration (an RGB array) beside the calibration's file.
 
     Raises
     ------

@@ -19,7 +19,7 @@ NO_CHANNELS = ("held_mm", "target_mm", "encoder_mm", "u_force_n")
 
 
 def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:
-    """Select the columns of a header that are channels, and the `u_` columns that belong to one."""
+    """Select from a table's header the names of channels, and of `u_` columns that belong to a channel."""
     found = [
         name
         for name in names
@@ -29,14 +29,14 @@ def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:
 
 
 def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers], list[str]]:
-    """Read the channels of a table in the project's own format; one without numbers is omitted with a note.
+    """Read the channels of a table in fingervision's own format; a channel without numbers is omitted with a note.
 
     Parameters
     ----------
     path : Path
-        The table, whose other columns were read already.
+        The table, whose other columns have already been read.
     taken : collection of str
-        Names that mean something else.
+        Names of columns that have another meaning.
     """
     names = header_of(path)
     wanted = [name for name in channel_names(names, taken) if names.count(name) == 1]
@@ -54,7 +54,7 @@ def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers
 
 
 def channels_of(values: Mapping[str, Numbers], rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> dict[str, Channel]:
-    """Select the kept rows of channels, in order; `u_` columns that are no valid uncertainties are omitted."""
+    """Select given rows of channels in the given order; `u_` columns without valid uncertainties are omitted."""
     found = {}
     for name, numbers in values.items():
         if name.startswith("u_") or not numbers.present[rows].any():

@@ -1,4 +1,4 @@
-"""Columns of a CSV table with units in their names: comma, decimal point, `#` comments, empty cells."""
+"""Read columns of a CSV table in fingervision's own format (commas, decimal points, `#` comments, units in names)."""
 
 import csv
 import difflib
@@ -19,7 +19,7 @@ CHUNK_LINES = 1000
 
 
 def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) -> dict[str, list[str]]:
-    """Read the known columns as text, by name; other columns are ignored.
+    """Read the cells of known columns as text, by column name; other columns are ignored.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
 
 
 def header_of(path: Path) -> list[str]:
-    """Names of the columns of a table.
+    """Read the names of a table's columns.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def header_of(path: Path) -> list[str]:
 
 
 def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str, list[str]] | None:
-    """Read columns of a table without quotes, several times faster; None where a row needs the ordinary reader."""
+    """Read columns of a table without quotes by a faster method; None if a row needs the general reader."""
     if '"' in text:
         return None
     lines = text.splitlines()
@@ -89,14 +89,14 @@ def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str,
 
 
 def _reader(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Rows with their numbers, without comments and empty rows."""
+    """Iterate over rows with their row numbers, without comments and empty rows."""
     for number, cells in enumerate(_cells(path, text), start=1):
         if cells and not cells[0].lstrip().startswith("#") and any(map(str.strip, cells)):
             yield number, cells
 
 
 def read_block(path: Path) -> dict[str, NDArray[np.float64]] | None:
-    """Read a large table of numbers only, by name; None where it contains anything else.
+    """Read a large table that contains only numbers, by column name; None if it contains anything else.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def _cells(path: Path, text: str) -> Iterator[list[str]]:
 
 
 def number(path: Path, name: str, row: int, cell: str) -> float | None:
-    """Read a cell as a finite number, or None where it is empty."""
+    """Read a cell as a finite number; None if the cell is empty."""
     if not cell:
         return None
     try:

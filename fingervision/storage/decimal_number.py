@@ -1,4 +1,4 @@
-"""Numbers in tables: decimal, in ASCII.
+"""Read decimal numbers in tables, written in ASCII characters.
 
 Python's own conversion would also accept 1_0 as 10, and digits of other scripts.
 """
@@ -29,6 +29,6 @@ def decimal_number(cell: str) -> float:
 
 
 def are_decimal(cells: Iterable[str]) -> bool:
-    """Whether the cells, if Python can convert them, are decimal numbers as in tables."""
+    """Whether cells that Python can convert to numbers are also decimal numbers in a notation used in tables."""
     joined = "".join(cells)
     return "_" not in joined and joined.isascii()

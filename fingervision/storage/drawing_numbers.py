@@ -1,4 +1,4 @@
-"""Numbers in a drawing's tables by dotted name: read with their uncertainty, and changed.
+"""Numbers in the tables of a drawing, addressed by dotted names: read their uncertainties, and change numbers.
 
 A number may be written `{ value = 1.0, u = 0.1 }`, with its standard uncertainty, wherever a number or an expression is
 allowed. Repeated sections are addressed by their name, or by their position from 1: `flexure.left.thickness_mm`,
@@ -18,21 +18,21 @@ _KEYS = frozenset({"value", "u"})
 
 
 def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return a drawing's tables without uncertainties.
+    """Separate the tables of a drawing from the uncertainties stated in them.
 
     Parameters
     ----------
     tables : mapping
-        As TOML has them.
+        Tables of the drawing as read from TOML.
     origin : str
-        The file, for errors.
+        Name of the file, for error messages.
 
     Returns
     -------
     tables : dict
-        With bare numbers in place of those that state an uncertainty.
+        Copy of the tables in which a number with an uncertainty is replaced by the number alone.
     uncertainties : dict of str to float
-        Positive standard uncertainties by dotted name, each in its number's own unit.
+        Positive standard uncertainties by dotted name, each in the unit of its number.
 
     Raises
     ------
@@ -67,13 +67,13 @@ def changed_tables(
     Parameters
     ----------
     tables : mapping
-        With bare numbers.
+        Tables of the drawing with plain numbers.
     changes : mapping of str to float
-        By dotted name: how much is added, or the number itself.
+        Amount to add, or the new value (if `absolute`), by dotted name.
     origin : str
-        The file, for errors.
+        Name of the file, for error messages.
     absolute : bool
-        Whether the numbers are replaced.
+        Whether the numbers are replaced instead of changed by an amount.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def numbers_of(tables: Mapping[str, Any]) -> dict[str, float | str]:
 
 
 def _walk(tables: Mapping[str, Any]) -> Iterator[tuple[str, Path, Any]]:
-    """Every number, expression or uncertain number: its dotted name, its path and its content."""
+    """Iterate over all numbers, expressions and uncertain numbers, with dotted name, key path and content."""
     yield from _walk_in(tables, "", ())
 
 

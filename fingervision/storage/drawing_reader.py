@@ -1,4 +1,4 @@
-"""Reader of a drawing's tables: every error names the file and the number, what it must be and what it is."""
+"""Reader of a drawing's tables; every error names the file and the number, and states the expected and found value."""
 
 import difflib
 from collections.abc import Mapping
@@ -9,19 +9,19 @@ from fingervision.storage.arithmetic import number
 
 
 def as_table(raw: Any, what: str) -> Mapping[str, Any]:
-    """Check that a value is a table."""
+    """Return a value if it is a TOML table; otherwise raise an error."""
     if not isinstance(raw, dict):
         raise DataError(f"{what} must be a table, but is {raw!r}.")
     return raw
 
 
 class DrawingReader:
-    """Reads numbers of a drawing, which may refer to its [lengths], with errors in sentences.
+    """Reads the numbers of a drawing, which may be expressions of names in its section [lengths].
 
     Parameters
     ----------
     lengths : mapping of str to float
-        What names stand for.
+        Values of the names defined in [lengths].
     origin : str
         The file, for errors.
     """
@@ -30,28 +30,28 @@ class DrawingReader:
         self.lengths, self.origin = lengths, origin
 
     def sections(self, tables: Mapping[str, Any], name: str, least: int = 1) -> list[Mapping[str, Any]]:
-        """Tables of one name, in order."""
+        """Return the tables `[[name]]` of the drawing, in order."""
         raw = tables.get(name, [])
         if not isinstance(raw, list) or len(raw) < least:
             raise DataError(f"{self.origin} must have [[{name}]] sections, at least {least}, but has {raw!r}.")
         return [as_table(table, f"[[{name}]] in {self.origin}") for table in raw]
 
     def known(self, table: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:
-        """Refuse unknown keys."""
+        """Refuse a table with unknown keys."""
         for key in table:
             if key not in keys:
                 near = difflib.get_close_matches(key, keys, 1, cutoff=0.0)[0]
                 raise DataError(f"{what} in {self.origin} has an unknown key, {key}; did you mean {near}?")
 
     def value(self, table: Mapping[str, Any], key: str, what: str) -> float:
-        """One number or expression."""
+        """Read one number or expression."""
         name = f"{what}.{key}" if what else key
         if key not in table:
             raise DataError(f"{self.origin} must state {name}, but does not.")
         return number(table[key], self.lengths, f"{name} in {self.origin}")
 
     def positive(self, table: Mapping[str, Any], key: str, what: str) -> float:
-        """One positive number."""
+        """Read one positive number."""
         value = self.value(table, key, what)
         if value <= 0.0:
             name = f"{what}.{key}" if what else key
@@ -59,16 +59,16 @@ class DrawingReader:
         return value
 
     def numbers(self, table: Mapping[str, Any], key: str, count: int, what: str) -> tuple[float, ...]:
-        """A list of `count` numbers."""
+        """Read a list of `count` numbers."""
         raw = table.get(key)
         if not isinstance(raw, list) or len(raw) != count:
             raise DataError(f"{what}.{key} in {self.origin} must be a list of {count} numbers, but is {raw!r}.")
         return tuple(number(part, self.lengths, f"{what}.{key} in {self.origin}") for part in raw)
 
     def grown(self, values: tuple[float, ...], what: str, *, flat: bool = False) -> tuple[float, float, float, float]:
-        """Read the sides of an upright box (x from, x to, y from, y to).
+        """Check the limits (x from, x to, y from, y to) of an axis-parallel rectangle.
 
-        Where `flat`, it has no extent along one axis.
+        With `flat`, width and height may be zero.
         """
         x0, x1, y0, y1 = values
         fine = x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0

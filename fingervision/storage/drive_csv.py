@@ -1,4 +1,4 @@
-"""drive.csv: the recorded input, `time_s,input_mm[,run][,force_n]`."""
+"""The file drive.csv: the recorded input over time, `time_s,input_mm[,run][,force_n]`."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -61,13 +61,13 @@ def drive_rows(
     Parameters
     ----------
     path : Path
-        Where they come from, for sentences.
+        File of the columns, for error messages.
     values : mapping of str to ndarray of float, shape (n,)
-        `time_s`, `input_mm` and, where it was recorded, `force_n`.
+        Columns `time_s`, `input_mm` and, if recorded, `force_n`.
     runs : tuple of str, length n, or None
         Name of the run of each row.
     lines : sequence of int, length n
-        Line of the file that each row stands in.
+        Line number in the file of each row.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def drive_rows(
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Rows with their line numbers, without comments and empty lines."""
+    """Iterate over rows with their line numbers, without comments and empty lines."""
     if path.exists() and not path.is_file():
         raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:

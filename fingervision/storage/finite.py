@@ -4,7 +4,7 @@ from math import isfinite
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is an integer or floating-point number within a float's range: no nan, no infinity."""
+    """Whether a value is an integer or floating-point number in the range of floats, and neither NaN nor infinite."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:

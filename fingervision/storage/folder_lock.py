@@ -1,4 +1,4 @@
-"""Lock of a folder for one program, which the system releases when the program ends in any way."""
+"""Lock that reserves a folder for one program; the operating system releases it when the program ends in any way."""
 
 import os
 from contextlib import suppress
@@ -16,7 +16,7 @@ except ImportError:  # not on Windows, where an open file is locked as it is
 
 
 class FolderLock:
-    """Holds a folder.
+    """Exclusive lock of a folder.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class FolderLock:
             return False
 
     def remove(self) -> None:
-        """Release the lock, and delete its file."""
+        """Release the lock, and delete the lock file."""
         if self._file >= 0:
             with suppress(OSError):
                 self._path.unlink()

@@ -1,4 +1,4 @@
-"""Gaps in a gaps.csv as repeated readings of parts, for a gauge study (repeatability and reproducibility)."""
+"""Gaps of a gaps.csv as repeated readings of parts, for a gauge repeatability and reproducibility study."""
 
 import csv
 from math import isfinite
@@ -13,14 +13,15 @@ SAME_INPUT_PLACES = 3
 
 
 def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[float]]:
-    """Read the gaps of all frames that have one.
+    """Read the gaps of all video frames that have a gap.
 
     Parameters
     ----------
     path : Path
         A gaps.csv.
     by_input : bool
-        Whether every input of the drive is a part of its own; otherwise the recording shows one part, named None.
+        Whether each different input of the drive counts as a separate part; otherwise the recording shows a single
+        part, named None.
 
     Raises
     ------

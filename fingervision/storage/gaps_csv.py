@@ -1,4 +1,4 @@
-"""The file gaps.csv: one row per frame, written during the measurement, valid whenever the program is stopped."""
+"""The file gaps.csv: one row per video frame, written during the measurement and valid at any interruption."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -22,36 +22,36 @@ TIME_PLACES, PX_PLACES, MM_PLACES, FORCE_PLACES = 9, 5, 7, 6
 
 @dataclass(frozen=True, slots=True)
 class GapRow:
-    """One row of gaps.csv; None means an empty cell.
+    """One row of gaps.csv; None is written as an empty cell.
 
     Parameters
     ----------
     frame : int
-        Place in the recording, from 0.
+        Number of the video frame in the recording, from 0.
     time_s : float or None
-        Presentation time.
+        Presentation time of the frame.
     status : Status
-        Whether there is a number, and if not, why.
+        Whether the frame has a gap, and if not, the reason.
     gap_mm, u_gap_mm, u_random_mm : float or None
-        Gap, its standard uncertainty with the whole budget, and the random part alone.
+        Gap, its standard uncertainty with all contributions of the budget, and the random part of this uncertainty.
     gap_px, u_gap_px : float or None
         Gap in the picture and its random standard uncertainty.
     left_x_px, left_y_px, right_x_px, right_y_px : float or None
-        The measuring points.
+        Coordinates of the two measuring points in the picture.
     left_tip_px, right_tip_px : float or None
-        Tips along the fingers' axis.
+        Coordinates of the tips along the fingers' axis.
     left_mm, right_mm : float or None
-        Measuring points across the fingers, from the picture's middle.
+        Coordinates of the measuring points across the fingers, from the centre of the picture.
     u_shift_px : float or None
-        Standard uncertainty of `gap_px` for what the picture leaves open in every frame alike.
+        Standard uncertainty of `gap_px` from systematic effects in the picture, equal in every frame.
     fingers : str
-        `dark` or `light` on their ground; empty where there is no number.
+        `dark` or `light`: brightness of the fingers relative to the background; empty without a gap.
     held_px, held_mm : float or None
-        Width of a part that is held between the fingers.
+        Width of a part held between the fingers.
     run : str
-        Run of the drive that the frame belongs to; empty where none.
+        Run of the drive to which the frame belongs; empty if there is none.
     input_mm, force_n : float or None
-        The drive at the frame's time.
+        Input displacement and force of the drive at the frame's time.
     """
 
     frame: int
@@ -88,9 +88,9 @@ class GapsCsv:
     Parameters
     ----------
     path : Path
-        The file; replaced if there is one.
+        The file; an existing file is replaced.
     drive_columns : tuple of str
-        () or ("run", "input_mm") or ("run", "input_mm", "force_n").
+        Columns for the drive: () or ("run", "input_mm") or ("run", "input_mm", "force_n").
 
     Raises
     ------
@@ -115,7 +115,7 @@ class GapsCsv:
         self._file.add([self._line(row) for row in rows])
 
     def close(self) -> None:
-        """Write pending rows and close; closing twice is allowed."""
+        """Write pending rows and close the file; closing twice is allowed."""
         self._file.close()
 
     def _line(self, row: GapRow) -> str:
@@ -157,24 +157,25 @@ class Driven(Protocol):
 
     @property
     def input_mm(self) -> float:
-        """Input displacement."""
+        """Input displacement of the drive (mm)."""
 
     @property
     def force_n(self) -> float | None:
-        """Force (N); None where it was not recorded."""
+        """Force at the drive (N); None if not recorded."""
 
 
 def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force: bool) -> None:
-    """Fill the drive's columns of a finished table, line by line.
+    """Fill the columns of the drive in a finished table, line by line.
 
     Parameters
     ----------
     path : Path
-        gaps.csv with the columns run, input_mm and, with `has_force`, force_n at its end; replaced when it is whole.
+        A gaps.csv whose last columns are run, input_mm and, with `has_force`, force_n; the file is replaced once the
+        new table is complete.
     state : callable
-        The drive at a frame's time; None where it was not recorded.
+        Function that returns the state of the drive at a frame's time; None if the drive was not recorded at that time.
     has_force : bool
-        Whether there is a column force_n.
+        Whether the table has a column force_n.
 
     Raises
     ------

@@ -10,12 +10,12 @@ _NUMBERS = frozenset(each.name for each in fields(GapRow)) - {"frame", "status",
 
 
 class GapsReader:
-    """Reads the complete lines of a growing table.
+    """Reads the complete lines of a gaps.csv that is still growing.
 
     Parameters
     ----------
     path : Path
-        gaps.csv; it need not be there yet.
+        The file gaps.csv, which need not exist yet.
     """
 
     def __init__(self, path: Path) -> None:
@@ -24,7 +24,7 @@ class GapsReader:
         self._columns: tuple[str, ...] = ()
 
     def fresh(self) -> list[GapRow]:
-        """Rows that were added since the last call.
+        """Return the rows that were added since the last call.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The file gauges.csv: one row per number, frame by frame: `time_s,gauge,quantity,value,u,unit,status`."""
+"""The file gauges.csv: one row per frame and measured quantity, `time_s,gauge,quantity,value,u,unit,status`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ TIME_PLACES, PLACES = 9, 7
 
 @dataclass(frozen=True, slots=True)
 class GaugeRow:
-    """One row of gauges.csv; None means an empty cell.
+    """One row of gauges.csv; None is written as an empty cell.
 
     Parameters
     ----------
     time_s : float or None
-        Presentation time.
+        Presentation time of the frame.
     gauge, quantity : str
-        Which number.
+        Name of the gauge, and name of the quantity that it measures.
     value, u : float or None
-        The number and its standard uncertainty.
+        Measured value and its standard uncertainty.
     unit : str
-        Of both: mm, px or mrad.
+        Unit of the value and its uncertainty: mm, px or mrad.
     status : str
-        `ok`, or why there is no number.
+        `ok`, or the reason why there is no value.
     """
 
     time_s: float | None
@@ -40,7 +40,7 @@ class GaugeRow:
 
 
 class GaugeRows(list[GaugeRow]):
-    """Collects rows in memory instead of a file."""
+    """Collects rows in memory instead of writing them to a file."""
 
     def add(self, rows: Sequence[GaugeRow]) -> None:
         """Add rows, in order."""
@@ -56,7 +56,7 @@ class GaugesCsv:
     Parameters
     ----------
     path : Path
-        The file; replaced if there is one.
+        The file; an existing file is replaced.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class GaugesCsv:
         self._file.add([_line(row) for row in rows])
 
     def close(self) -> None:
-        """Write pending rows and close; closing twice is allowed."""
+        """Write pending rows and close the file; closing twice is allowed."""
         self._file.close()
 
 

@@ -1,4 +1,4 @@
-"""Writing of gauges.toml: unchanged entries keep their text and comments."""
+"""Writing of the file gauges.toml; unchanged entries keep their text and comments."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ Tables = Sequence[tuple[Mapping[str, Any], int | None]]
 
 
 def text_of(path: Path) -> str | None:
-    """Read a file's text; None where there is no file.
+    """Read the text of a gauges.toml; None if the file does not exist.
 
     Raises
     ------
@@ -41,16 +41,17 @@ def gauges_text(tables: Tables, before: str | None, schema: int) -> str:
     Parameters
     ----------
     tables : sequence of (mapping, int or None)
-        Keys of every gauge, and which table `[[gauge]]` of the text it was, from 0; None for a new one.
+        Settings of every gauge, and the index, from 0, of the gauge's table `[[gauge]]` in the previous text; None for
+        a new gauge.
     before : str or None
-        The file as it was read; None for a new one.
+        Previous text of the file; None for a new file.
     schema : int
-        Of the file.
+        Schema number of the file.
 
     Returns
     -------
     str
-        TOML that holds exactly these gauges. Comments and order of the text before are kept.
+        TOML text with exactly these gauges. Comments and order of the previous text are kept.
     """
     meant = {"schema": schema, "gauge": [dict(table) for table, _ in tables]}
     if before is not None:
@@ -64,7 +65,7 @@ def gauges_text(tables: Tables, before: str | None, schema: int) -> str:
 
 
 def _changed(tables: Tables, before: str) -> str:
-    """Replace only the changed parts, table by table, and keep the rest of the text."""
+    """Replace only the changed tables of the text, and keep the rest."""
     document = tomlkit.parse(before)
     old: Any = document["gauge"]
     kept = {place: table for table, place in tables if place is not None}
@@ -91,7 +92,7 @@ def _anew(meant: Mapping[str, Any]) -> str:
 
 
 def write_gauges_text(path: Path, text: str) -> None:
-    """Replace a file of gauges once the new one is complete.
+    """Replace a file of gauges once the new file is complete.
 
     Raises
     ------

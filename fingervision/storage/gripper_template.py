@@ -1,4 +1,4 @@
-"""A gripper.toml as a template of a mechanism: both fingers, each half with its own deviations."""
+"""A gripper.toml as template of a mechanism: both halves of the gripper, each with its own deviations."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,7 +23,7 @@ _SHARED = ("body.plate_mm", "material", "lever.l3_mm", "lever.drive")
 
 
 def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
-    """Build a mechanism whose [gripper] section names a gripper.toml, and deviations of its left and right half.
+    """Build a mechanism from a [gripper] section that names a gripper.toml and deviations of the left and right half.
 
     Keys of [gripper.left] and [gripper.right] are dotted names as in gripper.toml (`"lever.l2_mm"`), or hinge1 and
     hinge2 with thickness_mm or radius_mm; the function `redrawn` defines which other dimensions change with a number.

@@ -1,4 +1,4 @@
-"""The file gripper.toml: a gripper's drawing, with every number's unit, and its uncertainty where one is known."""
+"""The file gripper.toml: the drawing of a gripper, whose numbers have units and optional uncertainties."""
 
 import difflib
 import math
@@ -50,7 +50,7 @@ _SPELT: Mapping[str, str] = MappingProxyType(
 
 
 def read_gripper(path: Path) -> Gripper:
-    """Read and check a drawing.
+    """Read and check the drawing of a gripper.
 
     A number may be written with its standard uncertainty: `thickness_mm = {value = 1.0, u = 0.1}`.
 
@@ -75,7 +75,7 @@ def read_gripper(path: Path) -> Gripper:
 
 
 def gripper_from_tables(tables: Mapping[str, Any], origin: str) -> Gripper:
-    """Build a checked drawing from the five tables of `gripper.toml`; `origin` is named in errors."""
+    """Build and check a gripper from the five tables of `gripper.toml`; errors name the file `origin`."""
     _refuse_unknown(tables, _SECTIONS, origin, "section")
     uncertainties: dict[str, float] = {}
     parts = _read_sections(tables, _SECTIONS, origin, uncertainties)
@@ -221,13 +221,13 @@ def _check(gripper: Gripper, origin: str) -> None:
 
 
 def read_material(tables: Mapping[str, Any], origin: str) -> Material:
-    """Read the section [material], which is the same in every drawing."""
+    """Read the section [material], which has the same form in every kind of drawing."""
     section: Mapping[str, type] = {"material": Material}
     return _read_sections({"material": tables.get("material")}, section, origin, {})["material"]  # type: ignore[no-any-return]
 
 
 def check_material(material: Material, origin: str) -> None:
-    """Refuse impossible Poisson's ratios, and moduli that cannot be in MPa."""
+    """Refuse impossible Poisson's ratios, and Young's moduli whose values cannot be in MPa."""
     if material.poisson_ratio >= 0.5:
         raise DataError(f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}.")
     if not _LEAST_DENSITY <= material.density_kg_m3 <= _MOST_DENSITY:
@@ -248,7 +248,7 @@ def check_material(material: Material, origin: str) -> None:
 
 
 def _check_links(gripper: Gripper, origin: str) -> None:
-    """Refuse links without extent, for which no model can be built."""
+    """Refuse links of zero length or width, for which no model can be built."""
     links = gripper.links
     for name in ("pillar_and_root_mm", "drive_block_mm"):
         x0, x1, y0, y1 = getattr(links, name)

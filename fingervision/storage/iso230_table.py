@@ -41,13 +41,13 @@ half its travel."""
 
 @dataclass(frozen=True, slots=True)
 class Iso230Rows:
-    """Rows of a measured table, including overshoots, and a sentence for each assumption."""
+    """Rows of a measured table, including added rows for overshoots, and one sentence for each assumption."""
 
     rows: tuple[PathRow, ...]
     notes: tuple[str, ...]
 
     def cells(self) -> dict[str, list[str]]:
-        """Columns `input_mm, gap_mm, time_s` and, where present, `run, u_random_mm`, as text; a missing gap is ''."""
+        """Columns `input_mm, gap_mm, time_s` and, if present, `run, u_random_mm`, as text; a missing gap is ''."""
         out = {
             "input_mm": [repr(row.input_mm) for row in self.rows],
             "gap_mm": ["" if row.gap_mm is None else repr(row.gap_mm) for row in self.rows],
@@ -61,12 +61,12 @@ class Iso230Rows:
 
 
 def read_iso230_table(path: Path) -> Iso230Rows | None:
-    """Read a table of targets, cycles and directions; None where the file is another kind of table.
+    """Read a table of targets, cycles and directions; None if the file is another kind of table.
 
-    The gap is the position, or target + deviation. Rows are put into the order of travel: by `time_s` where every row
-    has one. Otherwise they follow cycle by cycle, first the targets approached from below in ascending order, then
-    those from above in descending order, with one reading every 30 s. If the path does not come from the stated side, a
-    row without a gap is added beyond the target.
+    The position, or target plus deviation, becomes the gap. Rows are sorted in the order of travel: by `time_s` if
+    every row has a time; otherwise cycle by cycle, first the targets approached from below in ascending order, then
+    those approached from above in descending order, with one reading every 30 s. If a target would not be reached from
+    its stated direction, a row without a gap is added beyond the target.
 
     Raises
     ------
@@ -88,11 +88,11 @@ def iso230_rows(
     Parameters
     ----------
     path : Path
-        Where they come from, for sentences.
+        File of the columns, for error messages.
     header : sequence of str
         Names of the columns.
     columns : callable
-        Gives the cells of required and of further columns by name, as `csv_columns.read_columns`.
+        Function that returns the cells of required and optional columns by name, like `csv_columns.read_columns`.
 
     Raises
     ------
@@ -138,9 +138,9 @@ def iso230_rows(
 
 
 def _header(path: Path) -> list[str]:
-    """Names in the first line that is no comment.
+    """Column names in the first line that is not a comment.
 
-    None where the file cannot be read (`read_columns` reports the error).
+    None if the file cannot be read (`read_columns` reports the error).
     """
     try:
         lines = plain(path).read_text(encoding="utf-8-sig").splitlines()
@@ -152,7 +152,7 @@ def _header(path: Path) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Cell:
-    """A cell with a reading: row of the table, its column, the word for its direction, its cycle ('': by order)."""
+    """A cell with a reading: its row, column, word for the direction, and cycle ('' if given only by the order)."""
 
     row: int
     column: str
@@ -161,7 +161,7 @@ class _Cell:
 
 
 def _cells(cells: dict[str, list[str]], blocks: dict[str, re.Match[str]], column: str) -> list[_Cell]:
-    """Every cell that may contain a reading, in the long form or in the matrix form."""
+    """List all cells that may contain a reading, in the long form or the matrix form of the table."""
     directions = cells.get("direction")
     if not blocks:
         cycles = cells.get("cycle", [""] * len(cells[TARGET]))
@@ -176,7 +176,7 @@ def _cells(cells: dict[str, list[str]], blocks: dict[str, re.Match[str]], column
 def _readings(
     path: Path, listed: list[_Cell], quantity: str, cells: dict[str, list[str]]
 ) -> tuple[list[Reading], set[str]]:
-    """Readings, and the words for directions that were used."""
+    """Convert cells to readings; also return the words for directions that the table uses."""
     factor, relative = QUANTITIES[quantity], quantity.startswith("deviation")
     names = [cell.cycle for cell in listed]
     numbers = {name: k for k, name in enumerate(sorted(set(names), key=_cycle_order(names)))}
@@ -217,7 +217,7 @@ def _readings(
 
 
 def _cycle_order(names: list[str]) -> Callable[[str], float]:
-    """Cycles ordered by their numbers, or by their first row where they are not numbers."""
+    """Sort cycles by number, or by their first row if they are not numbers."""
     try:
         by_number = {name: float(name) for name in names}
     except ValueError:

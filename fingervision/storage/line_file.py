@@ -1,4 +1,4 @@
-"""A text file that grows line by line, and contains complete lines whenever the program is stopped."""
+"""A text file that grows line by line, and contains only complete lines whenever the program is stopped."""
 
 import os
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ FLUSH_EVERY_S = 0.5
 
 
 class LineFile:
-    """Appends lines.
+    """Appends lines to a text file.
 
     Complete lines are written to the file at least every second. If the disk is full, the file is truncated after its
     last complete line.
@@ -26,7 +26,7 @@ class LineFile:
     header : str
         First line of a new file.
     go_on : bool
-        Append to what is there; else a file that is there is replaced.
+        Whether lines are appended to an existing file; otherwise an existing file is replaced.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class LineFile:
             self._write()
 
     def close(self) -> None:
-        """Write pending lines and close; closing twice is allowed."""
+        """Write pending lines and close the file; closing twice is allowed."""
         if self._file.closed:
             return
         try:
@@ -87,7 +87,7 @@ class LineFile:
 
 
 def cell(value: float | None, places: int) -> str:
-    """Format a number without trailing zeros; None gives an empty text."""
+    """Format a number without trailing zeros; None gives an empty string."""
     return "" if value is None else f"{value:.{places}f}".rstrip("0").rstrip(".")
 
 

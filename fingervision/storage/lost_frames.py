@@ -1,7 +1,8 @@
-"""The file lost.csv: frames of a run that could not be measured when they arrived, which its video does not show.
+"""The file lost.csv: video frames of a run that could not be measured on arrival, as the video itself cannot show.
 
-The marks of damage (lost packets, pictures that depend on them) come from the stream and the decoder. A video file
-contains the packets without these marks, and some damaged pictures would look sound when it is read again.
+Stream and decoder mark damage (lost packets, and pictures that depend on lost packets) on arrival. A video file
+contains the packets without these marks, so that some damaged pictures would seem undamaged when the file is read
+again.
 """
 
 import json
@@ -43,7 +44,7 @@ class LostFrames:
             raise self._failed(error) from error
 
     def add(self, time_s: float, lost: LostFrame) -> None:
-        """Add a lost frame, with its time in the recording."""
+        """Add a lost frame with its time in the recording (s)."""
         try:
             self._file.write(f"{cell(time_s, TIME_PLACES)},{lost.status.value},{quoted(lost.words)}\n")
         except OSError as error:
@@ -69,12 +70,12 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
     Parameters
     ----------
     files : sequence of Path
-        What the recording is made of.
+        Files of which the recording consists.
 
     Returns
     -------
     tuple of LostFrame
-        Empty where no run.json beside the file speaks of such a table; `index` counts the table's rows.
+        Lost frames; empty if no run.json beside the file mentions such a table. `index` is the row number in the table.
 
     Raises
     ------

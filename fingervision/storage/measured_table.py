@@ -1,4 +1,4 @@
-"""A measured table: any CSV with `input_mm,gap_mm` and further recorded columns (`gaps.csv` is one)."""
+"""Reader of measured tables: CSV files with `input_mm,gap_mm` and further recorded columns, such as gaps.csv."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,7 +25,7 @@ NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u
 
 
 def read_measured_table(path: Path) -> MeasuredTable:
-    """Read a measured table; rows with an input but no gap form its path, rows without an input are omitted.
+    """Read a measured table; rows with an input but no gap are kept as its path, rows without an input are omitted.
 
     Raises
     ------
@@ -65,22 +65,22 @@ def measured_rows(
     count_rows: bool = True,
     channels: Mapping[str, Numbers] = MappingProxyType({}),
 ) -> MeasuredTable:
-    """Sort the columns of a measured table, and refuse invalid values.
+    """Build a measured table from columns: sort the rows by run and time, and refuse invalid values.
 
     Parameters
     ----------
     path : Path
-        Where they come from, for sentences.
+        File of the columns, for error messages.
     values : mapping of str to Numbers
-        Columns of `NUMBERS`, all of one length.
+        Columns with the names in `NUMBERS`, all of equal length.
     run_cells : sequence of str, or None
         Name of the run of each row.
     said : sequence of str
-        What the reader has to say of the table, a sentence each.
+        Notes of the reader on the table, one sentence each.
     count_rows : bool
-        Whether to say how many rows have no value.
+        Whether to add a note on the number of rows without a value.
     channels : mapping of str to Numbers
-        Columns of one's own and their `u_`.
+        User-named columns, and their uncertainty columns `u_`.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def measured_rows(
 
 
 def _left_out(total: int, kept: int, besides: int) -> list[str]:
-    """Sentence on how many rows have no value, and for what they are used."""
+    """Sentences on the number of rows without a gap that count as path, and of rows that are omitted."""
     notes = []
     if besides:
         notes.append(f"{besides} of {total} rows have an input and no gap: they count as the input's path.")
@@ -176,7 +176,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
 
 
 def _by_run(names: Sequence[str], key: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
-    """Rows of each run, sorted by a key; runs in the order in which they first appear."""
+    """Indices of the rows of each run, sorted by a key; runs are in order of their first appearance."""
     number: dict[str, int] = {}
     codes = np.array([number.setdefault(name, len(number)) for name in names], dtype=np.intp)
     order = np.lexsort((key, codes))
@@ -191,7 +191,7 @@ def _path(
     names: Sequence[str],
     run_names: tuple[str, ...],
 ) -> RecordedPath:
-    """Sort all rows that have an input, as the measured ones; rows of runs without any gap are omitted."""
+    """Sort all rows with an input in the same way as the rows with a gap; runs without any gap are omitted."""
     of_run = _by_run(names, values["time_s"].value[on_path])
     rows = np.concatenate([on_path[of_run[name]] for name in run_names])
     ends = np.cumsum([of_run[name].size for name in run_names])
@@ -203,7 +203,7 @@ def _path(
 def _runs(
     inputs: NDArray[np.float64], time: NDArray[np.float64] | None, names: Sequence[str]
 ) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
-    """Order of the rows, with runs sorted by their first time (or smallest input), independently of their names."""
+    """Order of the rows; runs are sorted by their first time (or smallest input), independently of their names."""
     key = inputs if time is None else time
     # Each group is sorted by its key: its first is the least.
     groups = sorted(_by_run(names, key).items(), key=lambda item: (key[item[1][0]], float(np.sum(inputs[item[1]]))))

@@ -1,4 +1,4 @@
-"""The file mechanism.toml: any planar flexure mechanism; its numbers may be expressions of [lengths]."""
+"""The file mechanism.toml: drawing of any planar flexure mechanism; numbers may be expressions of its [lengths]."""
 
 import difflib
 import tomllib
@@ -46,7 +46,7 @@ _FLEXURES = {
 
 
 def is_mechanism(path: Path) -> bool:
-    """Whether a TOML file defines a mechanism by bodies or by a template, and is not a gripper.toml."""
+    """Whether a TOML file is a mechanism.toml (bodies or a template), not a gripper.toml."""
     try:
         tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
@@ -56,14 +56,14 @@ def is_mechanism(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class MechanismDrawing:
-    """A mechanism as defined by its file, and with some of its dimensions changed.
+    """Drawing of a mechanism, from which the mechanism can be built with changed dimensions.
 
     Parameters
     ----------
     path : Path
         The file.
     tables : mapping
-        Its tables with bare numbers.
+        Tables of the file, with plain numbers in place of those with an uncertainty.
     uncertainties : mapping of str to float
         Standard uncertainties of numbers by dotted name, such as `lengths.t`.
     """
@@ -87,7 +87,7 @@ class MechanismDrawing:
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """Uncertain dimensions with their values and standard uncertainties."""
+        """Return the dimensions with a stated uncertainty: their values and standard uncertainties."""
         lengths: dict[str, float] = {}
         for name, raw in as_table(self.tables.get("lengths", {}), f"[lengths] in {self.path}").items():
             lengths[name] = number(raw, lengths, f"lengths.{name} in {self.path}")
@@ -128,7 +128,7 @@ def read_mechanism(path: Path) -> Mechanism:
 
 
 def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
-    """Build a checked mechanism; `origin` is named in errors."""
+    """Build and check a mechanism from its tables; errors name the file `origin`."""
     for key in tables:
         if key not in _TOP:
             near = difflib.get_close_matches(key, _TOP, 1, cutoff=0.0)[0]

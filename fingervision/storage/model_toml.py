@@ -1,4 +1,4 @@
-"""The file model.toml, a corrected model; and the choice of reader for every kind of model file."""
+"""The file model.toml of a corrected model, and the choice of the reader for each kind of model file."""
 
 import json
 import os
@@ -38,18 +38,18 @@ def read_model(
     inside: tuple[Path, ...] = (),
     table: Callable[[Path], TableModel] = read_simulation_table,
 ) -> CorrectedModel:
-    """Read a simulation table or a gripper (without effects), or a corrected model.
+    """Read a model: a simulation table or a gripper drawing (without effects), or a corrected model.
 
     Parameters
     ----------
     path : Path
         The file.
     kind : str
-        Kind of model that a gripper becomes.
+        Kind of model that is built from a gripper drawing.
     inside : tuple of Path
-        Corrected models that this one is the base of.
+        Corrected models that have this model as their base.
     table : callable
-        Reader of simulation tables; the project's own alone, unless another is given.
+        Function that reads simulation tables; by default, only tables in fingervision's own format can be read.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
 
 
 def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -> None:
-    """Refuse an unknown effect, or one with a missing parameter; `origin` is where it came from."""
+    """Refuse an unknown effect, or an effect with a missing parameter; `origin` states where the effect came from."""
     if name not in catalogue() and origin:
         advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
         if origin == str(SESSION):
@@ -158,7 +158,7 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -
 
 
 def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
-    """Refuse a curve whose points are not numbers, too few, or not in the order of their inputs."""
+    """Refuse a curve with invalid or too few points, or with points that are not sorted by input."""
     inputs, errors = curve_points({key: estimate.value for key, estimate in values.items()})
     if inputs.size and not (
         inputs.size > 1
@@ -173,7 +173,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
 
 
 def _gripper(path: Path, kind: str) -> CorrectedModel:
-    """Build a gripper that computes mechanism effects by its own physics."""
+    """Build a gripper model that computes mechanism effects by physical laws."""
     if kind not in kinds():
         raise DataError(f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one.")
     if is_mechanism(path):

@@ -1,4 +1,4 @@
-"""A motion in time as a measured table: `[run,]time_s,input_mm[,gap_mm,left_mm,right_mm],...,force_n`."""
+"""A simulated motion as a measured table: `[run,]time_s,input_mm[,gap_mm,left_mm,right_mm],...,force_n`."""
 
 import csv
 from collections.abc import Mapping
@@ -27,13 +27,13 @@ def write_motion(
     path : Path
         File to write.
     drive : DriveHistory
-        Times, inputs and runs.
+        Times, inputs and runs of the drive.
     observed_mm : mapping of str to ndarray of float, shape (n,)
-        Columns; `compare` and `diagnose` take the table where one is `gap_mm`.
+        Columns by name; `compare` and `diagnose` accept the table if one of them is `gap_mm`.
     force_n : ndarray of float, shape (n,)
-        At the drive.
+        Force at the drive.
     symmetric : bool
-        Whether both fingers move alike, so that half the gap stands on either side.
+        Whether both fingers move symmetrically, so that each is at half the gap from the centre.
     """
     columns = {"time_s": drive.time_s, "input_mm": drive.input_mm, **observed_mm}
     if symmetric:

@@ -1,4 +1,4 @@
-"""A large table of numbers only, read in one call."""
+"""Fast reading of a large table that contains only numbers."""
 
 from collections.abc import Sequence
 
@@ -10,22 +10,22 @@ FEWEST_LINES = 2000
 
 
 def number_block(lines: Sequence[str], separator: str | None, wide: int) -> NDArray[np.float64] | None:
-    """Read lines of numbers in one call; None where each cell must be read separately.
+    """Read lines of numbers in one call; None if each cell must be read separately.
 
     Parameters
     ----------
     lines : sequence of str
-        Rows, without header.
+        Rows of the table, without a header.
     separator : str or None
-        What stands between two cells; None for any blanks.
+        Separator between two cells; None for any white space.
     wide : int
         Number of cells in a row.
 
     Returns
     -------
     ndarray of float, shape (n, wide), or None
-        None for fewer rows than `FEWEST_LINES`, and where a cell is empty, is no finite number, or rows differ in
-        length.
+        Numbers of the table; None if there are fewer rows than `FEWEST_LINES`, if a cell is empty or not a finite
+        number, or if rows differ in length.
     """
     if len(lines) < FEWEST_LINES:
         return None

@@ -1,4 +1,4 @@
-"""Columns of numbers in a table: values, and which cells are empty."""
+"""Columns of numbers in a table, with a mask of empty cells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from fingervision.storage.decimal_number import are_decimal, decimal_number
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Numbers:
-    """One column.
+    """One column of numbers.
 
     Parameters
     ----------
     value : ndarray of float, shape (n,)
-        Finite numbers; 0 where there is none.
+        Finite numbers; 0 for an empty cell.
     present : ndarray of bool, shape (n,)
         Whether the cell holds a number.
     """
@@ -28,7 +28,7 @@ class Numbers:
 
     @classmethod
     def whole(cls, value: NDArray[np.float64]) -> "Numbers":
-        """Convert a column without empty cells."""
+        """Build a column from values without empty cells."""
         return cls(value, np.ones(value.size, dtype=np.bool_))
 
     @property
@@ -38,7 +38,7 @@ class Numbers:
 
 
 def numbers_in(path: Path, name: str, cells: Sequence[str]) -> Numbers:
-    """Read cells as finite numbers; an empty cell means no value.
+    """Read cells as finite numbers; an empty cell represents a missing value.
 
     Raises
     ------

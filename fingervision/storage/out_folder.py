@@ -1,4 +1,4 @@
-"""The folder named by `--out`: it is created, and system errors become sentences."""
+"""The folder named by `--out`: create it, and convert errors of the operating system to error messages."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from fingervision.domain.errors import OutputError
 
 @contextmanager
 def out_folder(path: Path) -> Iterator[None]:
-    """Create a folder if needed, and name it in errors of the system raised in the block.
+    """Create a folder if needed; system errors raised in the `with` block are converted to errors that name the folder.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def out_folder(path: Path) -> Iterator[None]:
 
 
 def make_out_folder(path: Path) -> None:
-    """Create the folder before a long computation, whose result would be lost if that failed at the end."""
+    """Create the folder before a long computation, so that its result is not lost because of an unusable folder."""
     with out_folder(path):
         pass
 

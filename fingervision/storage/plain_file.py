@@ -1,4 +1,4 @@
-"""Refuse pipes and devices as documents: reading them would wait for a writer, or never end."""
+"""Refuse pipes and devices as input files, because reading them could wait for ever or never end."""
 
 import errno
 from pathlib import Path
@@ -7,17 +7,17 @@ from fingervision.domain.errors import OutputError
 
 
 def plain(path: Path) -> Path:
-    """Return the path if it can be read to its end.
+    """Return the path if it is a file that can be read to its end.
 
     Parameters
     ----------
     path : Path
-        Of a document that shall be read.
+        Path of a file that is to be read.
 
     Returns
     -------
     Path
-        The same; also where there is nothing, or a folder, which the system says when it is opened.
+        The same path; also for a missing file or a folder, which cause an error when they are opened.
 
     Raises
     ------
@@ -30,12 +30,12 @@ def plain(path: Path) -> Path:
 
 
 def why(error: Exception) -> str:
-    """Reason of a system error, without its number and path, for a sentence that names the file itself."""
+    """Reason stated by a system error, without error number and path, for a message that names the file separately."""
     return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
 
 
 def in_utf8(path: Path, text: str) -> str:
-    """Return a document's text if it can be written in UTF-8; names of files need not be.
+    """Return a text if it can be encoded in UTF-8; it may contain file names that cannot.
 
     Raises
     ------

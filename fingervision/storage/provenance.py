@@ -1,4 +1,4 @@
-"""Origin of a result: its files with their hashes, the command, the versions, the time."""
+"""Provenance of a result: its input files with their hashes, the command, the versions, and the time."""
 
 import hashlib
 import platform
@@ -30,13 +30,13 @@ class Provenance:
     Parameters
     ----------
     files : tuple of SourceFile
-        What went in.
+        Input files of the result.
     command : str
-        As it was called.
+        The command line.
     versions : mapping of str to str
-        Of fingervision, Python and the libraries that compute.
+        Versions of fingervision, Python and the numerical libraries.
     made_at : str
-        ISO 8601, UTC.
+        Time of creation in ISO 8601 format, UTC.
     """
 
     files: tuple[SourceFile, ...]
@@ -45,19 +45,19 @@ class Provenance:
     made_at: str
 
     def document(self) -> dict[str, object]:
-        """The origin as a document for programs."""
+        """Return the provenance as a mapping for JSON."""
         return asdict(self)
 
 
 def provenance(files: Mapping[str, Path], command: str | None = None) -> Provenance:
-    """Collect the origin of a result.
+    """Collect the provenance of a result.
 
     Parameters
     ----------
     files : mapping of str to Path
-        By what they are used as; those that are no files are left out.
+        Paths by role; paths that are not files are omitted.
     command : str or None
-        As it was called; None for the command that is running.
+        The command line; None for that of the running command.
     """
     read = tuple(
         SourceFile(role, path.name, path.stat().st_size, _sha256(path))

@@ -1,4 +1,4 @@
-"""A recipe: the steps that the test bed executes."""
+"""The file recipe.toml: the steps that the test bed executes."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ BELOW_FORCE_N = 5.0
 
 
 def read_recipe(path: Path) -> Recipe[Section]:
-    """Read a recipe; the keys of a step are read by its kind.
+    """Read a recipe; the settings of each step are read by the step's kind.
 
     Raises
     ------

@@ -13,12 +13,12 @@ def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:
     Parameters
     ----------
     files : sequence of Path
-        What the recording is made of.
+        Files of which the recording consists.
 
     Returns
     -------
     mapping of str to str
-        Empty where no run.json speaks of this recording.
+        Settings by name; empty if no run.json mentions this recording.
     """
     if len(files) != 1:
         return {}

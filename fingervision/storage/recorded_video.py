@@ -1,4 +1,4 @@
-"""Video of a recording: the camera's own packets, or FFV1, with true times, complete whenever it ends."""
+"""Video file of a recording: the camera's own packets or FFV1, with true times, readable at any interruption."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -24,19 +24,19 @@ GREY_FORMATS = {"uint8": "gray", "uint16": "gray16le"}
 
 
 class RecordedVideo:
-    """Writes frames as they are measured.
+    """Writes video frames to a file as they are measured.
 
-    Frames are numbered and timed from the first frame whose picture depends on no other.
+    Numbers and times start at the first frame whose picture does not depend on another picture.
 
     Parameters
     ----------
     path : Path
         The file.
     template : av.VideoStream or None
-        The camera's coded stream, whose packets are kept as they are; None stores the grey levels with FFV1.
+        The camera's coded stream, whose packets are stored unchanged; None stores the grey levels with FFV1.
     keep : int, optional
-        Go on with an FFV1 recording that broke off, after its first so many frames. The file on disk is whole at any
-        moment: what is kept is copied beside it, and then takes its name.
+        Number of frames to keep of an interrupted FFV1 recording that is to be continued. The file on disk is valid at
+        all times: the kept frames are copied to a new file, which then replaces the old file.
 
     Raises
     ------
@@ -66,7 +66,8 @@ class RecordedVideo:
         Returns
         -------
         float or None
-            Its time in the recording, exactly as the file holds it; None if the recording begins after it.
+            Time of the frame in the recording, exactly as stored in the file; None if the recording begins after this
+            frame.
 
         Raises
         ------
@@ -93,13 +94,13 @@ class RecordedVideo:
         return tick / TICKS_PER_S
 
     def time_s(self, lost: LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
-        """Time in the recording that a lost frame, not yet added, will have (s); None before the recording begins."""
+        """Time (s) in the recording of a lost frame that is not yet added; None before the recording begins."""
         self._begin(lost, packets)
         tick = self._tick(lost)
         return None if tick is None or tick < 0 else tick / TICKS_PER_S
 
     def close(self) -> None:
-        """Write pending packets and close."""
+        """Write pending packets and close the file."""
         try:
             if self._stream is not None and self._template is None:
                 self._container.mux(self._stream.encode(None))
@@ -183,7 +184,7 @@ class RecordedVideo:
 
 
 def frames_in(path: Path) -> int:
-    """Number of complete frames of a recording that may have been interrupted; 0 where there is none."""
+    """Number of complete frames in a recording that may have been interrupted; 0 without a recording."""
     count = 0
     try:
         with av.open(f"file:{path}") as container:

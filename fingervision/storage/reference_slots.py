@@ -1,4 +1,4 @@
-"""Reference slots measured in a run on the bed, from the run.json beside the table."""
+"""Reference slots measured in a run on the test bed, from the run.json beside the run's table."""
 
 import json
 from pathlib import Path
@@ -10,12 +10,12 @@ KEY = "reference_slots"
 
 
 def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
-    """Read the slots of the run to which a table belongs; none where there is no run, or no slot was measured.
+    """Read the reference slots of the run to which a table belongs; empty without a run or without measured slots.
 
     Parameters
     ----------
     table : Path
-        A file of a run folder, or any other table.
+        A table in a run folder, or any other table.
     """
     try:
         about = json.loads((table.parent / RUN).read_text(encoding="utf-8"))

@@ -8,7 +8,7 @@ from fingervision.domain.report import DiagnosisReport, NamedEffect
 
 
 def report_document(report: DiagnosisReport, model_path: str | None, recipe_path: str | None) -> dict[str, object]:
-    """Compose the document for programs; paths are relative to the report."""
+    """Compose the content of report.json; paths are relative to the folder of the report."""
     run = report.next_run
     return {
         "schema": 1,
@@ -54,7 +54,7 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
 
 
 def _effect(effect: NamedEffect) -> dict[str, object]:
-    """An effect for programs; with the points of its curve, if any, and its place and end, if any."""
+    """Convert an effect to a mapping for JSON, with its place, its end and the points of its curve, if any."""
     document = asdict(effect)
     points = document.pop("points")
     for name in ("place", "end"):
@@ -64,5 +64,5 @@ def _effect(effect: NamedEffect) -> dict[str, object]:
 
 
 def write_report(path: Path, document: dict[str, object]) -> None:
-    """Write the document, which never contains NaN."""
+    """Write the report as JSON, which never contains NaN."""
     path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A camera's response as a file: `level,light`, one row per level, from 0 to the full scale."""
+"""File of a camera's response: `level,light`, one row per grey level from 0 to full scale."""
 
 import csv
 from pathlib import Path
@@ -18,7 +18,7 @@ TOP_LEVELS = (255, 1023, 4095, 16383, 65535)
 
 
 def response_named(name: str) -> CameraResponse | None:
-    """Response named by --response: a standard curve or a file; None for auto.
+    """Return the response that --response names: a standard curve or a file; None for `auto`.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def response_named(name: str) -> CameraResponse | None:
 
 
 def read_response(path: Path) -> CameraResponse:
-    """Read a response.
+    """Read a camera's response from a file.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def _response(name: str, level: NDArray[np.float64], light: NDArray[np.float64],
 
 
 def write_response(response: CameraResponse, path: Path) -> None:
-    """Write a response.
+    """Write a camera's response to a file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Ownership of results in a folder, so that no command replaces the results of another input."""
+"""Record of the input to which a result folder belongs, so that no command overwrites results of another input."""
 
 import json
 import os
@@ -19,12 +19,12 @@ def own_folder(out: Path, source: Path, *, named: bool) -> Path:
     Parameters
     ----------
     out : Path
-        The folder that is named, or the usual one.
+        The folder that the user names, or the default folder.
     source : Path
-        The input; may be a pattern.
+        The input file or folder, or a pattern of file names.
     named : bool
-        Whether the user has named the folder. Where not, one with another input's results is left alone, and one
-        beside it is given.
+        Whether the user has named the folder. If not, and if the default folder holds results of another input, a new
+        folder beside it is returned.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def own_folder(out: Path, source: Path, *, named: bool) -> Path:
 
 
 def mark_owner(out: Path, source: Path) -> None:
-    """Store in a folder to which input its results belong; the path is relative, so that both may be moved together.
+    """Store in a result folder the relative path of its input, so that folder and input may be moved together.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def mark_owner(out: Path, source: Path) -> None:
 
 
 def began_in(out: Path) -> int | None:
-    """Time before anything is written to an own result folder, by the clock of its disk (ns); None for other folders.
+    """Time before the first result is written, by the clock of the disk (ns); None if the folder has no owner record.
 
     Raises
     ------
@@ -79,18 +79,18 @@ def began_in(out: Path) -> int | None:
 
 
 def finish_in(out: Path, source: Path, names: Iterable[str], began_ns: int | None) -> None:
-    """Mark the results in a folder as complete, and remove files left by an earlier call of the same command.
+    """Mark the results in a folder as complete, and delete files that remain from an earlier call of the same command.
 
     Parameters
     ----------
     out : Path
         The folder.
     source : Path
-        The input.
+        The input of the command.
     names : iterable of str
-        Files that a call of this kind may write; those older than this call are of an earlier one.
+        Names of files that the command may write; those older than this call remain from an earlier call.
     began_ns : int or None
-        What `began_in` gave before the first was written.
+        Result of `began_in` before the first file was written.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def _owner(out: Path) -> str | None:
 
 
 def _of_another(out: Path, source: Path) -> str | None:
-    """Name of the other input to which a folder's results belong; None where it has none, or this input's."""
+    """Name of the other input to which a folder's results belong; None without results, or with those of this input."""
     owner = _owner(out)
     if owner is None or (out / owner).resolve() == source.resolve():
         return None

@@ -1,4 +1,4 @@
-"""Files of every run folder: run.json, events.jsonl, a video; each is complete at any time."""
+"""Files of a run folder: run.json and events.jsonl, each readable at any time, and hashes of the other files."""
 
 import hashlib
 import json
@@ -34,7 +34,7 @@ class RunFiles:
             raise self.failed(error) from error
 
     def write_about(self, about: Mapping[str, Any], *, complete: bool) -> None:
-        """Write run.json, replacing an older one only when complete."""
+        """Write run.json; an older file is replaced only once the new file is complete."""
         part = self.path / f".{RUN}.part"
         try:
             part.write_text(json.dumps({**about, "complete": complete}, indent=2) + "\n", encoding="utf-8")
@@ -43,7 +43,7 @@ class RunFiles:
             raise self.failed(error) from error
 
     def event(self, line: Mapping[str, Any]) -> None:
-        """Append an event."""
+        """Append an event to events.jsonl."""
         try:
             self._events.write(json.dumps(line, ensure_ascii=False) + "\n")
         except OSError as error:
@@ -65,7 +65,7 @@ class RunFiles:
             raise self.failed(error) from error
 
     def failed(self, error: OSError) -> FingervisionError:
-        """Return the error that the run could not be written."""
+        """Return the error which states that the run could not be written."""
         return OutputError(
             f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
             "in it: free disk space, or name another folder with --out."

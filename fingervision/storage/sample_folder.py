@@ -1,4 +1,4 @@
-"""Location of the samples: inside the installed package, or beside it in the source tree."""
+"""Location of the sample files: inside the installed package, or beside it in the source tree."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ NAME = "sample_frames"
 
 
 def sample_folder() -> Path:
-    """Return the folder of the samples.
+    """Return the folder of the sample files.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The file samples.csv of a run on the bed: a measured table with further columns for each row."""
+"""The file samples.csv of a run on the test bed: a measured table with additional columns."""
 
 import csv
 from collections.abc import Sequence
@@ -20,32 +20,32 @@ TIME_PLACES, MM_PLACES, FORCE_PLACES = 6, 7, 6
 
 @dataclass(frozen=True, slots=True)
 class SampleRow:
-    """One row of samples.csv; None means an empty cell.
+    """One row of samples.csv; None is written as an empty cell.
 
     Parameters
     ----------
     run : str
-        Re-zeroing and whatever else breaks with the past begins another.
+        Name of the run; a re-zeroing, or any other loss of continuity, begins a new run.
     time_s : float
-        Since the folder's first row, on the camera's clock.
+        Time since the first row of the folder, by the camera's clock.
     input_mm : float or None
-        Position of the stage at the time of the exposure, between the steps of its encoder.
+        Position of the stage at the time of the exposure, interpolated between the readings of its encoder.
     gap_mm, left_mm, right_mm : float or None
-        Gap and measuring points.
+        Gap, and positions of the measuring points.
     u_gap_mm, u_random_mm : float or None
-        Standard uncertainty of the gap with the whole budget, and its random part alone.
+        Standard uncertainty of the gap with all contributions of the budget, and its random part.
     force_n : float or None
-        Force at the drive, at the time of the exposure.
+        Force at the drive at the time of the exposure.
     status : Status
-        Whether there is a gap, and if not, why.
+        Whether the frame has a gap, and if not, the reason.
     frame : int
-        Place in the video, from 0.
+        Number of the frame in the video, from 0.
     step : int
-        Step of the recipe, from 1.
+        Number of the recipe's step, from 1.
     encoder_mm : float or None
-        The actuator's own newest reading when the frame had come.
+        Most recent position reading of the actuator when the frame arrived.
     camera_s, arrived_s : float
-        The frame's stamp on the camera's own clock, and when the host had it on the bed's.
+        Time stamp of the frame by the camera's clock, and time of its arrival by the test bed's clock.
     """
 
     run: str
@@ -65,7 +65,7 @@ class SampleRow:
     arrived_s: float
 
     def line(self) -> str:
-        """The row as a line of the file."""
+        """Return the row as a line of the file."""
         mm = (self.input_mm, self.gap_mm, self.left_mm, self.right_mm, self.u_gap_mm, self.u_random_mm)
         return ",".join(
             [
@@ -91,7 +91,7 @@ class SamplesCsv:
     path : Path
         The file.
     go_on : bool
-        Append to the rows that are there.
+        Whether rows are appended to an existing file.
     """
 
     def __init__(self, path: Path, *, go_on: bool = False) -> None:
@@ -102,7 +102,7 @@ class SamplesCsv:
         self._file.add([row.line() for row in rows])
 
     def close(self) -> None:
-        """Write pending rows and close."""
+        """Write pending rows and close the file."""
         self._file.close()
 
 
@@ -136,7 +136,7 @@ def read_samples(path: Path) -> list[SampleRow]:
 
 
 def write_rows(path: Path, rows: Sequence[SampleRow]) -> None:
-    """Replace the table by one with these rows; it is complete at any time."""
+    """Replace the table by the given rows; the file on disk is complete at any time."""
     part = path.with_name(f".{path.name}.part")
     part.write_text("\n".join((COLUMNS, *(row.line() for row in rows))) + "\n", encoding="utf-8")
     part.replace(path)

@@ -1,4 +1,4 @@
-"""Settings of a bench in a file, which the page saves and commands read by `--settings`."""
+"""File of measurement settings, which the browser page saves and commands read by `--settings`."""
 
 import json
 import os
@@ -20,18 +20,18 @@ CAMERA_KEYS = (*CAMERA_NUMBERS, "size", "pixel_format")
 
 
 def read_settings(path: Path) -> dict[str, Any]:
-    """Read settings as options of the commands, by name.
+    """Read settings as values of command options, by option name.
 
     Parameters
     ----------
     path : Path
-        TOML; every key may be left out.
+        The TOML file; every key is optional.
 
     Returns
     -------
     dict
-        `calibration` is a Path, found from the file's own folder, `roi` the words that `--roi` takes, a camera's
-        settings stand under `camera`.
+        Values by option name: `calibration` is a Path relative to the folder of the file, `roi` is the text that
+        `--roi` accepts, and `camera` contains the settings of the camera.
 
     Raises
     ------
@@ -70,14 +70,14 @@ def read_settings(path: Path) -> dict[str, Any]:
 
 
 def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
-    """Write settings, omitting those that are None.
+    """Write settings to a file; settings that are None are omitted.
 
     Parameters
     ----------
     path : Path
-        The file; replaced when the new one is whole.
+        The file; an existing file is replaced once the new file is complete.
     settings : mapping
-        Keys as in the file; `calibration` is a Path, `roi` four whole numbers, `camera` a mapping.
+        Settings by key as in the file; `calibration` is a Path, `roi` four whole numbers, `camera` a mapping.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Write a simulation table, `input_mm,gap_mm,left_mm,right_mm[,force_n]` and poses of bodies, from a model."""
+"""Write a model's simulation table: `input_mm,gap_mm,left_mm,right_mm[,force_n]` and poses of bodies."""
 
 import csv
 from collections.abc import Mapping
@@ -15,12 +15,12 @@ POSE = ("x_mm", "y_mm", "angle_mrad")
 
 
 def pose_columns(bodies: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Names of the columns of poses, `body.x_mm`, `body.y_mm`, `body.angle_mrad`, body by body.
+    """Names of the pose columns `body.x_mm`, `body.y_mm`, `body.angle_mrad` of every body.
 
     Parameters
     ----------
     bodies : mapping of str to ndarray of float, shape (n, 3)
-        Poses of every body.
+        Poses of every body (x in mm, y in mm, angle in mrad).
     """
     return {f"{name}.{part}": rows[:, place] for name, rows in bodies.items() for place, part in enumerate(POSE)}
 
@@ -31,18 +31,18 @@ def write_simulation(
     response: Response,
     bodies: Mapping[str, NDArray[np.float64]] = MappingProxyType({}),
 ) -> None:
-    """Write one row per input; `fingervision.storage.simulation_table` reads it.
+    """Write a simulation table with one row per input; `fingervision.storage.simulation_table` reads it.
 
     Parameters
     ----------
     path : Path
         File to write.
     input_mm : ndarray of float, shape (n,)
-        Inputs.
+        Displacements of the drive.
     response : Response
-        The model's answer to them.
+        Response of the model to these inputs.
     bodies : mapping of str to ndarray of float, shape (n, 3)
-        Poses of the bodies, at the end of the table.
+        Poses of the bodies, written as the last columns of the table.
     """
     columns = {
         "input_mm": input_mm,

@@ -1,4 +1,4 @@
-"""A simulation table: `input_mm,gap_mm[,left_mm,right_mm,force_n]`, any order, at least two rows."""
+"""Reader of simulation tables: `input_mm,gap_mm[,left_mm,right_mm,force_n]`, at least two rows, in any order."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,9 +30,9 @@ def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
     Parameters
     ----------
     path : Path
-        Where they come from, for sentences and as the model's name.
+        File of the columns, for error messages and as the name of the model.
     columns : mapping of str to Numbers
-        `input_mm, gap_mm` and, where there are, `left_mm, right_mm, force_n`.
+        Columns `input_mm, gap_mm` and, if present, `left_mm, right_mm, force_n`.
 
     Raises
     ------

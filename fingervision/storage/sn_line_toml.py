@@ -20,9 +20,9 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
     Parameters
     ----------
     raw : object
-        As the file has it.
+        The value as read from the file.
     name, origin : str
-        Of the number and its file, for errors.
+        Name of the key and of its file, for error messages.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
 
 
 def check_below_yield(line: SNLine, yield_mpa: float, origin: str) -> None:
-    """Refuse a line whose stress amplitudes, plus the mean stress of the tests, reach the yield stress."""
+    """Refuse an S-N line whose peak stress (amplitude plus mean stress of the tests) reaches the yield stress."""
     mean = abs(line.amplitude_mpa[0] * (1.0 + line.stress_ratio) / (1.0 - line.stress_ratio))
     if mean + line.amplitude_mpa[0] > yield_mpa * (1.0 + 1e-9):
         raise DataError(

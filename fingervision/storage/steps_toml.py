@@ -106,7 +106,7 @@ def _entry(section: Section) -> CycleTime | SpeedEntry:
 
 
 def write_steps(path: Path, data: StepData) -> None:
-    """Write step data, so that reading returns them exactly."""
+    """Write step data to a file, from which they can be read back exactly."""
     lines = [
         f"schema = {SCHEMA}", f"name = {_text(data.name)}", f"start_mm = {data.start_mm!r}",
         f"sequence = {list(data.sequence)}",
@@ -130,7 +130,7 @@ def write_steps(path: Path, data: StepData) -> None:
 
 
 def _text(words: str) -> str:
-    """A TOML string: JSON's escapes are valid in TOML, except for the control character DEL."""
+    """Quote a text for TOML with JSON escapes, which are valid in TOML except for the control character DEL."""
     import json
 
     return json.dumps(words, ensure_ascii=False).replace("\x7f", "\\u007f")

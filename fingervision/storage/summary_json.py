@@ -1,4 +1,4 @@
-"""The file summary.json: input, settings, results and uncertainties of a measurement."""
+"""The file summary.json: input files, settings, results and uncertainties of a measurement."""
 
 import json
 from collections.abc import Mapping
@@ -13,14 +13,14 @@ SCHEMA = 1
 
 
 def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
-    """Write the summary; an older one stays complete until the new one is complete.
+    """Write the summary; an older summary is replaced only once the new file is complete.
 
     Parameters
     ----------
     path : Path
         The file.
     summary : mapping
-        Text, numbers, None, lists and mappings; no NaN.
+        Content of the file: text, numbers, None, lists and mappings, without NaN.
 
     Raises
     ------
@@ -41,12 +41,12 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
 
 
 def summary_text(summary: Mapping[str, Any]) -> str:
-    """Text of the summary's file."""
+    """Return the text of the file summary.json."""
     return json.dumps({"schema": SCHEMA, **summary}, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def recording_of(folder: Path) -> str | None:
-    """Name of the recording to which a folder's results belong; None where there is no summary."""
+    """Name of the recording to which the results in a folder belong; None without a summary."""
     try:
         name = json.loads((folder / SUMMARY).read_bytes())["recording"]["name"]
     except (OSError, ValueError, LookupError, TypeError):
@@ -55,14 +55,14 @@ def recording_of(folder: Path) -> str | None:
 
 
 def refuse_other_recording(folder: Path, recording: str) -> None:
-    """Refuse a folder with the results of another recording.
+    """Refuse an output folder that holds the results of another recording.
 
     Parameters
     ----------
     folder : Path
-        Where results shall go.
+        Folder for the new results.
     recording : str
-        As the user names it: a file, a folder or a pattern.
+        The recording as named by the user: a file, a folder or a pattern.
 
     Raises
     ------
@@ -79,17 +79,17 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
 
 
 def u_clock_beside(table: Path) -> float:
-    """Uncertainty of the clock offset of a gaps.csv, from the summary beside it (s).
+    """Standard uncertainty (s) of the offset between the clocks of gap and drive, from the summary beside a gaps.csv.
 
     Parameters
     ----------
     table : Path
-        gaps.csv, or any other table.
+        A gaps.csv, or any other table.
 
     Returns
     -------
     float
-        0 where the table is another, or the offset was given instead of found.
+        Standard uncertainty in s; 0 for any other table, or if the offset was given instead of estimated.
     """
     if table.name != GAPS:
         return 0.0

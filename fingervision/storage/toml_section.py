@@ -1,4 +1,4 @@
-"""A table of a TOML file, read key by key, with file, line and key in every error message."""
+"""Reader of a table of a TOML file key by key; error messages state file, line and key."""
 
 import difflib
 import re
@@ -21,12 +21,12 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
     path : Path
         The file.
     what : str
-        What it is to be, for the sentence: `recipe`, `bed`.
+        Kind of file for error messages, such as `recipe` or `bed`.
 
     Returns
     -------
     dict, str
-        Its tables, and its text (for line numbers).
+        Tables of the file, and its text (for line numbers).
 
     Raises
     ------
@@ -49,7 +49,8 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
 def line_of(text: str, header: str, place: int = 0, key: str | None = None) -> int:
     """Line number, from 1, of the nth `[header]` or `[[header]]` of a file, or of a key below it.
 
-    tomllib reports no lines; headers are searched for in their usual spelling, and 1 is returned where none is found.
+    The library tomllib reports no line numbers, so that the text is searched for headers in their usual spelling; 1 is
+    returned if the header is not found.
     """
     lines = text.splitlines()
     pattern = re.compile(rf"^\s*\[\[?\s*{re.escape(header)}\s*\]\]?")
@@ -69,20 +70,20 @@ def line_of(text: str, header: str, place: int = 0, key: str | None = None) -> i
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One table of a file.
+    """One table of a TOML file, whose values are read and checked.
 
     Parameters
     ----------
     path : Path
         The file.
     text : str
-        Its text.
+        Text of the file.
     header : str
         Name of the table as in its header; empty for the top of the file.
     values : mapping
-        Its keys.
+        Values of the table by key.
     place : int
-        Which of the tables of that header, from 0.
+        Index, from 0, of the table among those with the same header.
     """
 
     path: Path
@@ -138,7 +139,7 @@ class Section:
         return int(value)
 
     def word(self, key: str, default: str | None = None, *, of: Iterable[str] | None = None) -> str:
-        """Read a text; where `of` is given, one of its words."""
+        """Read a text; if `of` is given, the text must be one of these words."""
         value = self.values.get(key, default)
         if value is None:
             self.refuse(None, f"must state {key}, but does not: add it.")
@@ -158,14 +159,14 @@ class Section:
         return value
 
     def table(self, key: str) -> "Section":
-        """Read a table below this one; an empty one where there is none."""
+        """Read a sub-table of this table; empty if missing."""
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             self.refuse(key, f"must be a table [{key}], but is {value!r}.")
         return Section(self.path, self.text, f"{self.header}.{key}" if self.header else key, value)
 
     def tables(self, key: str) -> tuple["Section", ...]:
-        """Read the tables `[[key]]`, in order."""
+        """Read the sub-tables `[[key]]`, in order."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
             self.refuse(key, f"must be tables [[{key}]], but is {value!r}.")

@@ -1,4 +1,4 @@
-"""Reading of any laboratory's tables: format, columns and units are recognised.
+"""Reading of tables that other programs wrote: file format, columns and units are recognised.
 
-The result is a table, drive or model.
+The result is a measured table, a drive history or a model.
 """

@@ -1,4 +1,4 @@
-"""Report on how a table was interpreted: for a person, for a program, and for columns.toml."""
+"""Report on how a table was interpreted, as text, as JSON, and as an entry of columns.toml."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -25,7 +25,7 @@ from fingervision.tables.understanding import Taken, Understood, understand
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Account:
-    """Interpretation of a table.
+    """Report on the interpretation of a table.
 
     Parameters
     ----------
@@ -34,27 +34,27 @@ class Account:
     kind : str
         `measured`, `drive` or `simulation`.
     what : str
-        Format and dialect.
+        Description of file format and dialect.
     own : bool
-        Whether it is in the project's own format, which needs no columns.toml.
+        Whether the table is in fingervision's own format, which needs no columns.toml.
     taken : tuple of Taken
-        Columns with a role.
+        Columns to which a role was assigned.
     unused : tuple of str
-        Names of the others.
+        Names of the columns without a role.
     columns : mapping of str to Numbers
-        By role, in mm, s and N.
+        Values of the columns by role, in mm, s and N.
     rows : int
-        Rows of the file.
+        Number of rows in the file.
     rate_hz : float or None
-        Median rate of the rows that have a time.
+        Median sampling rate of the rows that have a time.
     left_out, notes : tuple of str
-        What was left out and why; what was assumed.
+        Omissions with their reasons; assumptions that were made.
     question : OpenQuestionError or FingervisionError, or None
-        Why it cannot be read yet.
+        Reason why the table cannot be read yet; None if it can.
     entry : Entry
-        What columns.toml would say.
+        Entry of columns.toml that describes this interpretation.
     channels : BodyChannels
-        Channels of one's own.
+        User-named channels.
     """
 
     path: Path
@@ -73,7 +73,7 @@ class Account:
     channels: BodyChannels = field(default_factory=BodyChannels)
 
     def curve(self) -> tuple[str, NDArray[np.float64], str, NDArray[np.float64]] | None:
-        """Data to plot: the gap against the input, or the input over time; None where there is too little."""
+        """Return the curve to plot: gap over input, or input over time; None if there are too few data."""
         names = ("input", "gap") if "gap" in self.columns else ("time", "input")
         if not all(name in self.columns for name in names):
             return None
@@ -84,7 +84,7 @@ class Account:
         return CANONICAL[names[0]], x.value[both], CANONICAL[names[1]], y.value[both]
 
     def document(self) -> dict[str, Any]:
-        """For programs."""
+        """Return the report as a mapping for JSON."""
         ranges = {
             role: [float(each.value[each.present].min()), float(each.value[each.present].max())]
             for role, each in self.columns.items()
@@ -125,16 +125,16 @@ class Account:
 
 
 def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account:
-    """Interpret a table as a given kind, or as the kind that leaves the fewest open questions.
+    """Interpret a table as a given kind of table, or as the kind that leaves the fewest open questions.
 
     Parameters
     ----------
     path : Path
         The table.
     kind : str or None
-        `measured`, `drive` or `simulation`; None: to be found.
+        `measured`, `drive` or `simulation`; None if the kind is to be recognised.
     given : mapping of str to Entry
-        What is decided, by kind.
+        Decisions of the user, by kind of table.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 
 
 def _open_columns(table: Understood) -> int:
-    """Number of unresolved columns for a kind: missing required columns count twice."""
+    """Number of unresolved columns of an interpretation; a missing required column counts twice."""
     missing = sum(question.key.startswith("columns.") for question in table.questions)
     missing += sum(bool(question.missing) for question in table.questions)
     # A column called after a program's model holds no measurement.
@@ -192,7 +192,7 @@ def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
 
 
 def _entry(taken: tuple[Taken, ...], given: Entry, raw: RawTable) -> Entry:
-    """Entry for columns.toml with everything that was recognised."""
+    """Entry for columns.toml that states everything that was recognised."""
     names = [column.name for column in raw.columns]
     columns = {
         each.role: given.columns.get(each.role)
@@ -205,12 +205,12 @@ def _entry(taken: tuple[Taken, ...], given: Entry, raw: RawTable) -> Entry:
 
 
 def _dialect(raw: RawTable) -> dict[str, str]:
-    """Keys for the recognised text format, or for the selected part of a file."""
+    """Keys of columns.toml for the recognised text format, or for the selected part of a file."""
     return {key: str(raw.settings[key]) for key in ("separator", "decimal", "part") if key in raw.settings}
 
 
 def _rate(time: Numbers | None) -> float | None:
-    """Median rate of the rows (Hz)."""
+    """Median sampling rate of the rows (Hz)."""
     if time is None:
         return None
     steps = np.diff(time.value[time.present])
@@ -219,7 +219,7 @@ def _rate(time: Numbers | None) -> float | None:
 
 
 def _targets(raw: RawTable, given: Entry) -> Account | None:
-    """Report for a table of targets, cycles and directions; None where it is none."""
+    """Report on a table of targets, cycles and directions; None for any other table."""
     question = None
     try:
         rows = iso230_rows_of(raw, given)
@@ -241,7 +241,7 @@ def _targets(raw: RawTable, given: Entry) -> Account | None:
 
 
 def _own(path: Path, kind: str) -> Account:
-    """Report for a table in the project's own format, which is read literally."""
+    """Report on a table in fingervision's own format, which is read literally."""
     question = None
     notes: tuple[str, ...] = ()
     columns: dict[str, Numbers] = {}

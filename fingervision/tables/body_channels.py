@@ -1,4 +1,4 @@
-"""User-named channels in a foreign table: positions and angles of bodies, `link 2.x [µm]`, with their `u_` columns."""
+"""User-named channels in tables of other programs: poses of bodies, such as `link 2.x [µm]`, with `u_` columns."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -32,11 +32,11 @@ class BodyChannels:
     Parameters
     ----------
     columns : dict of str to Numbers
-        In mm and mrad, named `name_mm` and `name_mrad`, with `u_` before that for a standard uncertainty.
+        Channels in mm and mrad, named `name_mm` and `name_mrad`; standard uncertainties have the prefix `u_`.
     names : dict of str to str
-        What the file calls each of them.
+        Name of each channel's column in the file.
     notes : list of str
-        Which columns could not be channels, and why.
+        Columns that could not be used as channels, with the reasons.
     """
 
     columns: dict[str, Numbers] = field(default_factory=dict)
@@ -45,16 +45,16 @@ class BodyChannels:
 
 
 def channels_in(raw: RawTable, used: Collection[int], decimal: str) -> BodyChannels:
-    """Treat columns with a unit of length or angle, and without a role, as channels.
+    """Collect as channels all columns that have a unit of length or angle but no role.
 
     Parameters
     ----------
     raw : RawTable
         The table.
     used : collection of int
-        Places of the columns that have a role.
+        Indices of the columns that have a role.
     decimal : str
-        Its decimal mark.
+        Decimal mark of the table.
     """
     found = BodyChannels()
     places: dict[str, list[int]] = {}
@@ -89,7 +89,7 @@ def _numbers(column: RawColumn, decimal: str) -> tuple[Numbers, int]:
 
 
 def _channel(column: RawColumn) -> tuple[str, float] | None:
-    """Name of the channel in a column, and the factor for its unit; None where it is no channel."""
+    """Name of the channel in a column, and the conversion factor of its unit; None if the column is not a channel."""
     text = column.name.strip().strip('"').strip()
     if text in NO_CHANNELS or column.since:
         return None
@@ -117,7 +117,7 @@ def _apart(text: str) -> tuple[str, str]:
 
 
 def _size(unit: str) -> tuple[str, float] | None:
-    """`mm` or `mrad`, and the factor to convert to it."""
+    """Target unit (`mm` or `mrad`) for a unit, and the conversion factor."""
     if (angle := MRAD.get(unit.lower())) is not None and unit != "Mrad":
         return "mrad", angle
     length = factor(unit, "length") if known_unit(unit) else None

@@ -18,16 +18,16 @@ def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.
     Parameters
     ----------
     cells : sequence of str, length n
-        Stripped.
+        Cells without surrounding white space.
     decimal : str
-        `.` or `,`.
+        Decimal mark: `.` or `,`.
 
     Returns
     -------
     Numbers
-        Of length n; cells without a number are absent.
+        Numbers of length n; cells without a number are marked as missing.
     ndarray of int
-        Rows whose cell holds something that is neither a number nor a usual word for none.
+        Rows whose cell is neither a number nor a usual word for a missing value.
     """
     try:
         if decimal == "," and any("," in cell for cell in cells):
@@ -56,7 +56,7 @@ def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.
 
 
 def to_number(cell: str, decimal: str) -> float | None:
-    """Read a cell as a finite number; None where it is none.
+    """Read a cell as a finite number; None if the cell is not a number.
 
     Examples
     --------

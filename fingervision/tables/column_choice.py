@@ -1,4 +1,4 @@
-"""Assign roles to the columns of a table: as the user states, else by the columns' names."""
+"""Assign roles to the columns of a table: as stated by the user, otherwise by the columns' names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ CANONICAL = {role: f"{role}_{UNIT[dimension]}" for role, dimension in DIMENSION.
 
 @dataclass(slots=True)
 class Findings:
-    """Collects what is found while a table is examined."""
+    """Collects questions, notes and omissions while a table is interpreted."""
 
     questions: list[Question] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -42,13 +42,13 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     raw : RawTable
         The table.
     names : sequence of ColumnName
-        Its names, taken apart.
+        Names of the columns, split into name and unit.
     kind : str
-        What it is to be.
+        Kind of table as which the file is to be read.
     given : Entry
-        What the user has decided.
+        Decisions of the user.
     about : object
-        Takes questions and notes.
+        Object that collects questions and notes.
     """
     chosen = {role: _named_column(raw, role, name, given) for role, name in given.columns.items()}
     fixed = set(chosen.values())
@@ -99,7 +99,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
 def _one_clock(
     raw: RawTable, names: Sequence[ColumnName], times: list[int], dates: list[int], about: Findings
 ) -> list[int]:
-    """Use the elapsed time where there is a date as well; a date alone is used as the time."""
+    """Choose the time column: the elapsed time if there is also a date; otherwise the date."""
     both = times + [k for k in dates if _is_dated(raw.columns[k])]
     elapsed = [k for k in times if not _is_dated(raw.columns[k])]
     if len(both) > 1 and len(elapsed) == 1:
@@ -116,7 +116,7 @@ def _is_dated(column: RawColumn) -> bool:
 
 
 def _named_column(raw: RawTable, role: str, name: str, given: Entry) -> int:
-    """Find the column that the user names, by its whole name, its name without unit, or its number."""
+    """Find the column that the user names by its full name, its name without the unit, or its number."""
     for way in (lambda c: c.name.strip(), lambda c: column_name(c.name).base, lambda c: c.name.strip().lower()):
         found = [k for k, column in enumerate(raw.columns) if way(column) == name or way(column) == name.lower()]
         if len(found) == 1:

@@ -17,11 +17,11 @@ class ColumnName:
     Parameters
     ----------
     text : str
-        The whole name.
+        The full name.
     base : str
-        Without its unit.
+        Name without the unit.
     unit : str
-        The unit, as written; empty where the name holds none.
+        Unit as written; empty if the name contains no unit.
     """
 
     text: str
@@ -30,17 +30,17 @@ class ColumnName:
 
     @property
     def role(self) -> str | None:
-        """Role that the name denotes, if any."""
+        """Role that the name denotes; None if the name is not recognised."""
         return role_of(self.base)
 
     @property
     def source(self) -> str | None:
-        """`measured` or `simulation` where the name only states the source of the values."""
+        """`measured` or `simulation` if the name states only the source of the values; otherwise None."""
         return source_of(self.base)
 
 
 def column_name(text: str) -> ColumnName:
-    """Split a column's name into its parts.
+    """Split a column's name into name and unit.
 
     Examples
     --------

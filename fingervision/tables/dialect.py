@@ -1,4 +1,4 @@
-"""Text format (dialect) of a table: separator and decimal mark, found from its lines."""
+"""Text format (dialect) of a table: separator and decimal mark, recognised from the table's lines."""
 
 import csv
 import re
@@ -38,13 +38,13 @@ class Dialect:
     Parameters
     ----------
     separator : str or None
-        Between two cells; None for any blanks.
+        Separator between two cells; None for any white space.
     decimal : str
-        `.` or `,`.
+        Decimal mark: `.` or `,`.
     wide : int
-        Cells in a row.
+        Number of cells in a row.
     either_way : bool
-        Whether the only mark in the numbers may be the decimal one, or set thousands apart.
+        Whether the only mark in the numbers may be either a decimal mark or a thousands separator.
     """
 
     separator: str | None
@@ -54,12 +54,12 @@ class Dialect:
 
     @property
     def words(self) -> str:
-        """For a person."""
+        """Description of the dialect for messages."""
         return f"separator {NAMES[self.separator]}, decimal {'point' if self.decimal == '.' else 'comma'}"
 
 
 def split(line: str, separator: str | None) -> list[str]:
-    """Cells of a line, without quotes."""
+    """Split a line into cells, without quotes."""
     if separator is None:
         return line.split()
     if '"' in line:
@@ -76,7 +76,7 @@ def is_comment(line: str) -> bool:
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Whether a cell is a number in the given dialect."""
+    """Whether a cell is a number with the given decimal mark."""
     cell = cell.translate(MINUS)
     return NUMBER[decimal].fullmatch(cell) is not None or GROUPED[decimal].fullmatch(cell) is not None
 
@@ -87,14 +87,14 @@ def is_value(cell: str, decimal: str) -> bool:
 
 
 def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -> Dialect | None:
-    """Find the dialect in which most cells of most lines are numbers; None where no line has two cells.
+    """Find the dialect in which most cells of most lines are numbers; None if no line has two cells.
 
     Parameters
     ----------
     lines : sequence of str
-        All lines.
+        All lines of the file.
     separator, decimal : str
-        What is stated already (keys of columns.toml); empty: to be found.
+        Marks stated by the user (keys of columns.toml); empty if they are to be recognised.
     """
     sample = [line for line in lines[:SAMPLE_LINES] if line.strip() and not is_comment(line)]
     separators = list(NAMES) if not separator else [BY_NAME_OR_BLANK[separator]]
@@ -117,7 +117,7 @@ def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -
 
 
 def _explained(rows: Sequence[Sequence[str]], decimal: str) -> tuple[float, int] | None:
-    """Fraction of the cells that are values, in rows of the most frequent length; and that length."""
+    """Fraction of cells that are values in rows of the most frequent length, and this length."""
     numeric = [(len(row), sum(is_number(cell, decimal) for cell in row), row) for row in rows]
     lengths = Counter(length for length, numbers, _ in numeric if length > 1 and numbers)
     if not lengths:
@@ -129,10 +129,10 @@ def _explained(rows: Sequence[Sequence[str]], decimal: str) -> tuple[float, int]
 
 
 def _either_way(cells: Sequence[str], dialect: Dialect) -> bool:
-    """Whether all numbers with a mark could be integers with a thousands separator as well as decimal numbers.
+    """Whether all numbers with a mark could be either integers with a thousands separator or decimal numbers.
 
-    A point is questioned only where semicolons separate the cells, because programs with decimal commas use it for
-    thousands.
+    A point is ambiguous only if semicolons separate the cells, because programs with decimal commas use points as
+    thousands separators.
     """
     numbers = [cell.translate(MINUS) for cell in cells if is_number(cell, dialect.decimal)]
     marks = {mark for mark in ".," if any(mark in number for number in numbers)}

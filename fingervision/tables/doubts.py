@@ -1,6 +1,7 @@
-"""Doubts about a foreign table: values that are impossible or improbable, which the user is asked about.
+"""Doubts about a table of another program: impossible or improbable values that the user is asked to confirm.
 
-Each doubt has a name, which the key `accept` in columns.toml takes; a unit stated there by the user is not doubted.
+Each doubt has a name, by which the key `accept` in columns.toml confirms the values; a unit that the user states in
+columns.toml is not doubted.
 """
 
 from collections.abc import Mapping
@@ -33,20 +34,20 @@ EPSILON_MM = 1e-9
 def doubts(
     columns: Mapping[str, Numbers], given: Entry, kind: str, runs: NDArray[np.intp] | None, *, dated: bool = False
 ) -> list[Question]:
-    """List the impossible or improbable values.
+    """List doubts about impossible or improbable values of a table.
 
     Parameters
     ----------
     columns : mapping of str to Numbers
-        By role, in mm, s and N.
+        Columns by role, in mm, s and N.
     given : Entry
-        What the user has decided.
+        Decisions of the user.
     kind : str
         `measured`, `drive` or `simulation`.
     runs : ndarray of int, shape (n,), or None
-        Number of the run of each row.
+        Run number of each row.
     dated : bool
-        Whether times were written as dates, so that their unit is beyond doubt.
+        Whether times were written as dates, so that the unit of the times is certain.
     """
     found: list[Question] = []
     given_units = set(given.units)
@@ -67,7 +68,7 @@ def doubts(
 
 
 def _overlap(columns: Mapping[str, Numbers]) -> list[Question]:
-    """Doubt an input that is missing in most rows with a gap."""
+    """State a doubt if the input is missing in most rows with a gap."""
     sides = [columns[name].present for name in ("left", "right") if name in columns]
     measured = columns["gap"].present if "gap" in columns else np.logical_and.reduce(sides)
     total = int(np.count_nonzero(measured))

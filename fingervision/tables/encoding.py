@@ -1,4 +1,4 @@
-"""Text encoding of a table: byte-order marks, UTF-8, UTF-16 without a mark, and older encodings."""
+"""Text encoding of a table: byte-order marks, UTF-8, UTF-16 without a byte-order mark, and older encodings."""
 
 import codecs
 
@@ -20,14 +20,14 @@ SAMPLE_BYTES = 65536
 
 
 def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
-    """Decode a table's bytes.
+    """Decode the bytes of a table to text.
 
     Parameters
     ----------
     content : bytes
-        The whole file.
+        Content of the complete file.
     given : str or None
-        Encoding that the user states.
+        Encoding stated by the user; None if it is to be recognised.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
 
 
 def _utf16_without_mark(sample: bytes) -> str | None:
-    """Recognise UTF-16 by its zero bytes: ASCII text has one in every second byte."""
+    """Recognise UTF-16 by zero bytes: in ASCII text encoded as UTF-16, every second byte is zero."""
     if len(sample) < 4:
         return None
     zeros = [sample[start::2].count(0) / len(sample[start::2]) for start in (0, 1)]
@@ -73,9 +73,9 @@ def _utf16_without_mark(sample: bytes) -> str | None:
 
 
 def _older(content: bytes) -> tuple[str, str]:
-    """Decode an 8-bit encoding: the Western one if all its characters are usual, else the guess of charset-normalizer.
+    """Decode an 8-bit encoding: Western if this gives only usual characters, otherwise as charset-normalizer detects.
 
-    The few non-ASCII bytes of a header are too few for the statistics of charset-normalizer, so the usual case is
+    A header has too few non-ASCII bytes for the statistics of charset-normalizer, so that the most frequent case is
     decided by a rule.
     """
     try:

@@ -1,4 +1,4 @@
-"""Foreign tables of targets, cycles and directions (ISO 230-2), converted to the project's column names."""
+"""Tables of targets, cycles and directions (ISO 230-2) from other programs, converted to fingervision's format."""
 
 import re
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ ARROWS = {"↑": " up ", "↓": " down ", "→": " up ", "←": " down "}
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A column of a matrix: its index, direction, cycle, and `position` or `deviation` where the name states it."""
+    """A column of a matrix table: its index, direction, cycle, and `position` or `deviation` if the name states it."""
 
     place: int
     side: str
@@ -49,14 +49,14 @@ class _Block:
 
 
 def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
-    """Read a raw table of targets, cycles and directions; None where it is none.
+    """Interpret a raw table of targets, cycles and directions; None for any other table.
 
     Parameters
     ----------
     raw : RawTable
-        Of any format.
+        Raw table from a file of any format.
     given : Entry
-        What the user has decided.
+        Decisions of the user.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
 
 
 def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
-    """Columns of a role: the one that the user names, else those recognised by name."""
+    """Indices of the columns of a role: the column that the user names, otherwise those recognised by name."""
     stated = given.columns.get(role)
     if stated is not None:
         found = [k for k, name in enumerate(names) if stated in (name.text, name.base, str(k + 1))]
@@ -120,7 +120,7 @@ def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
 
 
 def _side(word: str) -> str:
-    """Translate a word for a direction to the project's own; unknown words are kept, and refused later."""
+    """Translate a word for a direction to fingervision's own word; unknown words are kept, and refused later."""
     for arrow, side in ARROWS.items():
         word = word.replace(arrow, side)
     plain = " ".join(tokens(word)) or word.strip()
@@ -128,7 +128,7 @@ def _side(word: str) -> str:
 
 
 def _block(place: int, name: ColumnName) -> _Block | None:
-    """Interpret a name such as `1↑`, `up 2 [µm]`, `Abweichung vorwärts 3`, `+1` as a column of a matrix."""
+    """Interpret a name such as `1↑`, `up 2 [µm]`, `Abweichung vorwärts 3`, `+1` as a column of a matrix table."""
     text = name.base
     if (signed := re.fullmatch(r"\s*(?:(\d+)\s*([+-])|([+-])\s*(\d+))\s*", text)) is not None:
         sign, cycle = signed[2] or signed[3], signed[1] or signed[4]
@@ -152,7 +152,7 @@ def _block(place: int, name: ColumnName) -> _Block | None:
 
 
 def _long_form(raw: RawTable, names: Sequence[ColumnName], given: Entry) -> int:
-    """Column of the readings."""
+    """Return the column of the readings in a table of the long form."""
     found = [k for role in ("position", "deviation") if role in given.columns for k in _places(names, role, given)] or [
         k for k, name in enumerate(names) if name.role in ("input", "gap", "deviation")
     ]
@@ -174,7 +174,7 @@ def _long_form(raw: RawTable, names: Sequence[ColumnName], given: Entry) -> int:
 def _quantity(
     raw: RawTable, names: Sequence[ColumnName], place: int, target_mm: Numbers, given: Entry, questions: list[Question]
 ) -> str:
-    """Whether readings are positions or deviations: as stated, by name, or by their range."""
+    """Decide whether readings are positions or deviations: as the user states, by name, or by the range of values."""
     for role in ("position", "deviation"):
         if role in given.columns or role in given.units:
             return role
@@ -200,7 +200,7 @@ def _quantity(
 def _length(
     raw: RawTable, names: Sequence[ColumnName], place: int, role: str, given: Entry, questions: list[Question]
 ) -> Numbers:
-    """Column in mm."""
+    """Return a column of lengths, converted to mm."""
     column = raw.columns[place]
     unit = given.units.get(role) or column.unit or names[place].unit
     size = factor(unit, "length") if unit else None
@@ -226,7 +226,7 @@ def _plain(raw: RawTable, place: int) -> Numbers:
 
 
 def _time(raw: RawTable, names: Sequence[ColumnName], place: int, given: Entry, questions: list[Question]) -> Numbers:
-    """Times of a long form (s)."""
+    """Return the times (s) of a table of the long form."""
     content = raw.columns[place].content
     if not isinstance(content, Numbers) and looks_like_time(content):
         return seconds_of(content, given.words.get("date_order", "")).numbers

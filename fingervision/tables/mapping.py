@@ -1,4 +1,4 @@
-"""The file columns.toml: the user's decisions about foreign tables."""
+"""The file columns.toml: the user's decisions about the meaning of tables from other programs."""
 
 import fnmatch
 import os
@@ -32,22 +32,22 @@ KEYS = ("file", "as", "columns", "units", *WORDS, *TEXTS, "header_line", "accept
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Decisions about one table.
+    """The user's decisions about one table.
 
     Parameters
     ----------
     columns : mapping of str to str
         Name (or number, from 1) of the column of each role.
     units : mapping of str to str
-        Unit of each role; may be a multiple, `0.1 µm`.
+        Unit of the column of each role; may be a multiple such as `0.1 µm`.
     words : mapping of str to str
-        The other keys of text.
+        Values of the other keys that are texts.
     header_line : int or None
-        Line that names the columns; 0 where none does.
+        Number of the line with the column names; 0 if there is no such line.
     accept : frozenset of str
-        Doubts that the user has looked at.
+        Names of doubts whose values the user has confirmed.
     source : Path or None
-        The columns.toml; None where nothing is decided.
+        Path of the columns.toml; None if there is none.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -59,11 +59,11 @@ class Entry:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether the entry decides nothing."""
+        """Whether the entry contains no decision."""
         return self.source is None
 
     def over(self, other: "Entry") -> "Entry":
-        """Combine two entries; keys of this one override those of the other."""
+        """Combine two entries; the keys of this entry override those of `other`."""
         return Entry(
             {**other.columns, **self.columns},
             {**other.units, **self.units},
@@ -75,16 +75,16 @@ class Entry:
 
 
 def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Entry:
-    """Collect the decisions about a table: from `--columns`, else from a columns.toml in the table's own folder.
+    """Collect the decisions about a table from `--columns`, otherwise from a columns.toml in the table's folder.
 
     Parameters
     ----------
     table : Path
         The table.
     kind : str or None
-        What it is read as; None: not known yet.
+        Kind of table as which the file is read; None if not known yet.
     columns : Path or None
-        The file that the user names.
+        The columns.toml that the user names; None if none is named.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Ent
 
 
 def _matches(table: Path, pattern: str, folder: Path) -> bool:
-    """Whether a pattern matches a table: its name alone, or its path relative to the folder of columns.toml."""
+    """Whether a pattern matches the name of a table, or its path relative to the folder of columns.toml."""
     relative = Path(os.path.relpath(table.resolve(), folder.resolve())).as_posix()
     return any(name == pattern or fnmatch.fnmatchcase(name, pattern) for name in (table.name, relative))
 
@@ -137,7 +137,7 @@ def _entry(section: Section, path: Path) -> Entry:
 
 
 def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
-    """Read `--set` options, `columns.gap=comsol_mm`.
+    """Read the values of `--set` options, such as `columns.gap=comsol_mm`.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def _text(words: str) -> str:
 
 
 def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
-    """Write an entry into columns.toml; entries of other tables, and comments above them, stay unchanged.
+    """Write an entry to columns.toml; entries of other tables and the comments above them stay unchanged.
 
     Returns
     -------
@@ -217,7 +217,7 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
 
 
 def _is_of(part: str, ours: Sequence[str]) -> bool:
-    """Whether a part of columns.toml is the entry for the same file and kind."""
+    """Whether a part of columns.toml is the entry for the same file and the same kind of table."""
     lines = [re.sub(r"\s*=\s*", " = ", line.strip()) for line in part.splitlines()]
     kinds = [line for line in lines if line.startswith("as = ")]
     return all(line in lines for line in ours) and (len(ours) == 3 or not kinds)

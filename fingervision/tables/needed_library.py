@@ -1,4 +1,4 @@
-"""Libraries of the extra `formats`: imported when a file needs them, with an error message where they are missing."""
+"""Import libraries of the extra `formats` when a file needs them, with an error message if they are missing."""
 
 import importlib
 from pathlib import Path
@@ -8,16 +8,16 @@ from fingervision.domain.errors import MissingLibraryError
 
 
 def needed_library(name: str, path: Path, what: str) -> Any:
-    """Import a library that a format needs.
+    """Import a library that a file format needs.
 
     Parameters
     ----------
     name : str
-        Module to import.
+        Name of the module to import.
     path : Path
-        File that needs it.
+        File that needs the library.
     what : str
-        What the file is.
+        Kind of the file, for the error message.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Tables in the project's own format, which are read literally."""
+"""Recognition of tables in fingervision's own format, which are read literally."""
 
 from pathlib import Path
 
@@ -10,9 +10,9 @@ HEAD_BYTES = 100_000
 
 
 def is_own(path: Path, kind: str, given: Entry) -> bool:
-    """Whether a table is in the project's own format, judged by its header line; an unreadable file counts as such.
+    """Whether a table is in fingervision's own format, judged by its header line; True for an unreadable file.
 
-    A table with an entry in columns.toml is read as that entry states.
+    A table with an entry in columns.toml is read as this entry states.
     """
     if not given.says_nothing:
         return False

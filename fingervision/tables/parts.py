@@ -10,18 +10,18 @@ from fingervision.tables.questions import OpenQuestionError, Question
 
 
 def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, what: str) -> str:
-    """Name of the table to read: the stated one, the only one, or the only one with recognisable columns.
+    """Name of the table to read: the table that the user states, the only table, or the only recognisable table.
 
     Parameters
     ----------
     path : Path
         The file.
     names : mapping of str to sequence of str
-        Names of the columns of each part.
+        Names of the columns in each part of the file.
     given : Entry
-        What the user has decided.
+        Decisions of the user.
     what : str
-        What a part is called in this format.
+        Word for a part in this file format (sheet, group).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Open questions about a table, each with the key of columns.toml that answers it."""
+"""Open questions about a table, each with the key of columns.toml that resolves the question."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from fingervision.domain.errors import FingervisionError
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One open point.
+    """One open question about a table.
 
     Parameters
     ----------
     words : str
-        What is open, a clause without a full stop.
+        The question as a clause without a full stop.
     key : str
-        The key that decides, with an example of its value: `units.input=mm`.
+        The key that resolves the question, with an example of a value: `units.input=mm`.
     missing : str
-        Our name of the column that no name in the table stands for; empty where it is another question.
+        Name in fingervision of a required column that was not found in the table; empty for any other question.
     """
 
     words: str
@@ -27,16 +27,16 @@ class Question:
 
 
 class OpenQuestionError(FingervisionError):
-    """A table can be read in more than one way; the message names the key of columns.toml that decides.
+    """A table can be read in more than one way; the message names the key of columns.toml that resolves the ambiguity.
 
     Parameters
     ----------
     path : Path
         The table.
     kind : str
-        What it was to be read as: `measured`, `drive`, `simulation`, or `table` where that is not known yet.
+        Kind as which the table was to be read: `measured`, `drive`, `simulation`, or `table` if not known yet.
     questions : sequence of Question
-        At least one.
+        At least one open question.
     """
 
     def __init__(self, path: Path, kind: str, questions: Sequence[Question]) -> None:
@@ -54,7 +54,7 @@ class OpenQuestionError(FingervisionError):
 
 
 def _quoted(words: str) -> str:
-    """Quote a word for the shell."""
+    """Quote a text for the command line of a shell."""
     from shlex import quote
 
     return quote(words)

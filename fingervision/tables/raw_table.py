@@ -12,18 +12,19 @@ from fingervision.storage.number_columns import Numbers
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawColumn:
-    """One column.
+    """One column of a raw table.
 
     Parameters
     ----------
     name : str
-        As in the file, with what it says of its unit.
+        Name as in the file, including a unit that the name contains.
     content : sequence of str, or Numbers
-        Cells as text; or as numbers where the format holds such.
+        Cells as text, or as numbers if the file format stores numbers.
     unit : str
-        Unit that is stated apart from the name: a row of units, a property of the channel. Empty: none.
+        Unit that is stated separately from the name, in a row of units or as a property of the channel; empty if there
+        is none.
     since : str
-        For seconds that were dates: the date of the first, as text. Empty: no dates.
+        For seconds that were converted from dates: the first date, as text; empty for any other column.
     """
 
     name: str
@@ -44,19 +45,19 @@ class RawTable:
     path : Path
         The file.
     what : str
-        Format and dialect in words.
+        Description of file format and dialect.
     columns : tuple of RawColumn
-        In the file's order.
+        Columns in the order of the file.
     lines : sequence of int
-        Line (or row of the sheet) of each row; empty where a format has none.
+        Line number (or row of the sheet) of each row; empty for a format without lines.
     left_out : tuple of str
-        What was left out and why, a sentence each.
+        Omissions with their reasons, one sentence each.
     notes : tuple of str
-        What was assumed, a sentence each.
+        Assumptions that were made, one sentence each.
     restarts : ndarray of int
-        Rows before which the header stood again.
+        Indices of the rows before which the header was repeated.
     settings : mapping of str to str
-        Keys of columns.toml that would read it the same way again.
+        Keys of columns.toml with which the file would be read in the same way.
     named : bool
         Whether the file itself names its columns.
     """

@@ -1,4 +1,4 @@
-"""Entry points for reading any table as a measured table, a drive or a simulation."""
+"""Entry points for reading any table as a measured table, a drive table or a simulation table."""
 
 from collections.abc import Callable
 from functools import partial
@@ -27,14 +27,14 @@ TABLE_ENDINGS = frozenset((*TEXT_ENDINGS, ".mat", ".parquet", ".tdms", ".xls", "
 
 
 def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTable:
-    """Read a measured table of any kind.
+    """Read a measured table in any format.
 
     Parameters
     ----------
     path : Path
         The table.
     columns : Path or None
-        A columns.toml; None: the one beside the table, if any.
+        A columns.toml; None for that beside the table, if any.
 
     Raises
     ------
@@ -60,14 +60,14 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
 
 
 def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
-    """Read a drive table of any kind.
+    """Read a drive table in any format.
 
     Parameters
     ----------
     path : Path
         The table.
     columns : Path or None
-        A columns.toml; None: the one beside the table, if any.
+        A columns.toml; None for that beside the table, if any.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
 
 
 def drive_of(table: Understood, given: Entry) -> DriveHistory:
-    """Interpret a table as a drive."""
+    """Build a drive history from an interpreted table."""
     path = table.path
     kept = np.flatnonzero(table.columns["time"].present & table.columns["input"].present)
     if not kept.size:
@@ -117,14 +117,14 @@ def drive_of(table: Understood, given: Entry) -> DriveHistory:
 
 
 def read_simulation_table(path: Path, columns: Path | None = None) -> TableModel:
-    """Read a simulation table of any kind as a model.
+    """Read a simulation table in any format as a model.
 
     Parameters
     ----------
     path : Path
         The table.
     columns : Path or None
-        A columns.toml; None: the one beside the table, if any.
+        A columns.toml; None for that beside the table, if any.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def read_simulation_table(path: Path, columns: Path | None = None) -> TableModel
 
 
 def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
-    """Read a simulation table; of a file that is not named like one, say what a model is."""
+    """Read a simulation table; for a file that is not named like a table, the error states what a model file is."""
     try:
         return read_simulation_table(path, columns)
     except OpenQuestionError:
@@ -169,16 +169,16 @@ def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
 
 
 def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) -> CorrectedModel:
-    """Read a model: a simulation table of any kind, a gripper, or a corrected model.
+    """Read a model: a simulation table in any format, a gripper drawing, or a corrected model.
 
     Parameters
     ----------
     path : Path
         The file.
     kind : str
-        Kind of model that a gripper becomes.
+        Kind of model that is built from a gripper drawing.
     columns : Path or None
-        A columns.toml for simulation tables; None: the one beside the table, if any.
+        A columns.toml for simulation tables; None for that beside the table, if any.
 
     Raises
     ------
@@ -197,6 +197,6 @@ def _said(table: Understood, given: Entry) -> list[str]:
 
 
 def said(given: Entry, what: str, notes: tuple[str, ...], left_out: tuple[str, ...]) -> list[str]:
-    """Sentence on how a foreign table was read."""
+    """Sentence on how a table of another program was read."""
     how = f" with {given.source}" if given.source is not None else ""
     return [f"Read as {what}{how}.", *notes, *(f"Left out: {words}." for words in left_out)]

@@ -1,4 +1,4 @@
-"""A curve drawn in characters, for a terminal."""
+"""Plot of a curve in characters, for a terminal."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,16 @@ FEW, JOINED = 2000, 20_000
 def terminal_plot(
     x_name: str, x: NDArray[np.float64], y_name: str, y: NDArray[np.float64], *, plain: bool = False
 ) -> list[str]:
-    """Draw points.
+    """Plot points in a grid of characters.
 
     Parameters
     ----------
     x_name, y_name : str
-        What stands at the axes.
+        Labels of the axes.
     x, y : ndarray of float, shape (n,)
-        Points, n at least 1.
+        Coordinates of the points, n at least 1.
     plain : bool
-        With asterisks instead of braille, for terminals without Unicode.
+        Whether to use asterisks instead of braille characters, for terminals without Unicode.
     """
     top, bottom = f"{np.max(y):.4g}", f"{np.min(y):.4g}"
     left, right = f"{np.min(x):.4g}", f"{np.max(x):.4g}"

@@ -1,4 +1,4 @@
-"""Lines of a text file, with a limit on its size."""
+"""Reading of the lines of a text file, with a limit on the size of the file."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ LONGEST_LINE = 1_000_000
 
 
 def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
-    """Read all lines.
+    """Read all lines of a text file.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Header of a text table: the names of its columns, and their units."""
+"""Header of a text table: names and units of the columns."""
 
 import re
 from collections.abc import Sequence
@@ -26,16 +26,16 @@ ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The lines above the numbers.
+    """The header lines above the numbers.
 
     Parameters
     ----------
     names : tuple of str
-        Of the columns; empty where none are given.
+        Names of the columns; empty if there are none.
     units : tuple of str
-        A row of units; empty where there is none.
+        Units from a row of units; empty if there is none.
     line : int
-        Line of the names, from 0; -1 where there is none.
+        Number of the line with the names, from 0; -1 if there is none.
     """
 
     names: tuple[str, ...] = ()
@@ -48,7 +48,7 @@ def _is_row(cells: Sequence[str], dialect: Dialect) -> bool:
 
 
 def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
-    """Line number of the first row of numbers, from 0."""
+    """Find the line number, from 0, of the first row of numbers."""
     start = 0 if given.header_line is None else min(given.header_line, len(lines))
     named = given.header_line is None
     poor: int | None = None
@@ -70,7 +70,7 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
 
 
 def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry) -> Header:
-    """Find names and units above the first row."""
+    """Find column names and units above the first row."""
     if given.header_line == 0:
         return Header()
     if given.header_line is not None:
@@ -121,7 +121,7 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
 
 
 def _labelled(line: str, dialect: Dialect) -> tuple[str, tuple[str, ...]]:
-    """Label in the first column of a worksheet's header row, in lower case, and its value for each column."""
+    """Label (in lower case) in the first column of a worksheet's header row, and the row's value for each column."""
     label, *cells = [cell.strip() for cell in line.split("\t")]
     if len(cells) == dialect.wide - 1:
         cells = ["", *cells]
@@ -129,7 +129,7 @@ def _labelled(line: str, dialect: Dialect) -> tuple[str, tuple[str, ...]]:
 
 
 def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
-    """Names that are listed one per line; None where not every column has one."""
+    """Read column names that are listed one per line; None if not every column has a name."""
     matches = [(at, ONE_A_LINE.fullmatch(line)) for at, line in enumerate(lines)]
     found = {int(match[1]): (match[2], at) for at, match in matches if match is not None}
     if sorted(found) != list(range(wide)):
@@ -144,7 +144,7 @@ def _all_units(cells: Sequence[str]) -> bool:
 
 
 def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
-    """Interpret a line as the names of all columns; None where the number of names differs."""
+    """Interpret a line as the names of all columns; None if the number of names differs from that of columns."""
     text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).strip()
     if dialect.separator is not None:
         text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).rstrip("\r\n")
@@ -161,7 +161,7 @@ def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
 
 
 def _splits(text: str, dialect: Dialect) -> list[list[str]]:
-    """Ways to split a line into names, the most probable first."""
+    """List the ways to split a line into names, the most probable first."""
     ways = [split(text, dialect.separator)]
     if dialect.separator is None:
         ways.append([cell.strip() for cell in re.split(r"\t+|\s{2,}", text) if cell.strip()])

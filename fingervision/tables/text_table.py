@@ -1,4 +1,4 @@
-"""Convert lines of text to a raw table: header, units, comments, repeated headers, and lines that are no rows."""
+"""Convert lines of text to a raw table: header, units, comments, repeated headers, and lines that are not rows."""
 
 import re
 from collections.abc import Sequence
@@ -33,18 +33,18 @@ MOST_ODD = 0.05
 
 
 def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str) -> RawTable:
-    """Find header and rows among the lines, and read the rows.
+    """Find header and rows in the lines of a file, and read the rows.
 
     Parameters
     ----------
     path : Path
         The file.
     lines : sequence of str
-        All of its lines.
+        All lines of the file.
     given : Entry
-        What the user has decided.
+        Decisions of the user.
     encoding : str
-        For the description.
+        Name of the text encoding, for the description of the format.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def _settings(dialect: Dialect, header: Header) -> dict[str, str | int]:
 
 
 def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect) -> None:
-    """Refuse rows with twice as many comma-separated cells as there are names above (decimal commas)."""
+    """Refuse rows with twice as many comma-separated cells as column names (unquoted decimal commas)."""
     if dialect.separator != ",":
         return
     for line in lines[max(0, first - HEADER_LINES) : first]:
@@ -108,7 +108,7 @@ def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect
 
 
 def _marked(lines: Sequence[str], dialect: Dialect) -> str:
-    """First number with a decimal or thousands mark."""
+    """Find the first number with a decimal mark or thousands separator."""
     for line in lines:
         for cell in split(line, dialect.separator):
             if ("," in cell or "." in cell) and is_number(cell, dialect.decimal) and not is_comment(line):

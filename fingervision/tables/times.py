@@ -1,4 +1,4 @@
-"""Convert dates and times of day, in the spelling of common programs, to seconds since the first."""
+"""Convert dates and times of day, in the notations of common programs, to seconds since the first value."""
 
 import re
 from collections.abc import Sequence
@@ -26,20 +26,20 @@ ORDERS = ("dmy", "mdy")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seconds:
-    """A column of dates or times of day.
+    """A column of dates or times of day, converted to seconds.
 
     Parameters
     ----------
     numbers : Numbers
-        Seconds from the first.
+        Seconds since the first value.
     since : str
-        The first, as written.
+        The first value, as written in the file.
     notes : tuple of str
-        What was assumed, a sentence each.
+        Assumptions that were made, one sentence each.
     open_order : bool
-        Whether day and month could be exchanged, and that makes a difference.
+        Whether the order of day and month is ambiguous and affects the times.
     unread : int
-        Cells that are no date.
+        Number of cells that are neither a date nor a time.
     """
 
     numbers: Numbers
@@ -58,15 +58,15 @@ def looks_like_time(cells: Sequence[str]) -> bool:
 def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
     """Read dates and times of day.
 
-    A time of day that falls by more than half a day has passed midnight, once each time. An offset from UTC is
-    subtracted; times without an offset are used as they are.
+    If the time of day decreases by more than half a day, one midnight is assumed to have passed. An offset from UTC is
+    subtracted; times without an offset are used unchanged.
 
     Parameters
     ----------
     cells : sequence of str
         `2024-05-03T12:00:01.5+02:00`, `03.05.2024 12:00:01,5`, `5/3/2024 1:00:01 PM`, `12:00:01.250`.
     date_order : str
-        `dmy`, `mdy` or `ymd` where the user has said so.
+        Order of day, month and year if the user has stated it: `dmy`, `mdy` or `ymd`.
     """
     clock_s, present, codes, words = _taken_apart(cells)
     days = {order: _days(words, order) for order in ([date_order] if date_order else ORDERS)}
@@ -96,7 +96,7 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
 def _taken_apart(
     cells: Sequence[str],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.intp], list[str]]:
-    """Seconds of the day of each cell, whether it is a time, the index of its day's word (-1: none), and the words."""
+    """For each cell, seconds of the day, whether it is a time, and index of its date (-1 for none); also all dates."""
     clock_s, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
     codes = np.full(len(cells), -1, dtype=np.intp)
     number: dict[str, int] = {}
@@ -115,7 +115,7 @@ def _taken_apart(
 
 
 def _one(text: str) -> tuple[str, float | None]:
-    """Word for the day ('' for none) and seconds of the day; None where a cell is no time."""
+    """Split a cell into date ('' for none) and seconds of the day; None if the cell is not a time."""
     offset = 0.0
     if (zone := ZONE.search(text)) is not None and ":" in text[: zone.start()]:
         offset = _offset(zone[0])
@@ -129,9 +129,9 @@ def _one(text: str) -> tuple[str, float | None]:
 
 
 def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
-    """Days since the first, for each word (one zero where there is none).
+    """Convert each date to days since the first date (a single zero without dates).
 
-    None where a date does not exist in this order.
+    The result is None if a date does not exist in this order of day, month and year.
     """
     numbers = [_ordinal(word, order) for word in words]
     if None in numbers:
@@ -162,7 +162,7 @@ def _offset(zone: str) -> float:
 
 
 def _ordinal(text: str, order: str) -> int | None:
-    """Number of a day; None where no such day exists. Dates before 1970 are accepted."""
+    """Convert a date to a day number; None if no such day exists. Dates before 1970 are accepted."""
     match = DAY.fullmatch(text)
     if match is None:
         return None
@@ -182,7 +182,7 @@ def _ordinal(text: str, order: str) -> int | None:
 
 
 def is_epoch(first: float) -> str:
-    """Name of the epoch from which a large number of seconds is counted; empty where it is none of the known ones.
+    """Name of the epoch from which a large number of seconds is counted; empty if it matches no known epoch.
 
     Examples
     --------

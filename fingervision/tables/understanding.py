@@ -1,4 +1,4 @@
-"""Interpretation of a raw table: role and unit of each column, and what remains open."""
+"""Interpretation of a raw table: role and unit of each column, and open questions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,11 +32,11 @@ class Taken:
     Parameters
     ----------
     name : str
-        As in the file.
+        Name of the column in the file.
     role : str
-        Its role.
+        Role of the column.
     unit : str
-        Its unit, as written; empty where it has none.
+        Unit of the column as written; empty if there is none.
     """
 
     name: str
@@ -51,23 +51,23 @@ class Understood:
     Parameters
     ----------
     raw : RawTable
-        What was read.
+        The raw table.
     kind : str
         `measured`, `drive` or `simulation`.
     taken : tuple of Taken
-        Columns with a role.
+        Columns to which a role was assigned.
     columns : mapping of str to Numbers
-        By role, in mm, s and N.
+        Values of the columns by role, in mm, s and N.
     runs : tuple of str, or None
-        Name of each row's run.
+        Name of the run of each row; None without runs.
     notes : tuple of str
-        What was assumed, a sentence each.
+        Assumptions that were made, one sentence each.
     left_out : tuple of str
-        What was left out, and why.
+        Omissions with their reasons, one sentence each.
     questions : tuple of Question
-        What is open.
+        Open questions.
     channels : BodyChannels
-        Columns of a measured table that are channels of one's own.
+        User-named channels of a measured table.
     """
 
     raw: RawTable
@@ -82,11 +82,11 @@ class Understood:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the table's file."""
         return self.raw.path
 
     def decided(self) -> "Understood":
-        """Return the table itself, if nothing is open.
+        """Return the table itself if there is no open question.
 
         Raises
         ------
@@ -99,16 +99,16 @@ class Understood:
 
 
 def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
-    """Interpret each column.
+    """Interpret each column of a raw table: assign roles and convert units.
 
     Parameters
     ----------
     raw : RawTable
-        Of any format.
+        Raw table from a file of any format.
     kind : str
         `measured`, `drive` or `simulation`.
     given : Entry
-        What the user has decided.
+        Decisions of the user.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
 
 
 def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings) -> str | None:
-    """Unit of a column as stated by the user, beside its name, or in it; None where it is open, or not needed."""
+    """Unit of a column as stated by the user, beside the name or in the name; None if unresolved or not needed."""
     if role in given.units:
         return given.units[role]
     stated = [unit for unit in (spelled(column.unit), name.unit) if unit and unit != "-"]
@@ -192,7 +192,7 @@ def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
 
 
 def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about: Findings) -> Numbers:
-    """Read a column's cells; cells that are no numbers are reported."""
+    """Read a column's cells as numbers; cells that are not numbers are reported."""
     if isinstance(column.content, Numbers):
         return column.content
     values, odd = to_numbers(column.content, decimal)
@@ -209,7 +209,7 @@ def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about
 
 
 def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findings) -> Numbers | None:
-    """Time from dates and times of day; None where the column contains numbers."""
+    """Convert a column of dates and times of day to seconds; None if the column contains numbers."""
     column = raw.columns[chosen["time"]]
     if isinstance(column.content, Numbers) or "time" in given.units or not looks_like_time(column.content):
         return None
@@ -235,7 +235,7 @@ def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findin
 
 
 def _from_epoch(values: Numbers, column: RawColumn, about: Findings) -> Numbers:
-    """Subtract the first time where a clock counts from 1970 or 1904: no recording has such times."""
+    """Subtract the first time if the clock counts from 1970 or 1904."""
     if not values.present.any():
         return values
     first = float(values.value[int(np.argmax(values.present))])
@@ -249,7 +249,7 @@ def _from_epoch(values: Numbers, column: RawColumn, about: Findings) -> Numbers:
 def _runs(
     raw: RawTable, chosen: Mapping[str, int], columns: Mapping[str, Numbers], given: Entry, about: Findings
 ) -> tuple[str, ...] | None:
-    """Name of each row's run: from its own column, or from restarts of the time that the user declared to be runs."""
+    """Name of each row's run: from the column of runs, or from restarts of the time that the user declares as runs."""
     if (place := chosen.get("run")) is not None:
         content = raw.columns[place].content
         if isinstance(content, Numbers):

@@ -43,7 +43,7 @@ NO_UNIT = frozenset({"", "-", "1", "[-]", "\u2013", "none", "n/a"})
 
 @cache
 def registry() -> "UnitRegistry[Any]":
-    """Load the units library, once and only when a foreign table is read."""
+    """Load the units library once, and only when a table of another program is read."""
     from pint import UnitRegistry
 
     return UnitRegistry(cache_folder=None)
@@ -57,7 +57,7 @@ def spelled(text: str) -> str:
 
 @cache
 def known_unit(text: str) -> str | None:
-    """Name of a unit of length, time or force from its word or symbol; None where it is unknown."""
+    """Name of a unit of length, time or force from its word or symbol; None for an unknown unit."""
     text = spelled(text)
     if text in CASE_TELLS:
         return CASE_TELLS[text]
@@ -66,7 +66,7 @@ def known_unit(text: str) -> str | None:
 
 @cache
 def factor(text: str, dimension: str) -> float | None:
-    """Factor from a unit, or a multiple such as `0.1 µm`, to mm, s or N; None where the dimension differs.
+    """Conversion factor of a unit, or of a multiple such as `0.1 µm`, to mm, s or N; None if the dimension differs.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def factor(text: str, dimension: str) -> float | None:
 
 @cache
 def is_unit(text: str) -> bool:
-    """Whether a cell may belong to a row of units: a unit of any dimension, or empty."""
+    """Whether a cell may be part of a row of units: it is a unit of any dimension, or empty."""
     words = spelled(text)
     if words.lower() in NO_UNIT or known_unit(words) is not None or words in {"%", "°", "°C", "C", "V", "A", "Hz"}:
         return True

@@ -19,24 +19,24 @@ def is_numeric(value: Any) -> bool:
 
 
 def numbers(value: NDArray[Any]) -> Numbers:
-    """Convert an array of real numbers; values that are not finite become missing."""
+    """Convert an array of real numbers to a column; values that are not finite become missing values."""
     plain = np.asarray(value, dtype=np.float64).ravel()
     usable = np.isfinite(plain)
     return Numbers(np.where(usable, plain, 0.0), usable)
 
 
 def tables_of(values: Mapping[str, Any]) -> dict[str, list[RawColumn]]:
-    """Combine vectors of equal length; each matrix, and each structure, is a table of its own.
+    """Combine vectors of equal length to tables; each matrix and each structure becomes a separate table.
 
     Parameters
     ----------
     values : mapping of str to anything
-        Arrays, and mappings of such for structures; anything else is passed over.
+        Arrays by name, and mappings of arrays for structures; any other value is ignored.
 
     Returns
     -------
     dict of str to list of RawColumn
-        By the name of the structure or matrix; `vectors of N` for the rest.
+        Columns of each table, by the name of the structure or matrix; `vectors of N` for separate vectors.
     """
     found: dict[str, list[RawColumn]] = {}
     loose: dict[int, list[RawColumn]] = {}

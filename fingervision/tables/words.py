@@ -54,7 +54,7 @@ BY_TOKEN = {word: role for role, words in ROLES.items() for word in words.split(
 
 
 def tokens(name: str) -> tuple[str, ...]:
-    """Words of a name: lower case without accents; camelCase is split.
+    """Split a name into words, in lower case and without accents; camelCase is split as well.
 
     Examples
     --------
@@ -72,10 +72,10 @@ def tokens(name: str) -> tuple[str, ...]:
 
 
 def role_of(name: str) -> str | None:
-    """Role denoted by a name without its unit; None where it is unknown, or ambiguous.
+    """Role denoted by a name without its unit; None for an unknown or ambiguous name.
 
-    A name has a role if one of its words has, and all its other words are filler words. In `time stamp` the other word
-    is a filler, in `start time` it is not.
+    A name has a role if one of its words has a role and all other words are filler words. In `time stamp` the word
+    `stamp` is a filler; in `start time` the word `start` is not.
 
     Examples
     --------
@@ -84,7 +84,8 @@ def role_of(name: str) -> str | None:
     >>> role_of("room temperature"), role_of("gap error")
     (None, None)
 
-    A standard uncertainty is a small u, or a capital among capitals: U is the expanded one.
+    A lower-case u denotes a standard uncertainty, and so does a capital U in a name of capitals only; otherwise a
+    capital U denotes an expanded uncertainty and has no role.
 
     >>> role_of("u_gap"), role_of("u(gap)"), role_of("U_RANDOM"), role_of("U_gap")
     ('u_gap', 'u_gap', 'u_random', None)
@@ -117,7 +118,7 @@ def role_of(name: str) -> str | None:
 
 
 def source_of(name: str) -> str | None:
-    """`measured` or `simulation` where a column's name states the source of its values and nothing else.
+    """`measured` or `simulation` if a column's name states the source of the values and nothing else; otherwise None.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""The contract tests that every part passes, for authors of plug-ins: the package's own parts pass the same tests.
+"""Contract tests for authors of plug-ins; the built-in parts of the package pass the same tests.
 
-Derive a class whose name begins with `Test`, say what is to be tested, and run pytest; each method is one test, and a
-failure is a sentence that says what the part must do and what it does::
+Derive a class whose name begins with `Test`, state the part to be tested, and run pytest. Each method is one test; a
+failure is reported by a sentence that states what the part must do and what it does::
 
     # tests/test_creeping_foot.py
     from fingervision.testing import EffectContract
@@ -20,9 +20,10 @@ failure is a sentence that says what the part must do and what it does::
 | force sensor | `ForceSensorContract` | `open_bed()`: a bed that has it |
 | camera | `CameraContract` | `open_bed()`: a bed that has it |
 
-A bed is most easily opened from its file: `open_bed = lambda self: fingervision.testing.bed_at("bed.toml")`. Nothing
-here imports pytest. Without it, `run(EffectContract, effect=EFFECT)` runs all tests and returns a sentence for each one
-that fails. `diagnosed(effect, values)` simulates data with an effect, diagnoses them, and returns the report.
+The simplest way to open a test bed is from its file: `open_bed = lambda self: fingervision.testing.bed_at("bed.toml")`.
+This package does not import pytest. Without pytest, `run(EffectContract, effect=EFFECT)` runs all tests and returns a
+sentence for each failed test. `diagnosed(effect, values)` simulates data with an effect, diagnoses these data, and
+returns the report.
 """
 
 from fingervision.testing.bed_contract import ActuatorContract, CameraContract, ForceSensorContract, bed_at

@@ -25,22 +25,22 @@ encoder_step_mm, repeatability_mm and settling_s."""
 
 
 def bed_at(path: str | Path) -> Bed:
-    """Open the bed that a file describes; its `kind` entries may name a plug-in or a file."""
+    """Open the test bed that a file describes; the `kind` entries of the file may name plug-ins or Python files."""
     return bed_factory.open_bed(str(path))
 
 
 class _BedContract:
-    """Tests of a part through its bed; define `open_bed`, or pass an open bed with `of`."""
+    """Tests of a part through its test bed; define `open_bed`, or pass an open test bed with `of`."""
 
     _open: Bed | None = None
 
     def open_bed(self) -> Bed:
-        """Open a bed that contains the part; the subclass defines this."""
+        """Open a test bed that contains the part; to be defined by the subclass."""
         raise NotImplementedError
 
     @classmethod
     def of(cls, bed: Bed) -> Self:
-        """Return tests of a bed that is already open, which stays open afterwards."""
+        """Return the tests for a test bed that is already open, and that stays open afterwards."""
         contract = cls()
         contract._open = bed
         return contract
@@ -59,10 +59,10 @@ class ActuatorContract(_BedContract):
     """Tests of an actuator; define `open_bed()`.
 
     The motor moves by up to a millimetre, and once towards 5 mm until it is stopped: make sure that nothing is in its
-    way. The tolerances follow from what the actuator's `limits` declare. An actuator that declares nothing must stop
-    within a nanometre of its target, and the motion must take its nominal time within two readings (20 ms); see
-    `StageLimits` for accuracy_mm, encoder_step_mm, repeatability_mm (readings at rest, and the reference) and
-    settling_s (ramps and coming to rest).
+    way. The tolerances follow from the properties that the actuator's `limits` declare. An actuator without declared
+    properties must stop within a nanometre of its target, and a motion must take its nominal duration within two
+    readings (20 ms). See `StageLimits` for accuracy_mm, encoder_step_mm, repeatability_mm (of readings at rest, and of
+    the reference) and settling_s (acceleration ramps and settling).
 
     `has_motor` is False for an actuator that does not move at a commanded speed, such as a screw turned by hand.
     """
@@ -98,7 +98,7 @@ class ActuatorContract(_BedContract):
             )
 
     def test_homing_ends_at_zero(self) -> None:
-        """The reference becomes position 0."""
+        """After homing, the reference is position 0."""
         with self._bed() as bed:
             bed.actuator.move(_place_mm(bed, 0.7), _speed_mm_s(bed, SPEED_MM_S))
             _until_rest(bed)
@@ -111,7 +111,7 @@ class ActuatorContract(_BedContract):
             )
 
     def test_a_jog_ends_with_a_stop(self) -> None:
-        """A jog runs at its speed until it is stopped, and then the stage stands still."""
+        """A jog moves at its speed until it is stopped; then the stage is at rest."""
         self._needs_motor()
         with self._bed() as bed:
             before = bed.actuator.readings()[-1:]
@@ -145,13 +145,13 @@ class ActuatorContract(_BedContract):
             )
 
     def test_readings_come_in_order_and_between_question_and_answer(self) -> None:
-        """Each call returns readings up to the present, in order, with time bounds on the bed's clock."""
+        """Each call returns the readings up to the present, in order, with time bounds by the test bed's clock."""
         with self._bed() as bed:
             bed.actuator.move(_place_mm(bed, 0.5), _speed_mm_s(bed, 1.0))
             _check_order(bed, bed.actuator.readings, bed.actuator.name)
 
     def test_beyond_its_limits_nothing_moves(self) -> None:
-        """A target or speed beyond the limits is refused with a sentence, and the stage stands still."""
+        """A target or speed beyond the limits is refused with a sentence, and the stage stays at rest."""
         with self._bed() as bed:
             limits, before_mm = bed.actuator.limits, bed.actuator.readings()[-1].value
             speed_mm_s = _speed_mm_s(bed, 1.0)
@@ -170,7 +170,7 @@ class ActuatorContract(_BedContract):
             )
 
     def test_a_busy_actuator_refuses_another_motion(self) -> None:
-        """A second motion is refused while one is under way; after a stop the next one is accepted."""
+        """A second motion is refused during a motion; after a stop, the next motion is accepted."""
         self._needs_motor()
         with self._bed() as bed:
             bed.actuator.move(_place_mm(bed, FAR_MM), _speed_mm_s(bed, SLOW_MM_S))
@@ -178,7 +178,7 @@ class ActuatorContract(_BedContract):
             bed.actuator.stop()
 
     def test_closing_twice_is_allowed(self) -> None:
-        """Closing twice is allowed: the second time does nothing."""
+        """Closing twice is allowed: the second call does nothing."""
         with self._bed() as bed:
             bed.close()
             bed.close()
@@ -192,7 +192,7 @@ class ForceSensorContract(_BedContract):
     """Tests of a force sensor; define `open_bed()`."""
 
     def test_forces_come_in_order_and_within_the_full_scale(self) -> None:
-        """Each call returns forces up to the present, in order; no force is beyond the full scale."""
+        """Each call returns the forces up to the present, in order; no force exceeds the full scale."""
         with self._bed() as bed:
             sensor = bed.force_sensor
             if sensor is None:
@@ -209,7 +209,7 @@ class CameraContract(_BedContract):
     """Tests of a camera; define `open_bed()`."""
 
     def test_frames_come_in_order_after_their_exposure(self) -> None:
-        """Frame numbers have no holes, times rise, and pictures are as the camera describes them."""
+        """Frame numbers are consecutive, times increase, and pictures agree with the camera's description."""
         with self._bed() as bed:
             camera = bed.camera
             if camera is None:
@@ -240,7 +240,7 @@ class CameraContract(_BedContract):
 
 
 def _place_mm(bed: Bed, by_mm: float) -> float:
-    """The position `by_mm` from 0, brought within the limits of the bed (mm)."""
+    """The position `by_mm`, clipped to the limits of the test bed (mm)."""
     low, high = bed.limits.lower_mm, bed.limits.upper_mm
     middle = min(max(0.0, low), high)
     return min(max(middle + by_mm, low), high)
@@ -261,9 +261,9 @@ def _still_mm(bed: Bed) -> float:
 
 
 def _known_mm(bed: Bed, speed_mm_s: float) -> float:
-    """Uncertainty of a motion's length from readings: encoder steps, scatter, and uncertain times (mm).
+    """Uncertainty (mm) of a motion's length from readings: encoder steps, scatter, and uncertain times.
 
-    The beginning and the end of a motion lie between two readings each; ramps and settling add what the stage declares.
+    Start and end of a motion each lie between two readings; the declared durations of ramps and settling are added.
     """
     limits = bed.actuator.limits
     return limits.encoder_step_mm + 2.0 * limits.repeatability_mm + (2.0 * WAIT_S + limits.settling_s) * speed_mm_s
@@ -274,7 +274,7 @@ def _wait(bed: Bed, seconds: float) -> None:
 
 
 def _until_rest(bed: Bed) -> tuple[Reading, ...]:
-    """Readings up to the end of the motion; the last of them is at rest."""
+    """Collect readings up to the end of the motion; the last reading is at rest."""
     until_s = bed.clock.now_s() + PATIENCE_S
     seen: list[Reading] = []
     while bed.actuator.busy:
@@ -287,7 +287,7 @@ def _until_rest(bed: Bed) -> tuple[Reading, ...]:
 
 
 def _watched(bed: Bed, seconds: float) -> tuple[Reading, ...]:
-    """Readings during some seconds; an actuator that does not stream is asked often."""
+    """Collect readings for some seconds; an actuator that does not stream readings is polled frequently."""
     seen: list[Reading] = []
     until_s = bed.clock.now_s() + seconds
     while bed.clock.now_s() < until_s:
@@ -309,7 +309,7 @@ def _check_order(
 ) -> list[Reading]:
     """Check the order of readings.
 
-    With `asked` the newest reading is taken at the request; otherwise it was streamed before.
+    With `asked`, the newest reading must have been taken on request; otherwise it may have been streamed before.
     """
     seen: list[Reading] = []
     for _ in range(5):

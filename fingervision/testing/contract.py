@@ -1,11 +1,11 @@
-"""Common parts of the contracts: a failure is reported as a sentence; a test may declare that it does not apply."""
+"""Common parts of contract tests: a failure is reported as a sentence; a test may declare that it does not apply."""
 
 from typing import Any
 from unittest import SkipTest
 
 
 class ContractError(AssertionError):
-    """A part breaks its contract; the sentence says what it must do, and what it does."""
+    """A part violates its contract; the sentence states what the part must do, and what it does."""
 
 
 class NotApplicable(SkipTest):
@@ -19,7 +19,7 @@ def hold(kept: bool, sentence: str) -> None:
 
 
 def checks_of(contract: type) -> tuple[str, ...]:
-    """Name the tests of a contract, in the order in which they stand in it."""
+    """Names of the tests of a contract, in the order of their definition."""
     names = [name for base in reversed(contract.__mro__) for name in vars(base) if name.startswith("test_")]
     return tuple(dict.fromkeys(names))
 
@@ -30,14 +30,14 @@ def run(contract: type, **given: Any) -> dict[str, str]:
     Parameters
     ----------
     contract : type
-        `EffectContract` or another.
+        The contract class, such as `EffectContract`.
     **given
         What the contract asks for: `effect=EFFECT`.
 
     Returns
     -------
     dict of str to str
-        The sentence of each test that failed, by the test's name; empty where all passed.
+        Sentence of each failed test, by the name of the test; empty if all tests passed.
     """
     failed = {}
     for name in checks_of(contract):

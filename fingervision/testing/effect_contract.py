@@ -1,4 +1,4 @@
-"""Contract tests of effects: neutral at zero, at rest at the start, symmetric, with finite results."""
+"""Contract tests of effects: no change at neutral values, rest at the start of a run, symmetry, finite results."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ MODEL = TableModel("straight", INPUT_MM, -0.5 * GAP_MM, 0.5 * GAP_MM, 2.0 * INPU
 
 
 def bench() -> History:
-    """Sample data of two runs, each out, held, and back; the second at half the speed."""
+    """Sample history of two runs, each with an opening, a rest and a return; the second run has half the speed."""
     up = np.linspace(-0.4, 1.4, 120)
     run = np.concatenate([up, np.full(40, 1.4), up[::-1]])
     return History(
@@ -41,7 +41,7 @@ def bench() -> History:
 
 
 def neutral_values(effect: Effect, history: History) -> dict[str, float]:
-    """Parameter values at which the effect must change nothing: its neutral ones, or else the starting ones."""
+    """Parameter values at which the effect must change nothing: neutral values, or starting values of shapes."""
     return {
         p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) if p.neutral is None else p.neutral
         for p in _searched(effect, history)
@@ -49,7 +49,7 @@ def neutral_values(effect: Effect, history: History) -> dict[str, float]:
 
 
 def usual_values(effect: Effect, history: History) -> dict[str, float]:
-    """Values at which the effect must be visible: three tenths of the way to the upper bound, or half-way below it."""
+    """Parameter values at which the effect must be visible, well inside the bounds."""
     out = {}
     for p in _searched(effect, history):
         if p.run is not None:
@@ -64,19 +64,19 @@ def usual_values(effect: Effect, history: History) -> dict[str, float]:
 
 
 class EffectContract:
-    """Tests of one effect; give it as `effect`."""
+    """Tests of one effect, stated as the class attribute `effect`."""
 
     effect: Effect
 
     def test_it_states_what_it_is(self) -> None:
-        """Name, stage, words, formula, source, residual and parameters are declared, and a trial response is valid."""
+        """Name, stage, words, formula, source, residual and parameters are declared; a trial response is valid."""
         try:
             try_effect(self.effect)
         except MisfitError as error:
             hold(False, f"The effect {getattr(self.effect, 'name', self.effect)} {error}.")
 
     def test_neutral_parameters_change_nothing(self) -> None:
-        """At its neutral values, or with all of them 0, the positions of both fingers are those of the model."""
+        """At neutral values, or with all values 0, the positions of both fingers are those of the model."""
         bare = self._chain().respond({})
         moved_mm = []
         neutral = neutral_values(self.effect, bench())
@@ -91,7 +91,7 @@ class EffectContract:
         )
 
     def test_it_shows(self) -> None:
-        """Well inside its bounds it changes gap, midline or force."""
+        """At values well inside the bounds, the effect changes gap, midline or force."""
         values = usual_values(self.effect, bench())
         bare, moved = self._chain().respond({}), self._chain().respond({self.effect.name: values})
         changed = max(
@@ -106,7 +106,7 @@ class EffectContract:
         )
 
     def test_it_answers_at_its_bounds(self) -> None:
-        """With each parameter at either bound and the others as usual, the response is finite."""
+        """With each parameter at either bound and the other parameters at usual values, the response is finite."""
         usual = usual_values(self.effect, bench())
         for p in _searched(self.effect, bench()):
             for bound in (p.lower, p.upper):
@@ -118,7 +118,7 @@ class EffectContract:
                 )
 
     def test_the_same_values_give_the_same_answer(self) -> None:
-        """Nothing is random, and nothing is remembered from call to call."""
+        """The response is not random, and does not depend on earlier calls."""
         values = usual_values(self.effect, bench())
         first, again = (self._chain().respond({self.effect.name: values}) for _ in range(2))
         moved_mm = _moved_mm(first, again)
@@ -128,7 +128,7 @@ class EffectContract:
         )
 
     def test_memory_starts_each_run_at_rest(self) -> None:
-        """An effect with memory has none at the first sample of a run."""
+        """An effect with memory does not depend on earlier runs at the first sample of a run."""
         if not self.effect.memory:
             raise NotApplicable(f"{self.effect.name} does not depend on earlier inputs")
         bare = self._chain().respond({})
@@ -185,7 +185,7 @@ class EffectContract:
             hold(False, f"The effect {self.effect.name} must state needs_times, as it reads times ({error}).")
 
     def test_along_curves_a_sine_is_late_as_a_whole(self) -> None:
-        """A delay that interpolates along curves delays a sine more exactly than one along straight lines."""
+        """For a sine, a delay with curved interpolation is more accurate than a delay with linear interpolation."""
         if not (isinstance(self.effect, DriveEffect | PointEffect) and self.effect.act_curved is not None):
             raise NotApplicable(f"{self.effect.name} has the same result for curved and straight models")
         time_s = np.arange(0.0, 20.0, 0.2)
@@ -224,7 +224,7 @@ class _ChainOf:
         self._chain.__dict__["effects"] = {effect.name: effect}
 
     def respond(self, settings: dict[str, dict[str, float]]) -> Response:
-        """Run it."""
+        """Compute the response of the chain."""
         return self._chain.respond(settings)
 
 

@@ -14,7 +14,7 @@ NOWHERE = ("nowhere/nothing.xyz", "no such recording")
 
 
 class FrameSourceContract:
-    """Tests of one kind of frame source; give the class as `kind`, and a recording that it opens as `name`."""
+    """Tests of one kind of frame source, stated as `kind`, with a recording that it can open, stated as `name`."""
 
     kind: SourceKind
     name: str
@@ -25,13 +25,13 @@ class FrameSourceContract:
         return self.kind.open_frames(self.name, self.wish)
 
     def test_it_knows_what_it_is_and_what_it_is_not(self) -> None:
-        """It accepts its own recording, and no file that is missing."""
+        """The kind accepts its own recording, and does not accept a missing file."""
         hold(bool(self.kind.accepts(self.name)), f"The source must accept {self.name}, but does not.")
         for name in NOWHERE:
             hold(not self.kind.accepts(name), f"The source must not accept {name!r}, which is nothing, but does.")
 
     def test_it_describes_its_frames(self) -> None:
-        """The description agrees with the frames that follow."""
+        """The description agrees with the frames that the source yields."""
         source = self.source()
         described = source.description
         hold(
@@ -53,7 +53,7 @@ class FrameSourceContract:
                 )
 
     def test_frames_come_in_order(self) -> None:
-        """Frame numbers count from 0 without holes, lost frames included, and times rise."""
+        """Frame numbers, including those of lost frames, are consecutive from 0, and times increase."""
         frames = self._frames(self.source())
         indices = [frame.index for frame in frames]
         hold(indices == list(range(len(frames))), f"Frames must be counted from 0 without holes, but are {indices}.")
@@ -61,7 +61,7 @@ class FrameSourceContract:
         hold(all(a < b for a, b in pairwise(times)), f"Times of frames must rise, but are {times}.")
 
     def test_pixels_are_grey_levels_or_colours(self) -> None:
-        """Pixels have eight or sixteen bits, and one or three channels."""
+        """Pixels have 8 or 16 bits, and one or three channels."""
         for frame in self._frames(self.source()):
             if isinstance(frame, Frame):
                 pixels = frame.pixels
@@ -72,7 +72,7 @@ class FrameSourceContract:
                 )
 
     def test_a_recording_reads_alike_twice(self) -> None:
-        """A recording that is opened again gives the same frames."""
+        """A recording that is opened again yields the same frames."""
         source = self.source()
         if not source.description.files:
             raise NotApplicable("a live source gives other frames each time")

@@ -1,4 +1,4 @@
-"""Simulate data with an effect and diagnose them: the diagnosis must find the effect again."""
+"""Simulate data with a hidden effect and diagnose these data: the diagnosis must identify the effect."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ the middle (at the golden section), where the only value that is tried by defaul
 
 
 def made_up_history() -> History:
-    """Motion of the simulated data: two runs out and back, 400 samples in 16 s."""
+    """History of the simulated data: two runs of opening and return, 400 samples in 16 s."""
     up = np.linspace(-0.45, 1.45, 100)
     run = np.concatenate([up, up[::-1]])
     u = np.concatenate([run, run])
@@ -34,16 +34,16 @@ def made_up_history() -> History:
 
 
 def diagnosed(name: str, values: Mapping[str, float], *, seed: int = 1) -> DiagnosisReport:
-    """Simulate two noisy runs out and back with an effect of the catalogue, and diagnose them.
+    """Simulate two noisy runs of opening and return with an effect of the catalogue, and diagnose these data.
 
     Parameters
     ----------
     name : str
-        The effect: built in, installed, or registered by `fingervision.effects.register`.
+        Name of the effect: built in, installed, or registered by `fingervision.effects.register`.
     values : mapping of str to float
-        Its parameters.
+        Parameter values of the effect.
     seed : int
-        Of the noise.
+        Seed of the random noise.
     """
     input_mm = np.array([-0.6, 1.6])
     gap_mm = 4.0 + 7.7 * input_mm
@@ -60,7 +60,7 @@ def diagnosed(name: str, values: Mapping[str, float], *, seed: int = 1) -> Diagn
 
 
 def hidden_values(effect: Effect, history: History) -> dict[str, float]:
-    """Parameter values for the hidden effect, chosen away from where a search starts.
+    """Parameter values for the hidden effect, chosen away from the starting values of a search.
 
     Raises
     ------
@@ -84,18 +84,18 @@ def _hidden(parameter: Parameter) -> float:
 
 
 class HiddenEffectContract:
-    """Test that the diagnosis finds an effect again.
+    """Test that the diagnosis identifies a hidden effect.
 
-    Give it as `effect`, and its `values` where the defaults do not suit it.
+    State the effect as `effect`, and parameter values as `values` if the default values are not suitable.
 
-    It takes some seconds, because the whole diagnosis runs.
+    The test takes some seconds, because it runs a complete diagnosis.
     """
 
     effect: Effect
     values: Mapping[str, float] | None = None
 
     def test_the_diagnosis_finds_it_again(self) -> None:
-        """Hidden in two runs with ordinary noise, the effect is named, alone or with indistinguishable ones."""
+        """In two runs with ordinary noise, the hidden effect is named, alone or with indistinguishable effects."""
         effect = self.effect
         values = hidden_values(effect, made_up_history()) if self.values is None else dict(self.values)
         with added([] if effect.name in catalogue() else [effect]):

@@ -1,4 +1,4 @@
-"""Contract tests of models of a gripper that is given by its drawing."""
+"""Contract tests of models that are built from the drawing of a gripper."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ RELATIVE = 1e-6
 
 
 class ModelContract:
-    """Tests of one kind of model, on the drawing of the published gripper; give the class as `kind`."""
+    """Tests of one kind of model, stated as `kind`, with the drawing of the published gripper."""
 
     kind: Kind
 
@@ -22,7 +22,7 @@ class ModelContract:
         return self.kind.build(sample_gripper(), LINEAR, HingeTheory.CORRECTED)
 
     def test_it_has_the_name_of_its_kind(self) -> None:
-        """`name` is `KIND`."""
+        """The attribute `name` of the model equals `KIND` of its kind."""
         name = self.model().name
         hold(name == self.kind.KIND, f"The model must be named {self.kind.KIND}, as its KIND, but is named {name}.")
 
@@ -38,7 +38,7 @@ class ModelContract:
         )
 
     def test_the_gap_opens_with_the_input_and_both_fingers_alike(self) -> None:
-        """A symmetric drawing opens symmetrically, and farther for a larger input."""
+        """A gripper with a symmetric drawing opens symmetrically, and opens more for a larger input."""
         model = self.model()
         low, high = model.input_range_mm
         answer = model.respond(np.linspace(low, high, 7))

@@ -1,1 +1,1 @@
-"""A test bed in the page: its camera is the source, and its motor is controlled by users with permission."""
+"""A test bed in the browser page: the bed's camera is the source, and users with permission control the motor."""

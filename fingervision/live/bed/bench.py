@@ -1,4 +1,4 @@
-"""Thread of the bed: it takes frame after frame, and executes requested tasks between two frames."""
+"""Thread of the test bed, which acquires frame after frame and executes requested tasks between two frames."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -35,21 +35,21 @@ Say = Callable[[str, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """An action of the bed: its name for the page, and its function."""
+    """An action of the test bed: the name shown in the browser page, and the function that executes the action."""
 
     name: str
     act: Callable[[], str]
 
 
 class Bench:
-    """A bed as a live source, with one thread that alone uses camera and motor.
+    """A test bed as a live source; a single thread uses camera and motor.
 
     Parameters
     ----------
     bed : Bed
-        Open, with a camera and a scale.
+        An opened test bed with a camera and a scale.
     hidden : Hidden
-        What the bed was put together with; its digest belongs to every run.
+        Effects hidden in the simulated parts of the test bed; a digest of them is stored with every run.
 
     Raises
     ------
@@ -79,7 +79,7 @@ class Bench:
 
     # ---- a live source
     def received(self) -> Iterator[Received]:
-        """Yield frames with the stage's position at their exposure, until the bed is closed or fails."""
+        """Yield frames with the stage's position at the time of exposure, until the test bed is closed or fails."""
         self._thread.start()
         while True:
             try:
@@ -93,7 +93,7 @@ class Bench:
             yield following
 
     def close(self) -> None:
-        """Stop the motor first, then close the bed."""
+        """Stop the motor, then close the test bed."""
         if self._ending.is_set():
             return
         self.stop()
@@ -104,18 +104,18 @@ class Bench:
 
     # ---- what may be asked; from any thread
     def stop(self) -> None:
-        """Stop the motor at once, whatever it does, and discard the requested tasks."""
+        """Stop the motor at once, and discard all requested tasks."""
         self._stop_asked = True
         if self._controls is not None:
             self._controls.stop()
         self.bed.actuator.stop()
 
     def home(self) -> None:
-        """Go to the reference."""
+        """Move the stage to its reference position."""
         self._ask(Task("homing", lambda: f"At the reference: {home(self.bed, self._looking()):.4f} mm."))
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
-        """Move within the limits."""
+        """Move the stage to a position within the limits."""
 
         def act() -> str:
             return f"At {move(self.bed, to_mm, speed_mm_s, self._looking()):.4f} mm."
@@ -123,11 +123,11 @@ class Bench:
         self._ask(Task(f"moving to {to_mm:g} mm", act))
 
     def jog(self, speed_mm_s: float, for_s: float) -> None:
-        """Move at a signed speed for a time, at most to the limit."""
+        """Move the stage at a signed speed for a given time, at most to the limit."""
         self._ask(Task("jogging", lambda: f"At {jog(self.bed, speed_mm_s, for_s, looking=self._looking()):.4f} mm."))
 
     def run(self, recipe: Recipe[Section], out: Path) -> None:
-        """Run a recipe into a folder."""
+        """Run a recipe and write its results to a folder."""
         self._ask(Task(f"running {recipe.name}", lambda: self._recipe(recipe, out)))
 
     def _ask(self, task: Task) -> None:
@@ -176,7 +176,7 @@ class Bench:
         return Looking(self._look, lambda: self.position_mm, lambda: self.force_n)
 
     def _look(self) -> None:
-        """Take one frame; it waits until the stage's interpolated position is known."""
+        """Acquire one frame, which is kept until the stage's position at its exposure can be interpolated."""
         look = self._sight.look()
         self.position_mm, self.force_n = look.encoder_mm, look.force_now_n
         item = look.shot.item()
@@ -239,7 +239,7 @@ class Bench:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """The bed's soft limits, for the page."""
+        """Soft limits of the test bed, for the browser page."""
         limits = self.bed.limits
         return {
             "lower_mm": limits.lower_mm,

@@ -1,4 +1,4 @@
-"""Open a bed by name as the capture of its camera."""
+"""Open a test bed by name, with its camera as the live source."""
 
 from dataclasses import replace
 
@@ -11,16 +11,16 @@ from fingervision.testbed.simulation.parse_injected_effects import hidden_from
 
 
 def opened_bed(name: str, hide: tuple[str, ...], choices: Choices) -> tuple[Capture, Choices]:
-    """Open a bed; a simulated bed runs in real time.
+    """Open a test bed; a simulated test bed runs in real time.
 
     Parameters
     ----------
     name : str
-        The word simulated, or a configuration.
+        The word "simulated", or the path of a configuration file.
     hide : tuple of str
-        Effects that act in its simulated parts.
+        Effects injected into the simulated parts of the test bed.
     choices : Choices
-        What the user chose; scale and height are the bed's where none is given.
+        Settings chosen by the user; without a given scale and height, those of the test bed apply.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Requests of the page, one file per topic: each is checked, executed, and answered by a sentence."""
+"""Requests from the browser page, one module per topic; each is checked, executed, and answered with a sentence."""
 
 import importlib
 import pkgutil
@@ -15,10 +15,10 @@ __all__ = ["Answer", "Request", "harmless", "modules", "obey", "section"]
 
 @cache
 def modules() -> tuple[ModuleType, ...]:
-    """Modules of this package that have `COMMANDS`: a new file adds its requests, and no other file changes.
+    """List the modules of this package that define `COMMANDS`; a new module adds requests without other changes.
 
-    A module may also have `HARMLESS`, the names of its requests that change nothing and are allowed to viewers, and
-    `section(view)`, which returns its part of the state sent to every page.
+    A module may also define `HARMLESS`, the names of requests that change nothing and are allowed for viewers, and
+    `section(view)`, which returns the topic's part of the state sent to every page.
     """
     names = sorted(module.name for module in pkgutil.iter_modules(__path__))
     found = (importlib.import_module(f"{__name__}.{name}") for name in names)
@@ -32,12 +32,12 @@ def _table() -> dict[str, Command]:
 
 @cache
 def harmless() -> frozenset[str]:
-    """Names of the requests that change nothing."""
+    """Names of the requests that change nothing and that viewers may send."""
     return frozenset().union(*(getattr(module, "HARMLESS", frozenset()) for module in modules()))
 
 
 def obey(view: View, request: Request) -> Answer:
-    """Execute a request of the page.
+    """Execute a request from the browser page.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def obey(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """State of all topics, for the page."""
+    """Return the state of all topics, for the browser page."""
     told: dict[str, Any] = {}
     for module in modules():
         if hasattr(module, "section"):

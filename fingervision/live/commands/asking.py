@@ -1,4 +1,4 @@
-"""Checks of the values in a request, and its answer."""
+"""Checks of the values in a request, and the response to a request."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,16 +17,16 @@ MOST_LETTERS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Result of a request.
+    """Response to a request.
 
     Parameters
     ----------
     words : str
-        For the user; empty where the page shows it anyway.
+        Sentence for the user; empty if the page shows the result in any case.
     pictures : tuple of (str, bytes)
-        Names and PNG pictures of the steps.
+        Names and PNG pictures of the measuring steps.
     more : mapping
-        What the page's script that asked makes something of; goes out as JSON.
+        Additional data for the script of the page that sent the request, transmitted as JSON.
     """
 
     words: str = ""
@@ -39,7 +39,7 @@ Command = Callable[[View, Request], Answer]
 
 
 def seen_of(view: View) -> Seen:
-    """The frame that is shown, with its measurement; refused where there is none.
+    """Return the displayed frame with its measurement; an error if there is no frame yet.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def number(request: Request, name: str) -> float:
 
 
 def number_or_none(request: Request, name: str) -> float | None:
-    """Read a number from a request; None where it has none."""
+    """Read a number from a request; None if the number is missing."""
     return None if request.get(name) is None else number(request, name)
 
 

@@ -1,4 +1,4 @@
-"""Requests to the camera: other exposure, gain, focus or frame rate while it runs."""
+"""Requests to the camera: change exposure, gain, focus or frame rate during operation."""
 
 from dataclasses import asdict
 from typing import Any
@@ -12,14 +12,14 @@ from fingervision.measuring.other_camera import other_camera
 
 
 class CameraError(FingervisionError):
-    """A setting of the camera cannot be changed; the error carries its name, beside which the page shows the sentence.
+    """A camera setting cannot be changed; the page shows the error's sentence beside the named setting.
 
     Parameters
     ----------
     field : str
-        The name.
+        Name of the setting.
     words : str
-        The sentence.
+        Sentence that states the reason.
     """
 
     def __init__(self, field: str, words: str) -> None:
@@ -56,7 +56,7 @@ def _changed(view: View, name: str, value: float) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """What of the camera may be set."""
+    """Return the camera's controls that can be changed."""
     controls = view.capture.adjustments.controls if isinstance(view, Session) else ()
     return {"camera_controls": [asdict(each) for each in controls]}
 

@@ -50,7 +50,7 @@ def _said(view: View, sentence: str = "") -> Answer:
 
 
 def _kinds(view: View, request: Request) -> Answer:
-    """Kinds of gauges with their keys, for the page."""
+    """Return the kinds of gauges with their settings, for the browser page."""
     return Answer(
         more={
             "kinds": {name: [{**asdict(field), "usual": field.usual} for field in fields_of(name)] for name in kinds()}
@@ -97,7 +97,7 @@ def _save(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """The gauges, and their readings in the frame that is shown."""
+    """Return the gauges and their readings in the displayed frame."""
     found = view.features.get(GAUGES)
     if not isinstance(found, GaugesBeside):
         return {"gauges": {"is_open": False} if isinstance(view, Playback | Session) else None}

@@ -1,4 +1,4 @@
-"""Requests about measurement and display: region, tips, height, scale, zero, tolerance, step pictures."""
+"""Requests about measurement and display: region, tip direction, height, scale, zero, tolerance, step pictures."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -47,7 +47,7 @@ def _fingers(view: View, request: Request) -> Answer:
 
 
 def _height_at(view: View, request: Request) -> Answer:
-    """Measure at the height of a point in the picture."""
+    """Set the measuring height to that of a point in the picture."""
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
         raise StateError(

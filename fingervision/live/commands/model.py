@@ -1,4 +1,4 @@
-"""Requests about the model for comparison, and about a typed input."""
+"""Requests about the model for comparison, and about an input entered by the user."""
 
 from typing import Any
 
@@ -31,7 +31,7 @@ def _input(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Prediction, residual and verdict."""
+    """Return prediction, residual and verdict."""
     comparison = view.features.get(MODEL)
     return {"model": comparison.state() if isinstance(comparison, Comparison) else None}
 

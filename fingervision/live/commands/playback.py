@@ -52,7 +52,7 @@ def _measure(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """State of the playback."""
+    """Return the state of the playback."""
     if not isinstance(view, Playback):
         return {"playback": None}
     measuring = view.features.get(RANGE)

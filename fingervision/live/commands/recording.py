@@ -1,4 +1,4 @@
-"""A run recorded, a picture kept."""
+"""Requests to record a run and to save a picture."""
 
 from datetime import UTC, datetime
 from typing import Any

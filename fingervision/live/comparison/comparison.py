@@ -20,16 +20,16 @@ ROWS_BETWEEN = 25
 
 
 class Comparison:
-    """Compares rows whose input is known with a model.
+    """Compares measured rows whose input is known with a model.
 
     Parameters
     ----------
     view : View
-        Where the rows come from.
+        The view that supplies the rows.
     path : Path
-        Any model that `diagnose` takes.
+        File of any model that `diagnose` accepts.
     kind : str
-        Which model answers for a gripper.toml.
+        Kind of model to build from a gripper.toml.
 
     Raises
     ------
@@ -47,7 +47,7 @@ class Comparison:
         self._total = self._moved = self._still = 0
 
     def predicted_mm(self, rows: Sequence[GapRow]) -> list[float | None]:
-        """The model's gap for rows (mm); None where their input is unknown."""
+        """Predict the gap of rows (mm); None for a row whose input is unknown."""
         return self._prediction.predicted_mm(rows)
 
     def add(self, row: GapRow, arrived_s: float = 0.0) -> None:
@@ -59,7 +59,7 @@ class Comparison:
             self.verdicts.consider(tuple(self._rows), self._moved, at_rest=self._still >= ROWS_BETWEEN)
 
     def add_all(self, rows: Sequence[GapRow]) -> None:
-        """Add the rows of a recording that is completely measured."""
+        """Add the rows of a completely measured recording."""
         self._rows.clear()
         self._recent.clear()
         self._prediction.clear()
@@ -70,9 +70,10 @@ class Comparison:
         self.verdicts.consider(tuple(self._rows), self._moved, at_rest=True)
 
     def _take(self, row: GapRow) -> None:
-        """Keep a row.
+        """Keep a row for the comparison.
 
-        Of a long stop only some rows, which would otherwise outweigh the motion without adding information.
+        During a long rest of the stage, only some rows are kept, because they would outweigh the motion without adding
+        information.
         """
         stands = bool(self._recent) and self._recent[-1].input_mm == row.input_mm
         self._still = self._still + 1 if stands else 0
@@ -87,7 +88,7 @@ class Comparison:
         self.verdicts.stop()
 
     def state(self) -> dict[str, Any]:
-        """State of the comparison, for the page."""
+        """Return the state of the comparison, for the browser page."""
         rows = list(self._recent)
         pairs = [
             (row.gap_mm - gap_mm, row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)

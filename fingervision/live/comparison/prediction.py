@@ -18,12 +18,12 @@ PREDICTIONS_KEPT = 20_000
 
 
 class Prediction:
-    """Predicts the gap of each row once.
+    """Predicts the gap of each row, and stores the prediction.
 
     Parameters
     ----------
     model : CorrectedModel
-        With its effects, if any: they follow the input's path.
+        The model with its effects, if any; effects with memory depend on the path of the input.
     """
 
     def __init__(self, model: CorrectedModel) -> None:
@@ -38,18 +38,18 @@ class Prediction:
         self._lock = Lock()
 
     def clear(self) -> None:
-        """Discard all predictions, because the rows are counted from the beginning."""
+        """Discard all predictions, because the numbering of rows has started again."""
         with self._lock:
             self._known.clear()
             self._path.clear()
 
     def predicted_mm(self, rows: Sequence[GapRow]) -> list[float | None]:
-        """Predicted gap of each row (mm); None where its input is unknown, or outside the model's range.
+        """Predicted gap of each row (mm); None for a row whose input is unknown or outside the model's range.
 
         Parameters
         ----------
         rows : sequence of GapRow
-            In order; those that were asked for before are not computed again.
+            Rows in order; gaps that were predicted before are not computed again.
         """
         with self._lock:
             fresh = [row for row in rows if row.frame not in self._known]

@@ -1,4 +1,4 @@
-"""A first verdict by the command `diagnose`, in a process of its own while the measurement continues."""
+"""A preliminary verdict by the command `diagnose`, in a separate process while the measurement continues."""
 
 import csv
 import json
@@ -27,20 +27,20 @@ COLUMNS = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "u_gap_
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What `diagnose` said.
+    """Result of the command `diagnose`.
 
     Parameters
     ----------
     rows : int
-        Samples that it judged.
+        Number of samples that were diagnosed.
     verdict, sentence : str
-        As in report.json.
+        Verdict and its sentence, as in report.json.
     effects : tuple of (str, str)
-        Name of each effect of the answer, and its parameters in words.
+        Name and described parameters of each effect that was named.
     next_run : str
-        Path of the recipe that would settle what is open; empty where there is none.
+        Path of the recipe that would distinguish the remaining explanations; empty if there is none.
     report : str
-        Path of the report for people.
+        Path of the report in HTML.
     """
 
     rows: int
@@ -52,7 +52,7 @@ class Verdict:
 
 
 class VerdictSeeker:
-    """Requests verdicts as rows arrive.
+    """Starts diagnoses as rows arrive.
 
     Parameters
     ----------
@@ -61,11 +61,11 @@ class VerdictSeeker:
     kind : str
         Which model answers for a gripper.toml.
     range_mm : (float, float)
-        Inputs that the model covers.
+        Smallest and largest input of the model.
     out : Path
-        Folder for tables and answers.
+        Folder for tables and results.
     tell : callable
-        Takes a name and a sentence.
+        Function that reports an event by a name and a sentence.
     """
 
     def __init__(
@@ -81,20 +81,20 @@ class VerdictSeeker:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a verdict is being computed."""
+        """Whether a diagnosis is running."""
         return self._thread is not None and self._thread.is_alive()
 
     def consider(self, rows: Sequence[GapRow], moved: int, *, at_rest: bool) -> None:
-        """Request a verdict if there are enough rows, and more than the last time.
+        """Start a diagnosis if there are enough rows, and sufficiently more than at the last diagnosis.
 
         Parameters
         ----------
         rows : sequence of GapRow
-            With inputs, in order, the newest.
+            The most recent rows with known inputs, in order.
         moved : int
-            How many there have been while the input moved.
+            Number of rows so far that were measured while the input moved.
         at_rest : bool
-            Whether the motion has come to its end: then less that is new is worth a verdict.
+            Whether the motion has ended; fewer new rows are then sufficient for a diagnosis.
         """
         if self.is_busy or self._ending.is_set() or moved < LEAST_ROWS:
             return
@@ -107,7 +107,7 @@ class VerdictSeeker:
         self._thread.start()
 
     def stop(self) -> None:
-        """Seek no more."""
+        """Stop the running diagnosis and start no further one."""
         self._ending.set()
         if self._thread is not None:
             self._thread.join()

@@ -1,1 +1,1 @@
-"""Playback of a recording in the page: seek, step, play, and measurement by the command `measure`."""
+"""Playback of a recording in the browser page: seek, step, play, and measurement by the command `measure`."""

@@ -1,4 +1,4 @@
-"""Read one frame of a recording by its number, as fast as the recording allows, and never a wrong one."""
+"""Access to single frames of a recording by number, which never returns a different frame."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
@@ -15,17 +15,17 @@ Item = Frame | LostFrame
 
 
 class FrameReader:
-    """Reads frames in any order.
+    """Reads frames of a recording in any order.
 
-    A frame is accessed by its time if the recording's table states it and the source allows random access; otherwise
-    the recording is read from its beginning and counted, as `measure` does.
+    A frame is accessed by its time if the table of the recording states this time and the source allows random access;
+    otherwise the recording is read from its beginning and frames are counted, as `measure` does.
 
     Parameters
     ----------
     begin : callable
-        Begins to read the recording anew.
+        Function that starts reading the recording from its beginning.
     name : str
-        The recording.
+        Name of the recording.
     """
 
     def __init__(self, begin: Callable[[], Iterator[Item]], name: str) -> None:
@@ -36,19 +36,19 @@ class FrameReader:
         self._seeking: Seeking | None = seeking(name)
 
     def at(self, index: int, time_s: float | None) -> Item | None:
-        """Frame with a given number.
+        """Return the frame with a given number.
 
         Parameters
         ----------
         index : int
-            From 0.
+            Number of the frame, from 0.
         time_s : float or None
-            Its time, where it is known and no other frame has it.
+            Time of the frame if known and unique to this frame; otherwise None.
 
         Returns
         -------
         Frame, LostFrame or None
-            None beyond the recording's end.
+            The frame; None beyond the end of the recording.
 
         Raises
         ------

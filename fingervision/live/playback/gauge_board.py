@@ -1,4 +1,4 @@
-"""The gauges edited by a page: added, changed and removed one by one, read from their file and saved to it."""
+"""Gauges that are edited in the browser page: added, changed, removed, read from a file and saved to it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ PLACE = ("x_px", "y_px")
 
 
 class FieldError(FingervisionError):
-    """A value of a gauge is not allowed; the error carries its key.
+    """A value of a gauge is not allowed; the error contains the name of the setting.
 
     Parameters
     ----------
     field : str or None
-        The key; None where the gauge as a whole is meant.
+        Name of the setting; None if the error concerns the gauge as a whole.
     words : str
-        The sentence.
+        Sentence that states the reason.
     """
 
     def __init__(self, field: str | None, words: str) -> None:
@@ -38,7 +38,7 @@ class ChangedMeanwhileError(FingervisionError):
 
 @dataclass(frozen=True, slots=True)
 class _Typed(Section):
-    """A table of keys that was typed or drawn, and so has no line in a file."""
+    """Settings of a gauge that was entered in the browser page, and hence has no line number in a file."""
 
     def refuse(self, key: str | None, words: str) -> NoReturn:
         raise FieldError(key, f"{self.header if key is None else key} {words}")
@@ -57,7 +57,7 @@ class GaugeBoard:
     Parameters
     ----------
     path : Path
-        The file; read where it exists.
+        The file of gauges; read if it exists.
     frame_size_px : (int, int)
         Width and height of the frames.
 
@@ -84,22 +84,22 @@ class GaugeBoard:
 
     @property
     def tables(self) -> list[Mapping[str, Any]]:
-        """Keys of the gauges as they are stored in the file, or will be."""
+        """Settings of the gauges in the form in which they are stored in the file."""
         return [entry.table for entry in self._entries]
 
     @property
     def is_saved(self) -> bool:
-        """Whether the file contains exactly these gauges."""
+        """Whether the file contains exactly the present gauges."""
         return self.tables == self._kept
 
     def snapshot(self) -> tuple[int, tuple[Gauge, ...]]:
-        """Version and gauges at one moment."""
+        """Return a consistent pair of version number and gauges."""
         with self._lock:
             return self.version, self.gauges
 
     # ---- the file
     def load(self) -> None:
-        """Read the file; unsaved changes are dropped. If there is no file, there are no gauges.
+        """Read the gauges from the file, discarding unsaved changes; without a file there are no gauges.
 
         Raises
         ------
@@ -122,12 +122,12 @@ class GaugeBoard:
             self.version += 1
 
     def save(self, *, over: bool = False) -> None:
-        """Write the file.
+        """Write the gauges to the file.
 
         Parameters
         ----------
         over : bool
-            Also where somebody else has changed it since it was read.
+            Whether to overwrite a file that another program has changed since it was read.
 
         Raises
         ------
@@ -179,7 +179,7 @@ class GaugeBoard:
         name : str
             The gauge.
         changes : mapping
-            Values of the keys that change; None takes a key away.
+            New values of settings by name; None removes a setting.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Gauges measured from the first frame up to the one that is shown, with the numbers of `measure --gauges`."""
+"""Measurement of gauges from the first to the displayed frame, with the same results as `measure --gauges`."""
 
 import json
 import zlib
@@ -30,18 +30,18 @@ NO_SCALE = "The scale is not known: gauges can be drawn, and are read once it is
 
 
 class GaugeFollowing:
-    """Measures a board's gauges in a thread of its own.
+    """Measures the gauges of a gauge board in a separate thread.
 
-    A gauge follows its object from frame to frame, and a patch counts from the first frame; the reading in a frame
-    therefore requires that all earlier frames were measured. Whether a frame is damaged or repeated is taken from the
-    table, as in `measure`. Any change of gauges, scale or settings starts the measurement again.
+    A gauge tracks its object from frame to frame, and a patch gauge measures the displacement since the first frame;
+    the reading in a frame therefore requires that all earlier frames were measured. Whether a frame is damaged or
+    repeated is taken from the table, as in `measure`. Any change of gauges, scale or settings restarts the measurement.
 
     Parameters
     ----------
     playback : Playback
         The recording.
     board : GaugeBoard
-        Its gauges.
+        The board with the gauges.
     """
 
     def __init__(self, playback: Playback, board: GaugeBoard) -> None:
@@ -55,11 +55,11 @@ class GaugeFollowing:
         self._thread = Thread(target=self._follow, name="gauges", daemon=True)
 
     def start(self) -> None:
-        """Begin to follow."""
+        """Start the measuring thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End."""
+        """Stop the measuring thread."""
         self._stopped.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -70,7 +70,7 @@ class GaugeFollowing:
         return len(self._told)
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Readings of one version of the board's gauges in a frame; None until they are known."""
+        """Readings in a frame of a given version of the gauges; None until they are measured."""
         key, told = self._key, self._told
         if key != (version, self._playback.identity) or not 0 <= frame < len(told):
             return None
@@ -122,9 +122,9 @@ class GaugeFollowing:
             self._told.append(_packed(gauges, readings, plane))
 
     def _status(self, frame: int, key: tuple[int, str]) -> Status | None:
-        """Wait until a frame is requested and in the table, and return its status.
+        """Wait until a frame is requested and present in the table, and return its status.
 
-        None where there is nothing left to measure.
+        None if there is nothing left to measure.
         """
         playback = self._playback
         while not self._stopped.is_set() and key == self._now():
@@ -139,12 +139,12 @@ class GaugeFollowing:
 
 
 def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> bytes:
-    """Readings as the page shows them, in compact form because a recording has many frames."""
+    """Convert readings for the browser page to a compact form for storage, because a recording has many frames."""
     return zlib.compress(json.dumps(told(gauges, readings, plane)).encode())
 
 
 def told(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> list[dict[str, Any]]:
-    """Readings of one frame as the page shows them."""
+    """Convert the readings in one frame to the form that the browser page shows."""
     found: list[dict[str, Any]] = []
     for gauge, reading in zip(gauges, readings, strict=True):
         cells = cells_of(reading.quantities, plane)

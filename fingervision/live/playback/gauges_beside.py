@@ -1,4 +1,4 @@
-"""Gauges of a recording in the page: the list that is edited, and the thread that measures them."""
+"""Gauges in the browser page: the list that the user edits, and the measurement of these gauges."""
 
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,7 +12,7 @@ GAUGES = "gauges"
 
 
 class Follows(Protocol):
-    """Measures a board's gauges in the frames of a recording or a camera."""
+    """Protocol of a class that measures the gauges of a gauge board in the frames of a recording or a camera."""
 
     @property
     def first(self) -> int | None:
@@ -30,23 +30,23 @@ class Follows(Protocol):
         ...
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Readings of one version of the board's gauges in a frame; None where they are unknown."""
+        """Readings in a frame of a given version of the gauges; None if unknown."""
         ...
 
 
 class GaugesBeside:
-    """Data for the page's panel of gauges.
+    """Data for the panel of gauges in the browser page.
 
     Parameters
     ----------
     board : GaugeBoard
         The gauges and their file.
     following : Follows
-        What reads them.
+        Measurement of the gauges.
     is_asked_for : bool
-        Whether the user asked for gauges when the page was started: the panel is open from the beginning.
+        Whether the user requested gauges on the command line, so that the panel is open from the beginning.
     is_live : bool
-        Whether the frames come from a source that goes on, where every frame is one to draw in.
+        Whether the frames come from a continuous source, in which gauges can be drawn in any frame.
     """
 
     def __init__(self, board: GaugeBoard, following: Follows, *, is_asked_for: bool, is_live: bool = False) -> None:
@@ -57,7 +57,7 @@ class GaugesBeside:
 
 
 def put_gauges_beside(playback: Playback, path: Path, *, is_asked_for: bool = False) -> GaugesBeside:
-    """Add gauges to a recording, and begin to measure them.
+    """Add gauges to the playback of a recording, and start to measure them.
 
     Raises
     ------

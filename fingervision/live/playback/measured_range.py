@@ -1,4 +1,4 @@
-"""Measurement of a range of a recording, by the command `measure`; the result is kept."""
+"""Measurement of a range of a recording by the command `measure`, whose results are saved."""
 
 import json
 from pathlib import Path
@@ -15,14 +15,14 @@ LOOK_EVERY_S = 0.1
 
 
 class RangeMeasurement:
-    """One execution of `fingervision measure`, in a process of its own.
+    """One execution of `fingervision measure` in a separate process.
 
     Parameters
     ----------
     playback : Playback
-        The recording, and how it is measured.
+        The recording with its measurement settings.
     frames : (int, int) or None
-        First and last frame; None measures all.
+        First and last frame; None for all frames.
 
     Raises
     ------
@@ -56,7 +56,7 @@ class RangeMeasurement:
         return self._thread.is_alive()
 
     def stop(self) -> None:
-        """Break it off."""
+        """Abort the command."""
         self._command.stop()
 
     def _wait(self) -> None:
@@ -71,7 +71,7 @@ class RangeMeasurement:
 
 
 def _plain(name: str) -> str:
-    """Convert a folder's name to letters, digits, dots and dashes."""
+    """Reduce the name of a folder to letters, digits, dots and dashes."""
     return "".join(sign if sign.isalnum() or sign in "._-" else "_" for sign in name).strip(".") or "recording"
 
 

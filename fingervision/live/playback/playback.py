@@ -1,4 +1,4 @@
-"""A recording in the page: frames in sequence or any single frame, while its table is measured in the background."""
+"""A recording in the browser page: display of frames while the recording is measured in the background."""
 
 import secrets
 from collections import Counter, deque
@@ -32,14 +32,14 @@ SPEEDS = (0.01, 100.0)
 
 
 class Playback:
-    """Plays a recording in a thread of its own.
+    """Plays a recording in a separate thread.
 
     Parameters
     ----------
     opened : Recorded
-        The recording, and how it is measured.
+        The recording with its measurement settings.
     out : Path
-        Folder for what the user keeps.
+        Folder for files that the user saves.
     """
 
     def __init__(self, opened: Recorded, out: Path) -> None:
@@ -71,12 +71,12 @@ class Playback:
             self.say("recording", note)
 
     def start(self) -> None:
-        """Begin to measure and to show."""
+        """Start the measurement and the display."""
         self._measure_anew()
         self._thread.start()
 
     def stop(self) -> None:
-        """End everything."""
+        """Stop the measurement and the display."""
         for end in self.on_stop:
             end()
         with self._changed:
@@ -88,14 +88,14 @@ class Playback:
 
     # ---- what the page asks for
     def seek(self, frame: int) -> None:
-        """Show a frame; beyond the ends, the first or last one."""
+        """Show a frame; for a number beyond the ends of the recording, the first or last frame."""
         with self._changed:
             self.is_playing = False
             self.frame = max(0, min(frame, self.frame_count - 1))
             self._changed.notify_all()
 
     def play(self, *, on: bool, speed: float) -> None:
-        """Play from the shown frame, or from the beginning if it is the last; or pause.
+        """Play from the displayed frame (from the beginning if it is the last), or pause.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class Playback:
             self._changed.notify_all()
 
     def mark(self, first: int | None, last: int | None) -> None:
-        """Mark a range of frames, or clear the mark.
+        """Mark a range of frames, or remove the mark.
 
         Raises
         ------
@@ -148,12 +148,12 @@ class Playback:
     # ---- what the page is told
     @property
     def identity(self) -> str:
-        """A number that changes when the recording is measured again."""
+        """Number that changes when the measurement of the recording is restarted."""
         return f"{self._identity}-{self._generation}"
 
     @property
     def messages(self) -> deque[Message]:
-        """The latest messages."""
+        """The most recent messages."""
         return self._messages.kept
 
     @property
@@ -169,7 +169,7 @@ class Playback:
 
     @property
     def table(self) -> Path | None:
-        """The whole recording's gaps.csv; None until it is complete."""
+        """The gaps.csv of the complete recording; None until it is complete."""
         track = self._track
         return track.table if track is not None and track.is_whole else None
 
@@ -182,19 +182,19 @@ class Playback:
     oldest_row = shown_from = 0
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from frame `first` up to but excluding frame `last`."""
+        """Rows of the frames from `first` to `last` - 1."""
         track = self._track
         return iter(() if track is None else track.rows[first:last])
 
     @property
     def frame_count(self) -> int:
-        """Number of frames of the recording, as far as it is known."""
+        """Number of frames of the recording, as far as known."""
         if self.table is not None:
             return max(1, self.row_count)
         return max(1, self.description.frame_count or 0, self.row_count)
 
     def state(self) -> dict[str, Any]:
-        """State of the recording, for the page."""
+        """Return the state of the playback, for the browser page."""
         counts = Counter(row.status for row in self.rows(0, self.row_count))
         description = self.description
         return {
@@ -219,7 +219,7 @@ class Playback:
 
     @property
     def failure(self) -> str:
-        """Reason why the recording could not be measured; empty where it could."""
+        """Reason why the recording could not be measured; empty without a failure."""
         return "" if self._track is None else self._track.failure
 
     # ---- the thread
@@ -269,7 +269,7 @@ class Playback:
             self.on_table(track.rows)
 
     def _advance(self) -> None:
-        """Advance as far as the time requires; frames that cannot be shown in time are skipped."""
+        """Advance the display according to the elapsed time; frames that cannot be shown in time are skipped."""
         if not self.is_playing:
             return
         began_s, from_s = self._began
@@ -293,7 +293,7 @@ class Playback:
             self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
-        """Time of a frame; None where it has no picture or a neighbour has the same time."""
+        """Time of a frame; None if the frame has no picture, or if a neighbouring frame has the same time."""
         if row is None or row.time_s is None or row.status in (Status.DAMAGED, Status.DUPLICATE):
             return None
         neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]

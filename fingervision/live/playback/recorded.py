@@ -1,4 +1,4 @@
-"""Open a recording, or a run's folder, for playback with the settings with which it was measured."""
+"""Open a recording or a run folder for playback, with the settings of its original measurement."""
 
 import json
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ class Recorded:
     Parameters
     ----------
     name : str
-        What `measure` is given: the run's video, where a run's folder was named.
+        Name of the recording for `measure`; for a run folder, the video in this folder.
     source : FrameSource
-        Its frames.
+        Source of the frames.
     choices : Choices
-        How it is measured: as its run was, unless the user said otherwise.
+        Settings of the measurement: those of the run, unless the user states others.
     options : tuple of str
-        What else `measure` is given: a rate, a drive.
+        Further options for `measure`, such as a frame rate or a drive log.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Recorded:
 
 
 def is_recording(name: str) -> bool:
-    """Whether a source ends (a file, images, a run's folder), unlike cameras and streams."""
+    """Whether a source is a recording (a file, images, a run folder), not a camera or stream."""
     path = Path(name)
     if (path / RUN).is_file():
         return True
@@ -48,18 +48,18 @@ def is_recording(name: str) -> bool:
 
 
 def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[str, ...]) -> Recorded:
-    """Open a recording or a run's folder.
+    """Open a recording or a run folder.
 
     Parameters
     ----------
     name : str
-        A video, images, a glob, or the folder of a run.
+        A video file, a folder of images, a glob pattern, or a run folder.
     rate_hz : float or None
-        Of images without times.
+        Frame rate of images without times.
     choices : Choices
-        What the user chose; where no scale is given, that of the run and how it was measured.
+        Settings chosen by the user; without a scale, the scale and the settings of the run apply.
     drive : tuple of str
-        The options of `measure` for a stage's log, where one was given.
+        Options of `measure` for a drive log, if one was given.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def _about(folder: Path) -> dict[str, Any]:
 
 
 def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices:
-    """Scale and settings of the run; those that cannot be read are left to the user."""
+    """Take scale and settings from a run; those that cannot be read must be chosen by the user."""
     try:
         scale, settings = about["scale"], about["settings"]
         file = scale.get("calibration")

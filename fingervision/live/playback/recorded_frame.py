@@ -1,4 +1,4 @@
-"""One frame of a recording with its table row, and with a measurement of that frame alone."""
+"""One frame of a recording with its table row, and with a separate measurement of this frame."""
 
 from dataclasses import replace
 
@@ -17,23 +17,24 @@ IN_THE_TABLE = "As the table has it; judged by the frames before."
 
 
 def recorded_frame(item: Frame | LostFrame, row: GapRow | None, choices: Choices, description: Description) -> Seen:
-    """Picture, points and row of a frame.
+    """Combine picture, measured points and table row of a frame.
 
     Parameters
     ----------
     item : Frame or LostFrame
-        As it was read.
+        The frame as read from the recording.
     row : GapRow or None
-        The recording's table at this frame; None as long as it has not come so far.
+        Row of this frame in the table of the recording; None until the measurement has reached this frame.
     choices : Choices
-        How it is measured.
+        Settings of the measurement.
     description : Description
-        The recording.
+        Description of the recording.
 
     Returns
     -------
     Seen
-        Its row is the table's, which knows the frames before; before that comes it is what the frame says by itself.
+        The frame with its row from the table, whose measurement uses the preceding frames; until this row exists, a row
+        from the measurement of the single frame.
     """
     if isinstance(item, LostFrame):
         pixels = np.full((description.height_px, description.width_px), NO_PICTURE_LEVEL, np.uint8)

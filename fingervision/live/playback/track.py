@@ -1,4 +1,4 @@
-"""The table of a recording made by `fingervision measure`, read while it grows."""
+"""Table of a recording that `fingervision measure` writes, read while it grows."""
 
 import tempfile
 from pathlib import Path
@@ -19,11 +19,11 @@ def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tup
     Parameters
     ----------
     recording : str
-        Its name.
+        Name of the recording.
     choices : Choices
-        With a scale.
+        Settings of the measurement, including a scale.
     more : tuple of str
-        Options of the recording itself: its rate, its drive.
+        Options that belong to the recording, such as a frame rate or a drive log.
     """
     region, scale = choices.region, choices.scale
     assert scale is not None  # noqa: S101 - asked before
@@ -41,12 +41,12 @@ def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tup
 
 
 class Track:
-    """Measures a recording in a process of its own.
+    """Measures a recording in a separate process.
 
     Parameters
     ----------
     arguments : tuple of str
-        See `arguments_of`.
+        Arguments of the command, from `arguments_of`.
     """
 
     def __init__(self, arguments: tuple[str, ...]) -> None:
@@ -59,7 +59,7 @@ class Track:
         self._command: BackgroundCommand | None = BackgroundCommand(*arguments, "--out", self._folder.name)
 
     def refresh(self) -> bool:
-        """Read new rows; True where all rows must be read again, because the drive's inputs were added to them."""
+        """Read new rows; return True if all rows must be read again because inputs of the drive were added."""
         if self._command is None:
             return False
         ended = self._command.exit_code

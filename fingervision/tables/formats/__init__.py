@@ -1,4 +1,4 @@
-"""File formats of tables, one per file: each recognises its files by their first bytes and reads them raw."""
+"""File formats of tables, one module per format, with functions to recognise a file and to read its raw table."""
 
 import importlib
 import pkgutil
@@ -17,18 +17,18 @@ HEAD_BYTES = 1024
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format.
+    """A file format of tables.
 
     Parameters
     ----------
     name : str
-        Of its module.
+        Name of the format's module.
     order : int
-        Formats are asked in this order; what any file may be comes last.
+        Position in the order in which formats are tried; the format that accepts any file comes last.
     recognises : callable
-        Whether a file is of the format, from its path and first bytes.
+        Function that decides from path and first bytes whether a file has this format.
     read : callable
-        Reads the file, with what the user states of it.
+        Function that reads the file, using the decisions of the user.
     """
 
     name: str
@@ -39,9 +39,9 @@ class Format:
 
 @cache
 def formats() -> tuple[Format, ...]:
-    """All formats: every module of this package with `ORDER`, `recognises` and `read`.
+    """List all formats: every module of this package with `ORDER`, `recognises` and `read`.
 
-    One with `IN_OWN_PROCESS` uses libraries that may crash, and is therefore run in a process of its own.
+    A module with `IN_OWN_PROCESS` uses libraries that may crash, and is therefore run in a separate process.
     """
     found = []
     for module in pkgutil.iter_modules(__path__):

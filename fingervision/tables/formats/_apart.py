@@ -1,4 +1,4 @@
-"""Reading in a process of its own: if a C library crashes on a damaged file, the user gets an error message.
+"""Reading of a file in a separate process: if a C library crashes on a damaged file, the user gets an error message.
 
 For example, scipy 1.17 ends with a segmentation fault on some MATLAB files with a few wrong bytes
 (tests/tables/test_bad_files.py).
@@ -20,16 +20,16 @@ SHOWN = 300
 
 
 def read_apart(name: str, path: Path, given: Entry) -> RawTable:
-    """Read a file by the format's module in a process of its own.
+    """Read a file with the format's module in a separate process.
 
     Parameters
     ----------
     name : str
-        Whole name of the format's module.
+        Full name of the format's module.
     path : Path
         The file.
     given : Entry
-        What the user has decided.
+        Decisions of the user.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
 
 
 def serve() -> None:
-    """Answer one request from standard input on standard output."""
+    """In the separate process: read one request from standard input and write the result to standard output."""
     import importlib
 
     name, path, given = pickle.load(sys.stdin.buffer)

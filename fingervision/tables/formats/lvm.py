@@ -22,12 +22,12 @@ COMMENT = "Comment"
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Recognise the file by its first words."""
+    """Whether the file begins with the words of a LabVIEW measurement file."""
     return head.lstrip(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement")
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read all segments, one below another."""
+    """Read all segments and join their rows."""
     lines, encoding = lines_of(path, given.words.get("encoding"))
     ends = [at for at, line in enumerate(lines) if line.strip().startswith(END)]
     if len(ends) < 2:
@@ -96,13 +96,13 @@ def read(path: Path, given: Entry) -> RawTable:
 
 
 def _keys(lines: Sequence[str], separator: str) -> dict[str, list[str]]:
-    """Keys of a header with their values."""
+    """Read the keys and values of a header."""
     cells = [line.split(separator) for line in lines if line.strip()]
     return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in cells}
 
 
 def _next_header(lines: Sequence[str], begin: int, stop: int) -> int:
-    """Line at which a segment's rows end: the blank line before the next header."""
+    """Index of the line at which a segment's rows end: the blank line before the next header."""
     for at in range(begin + 1, stop):
         if lines[at].startswith("Channels") or lines[at].strip().startswith("***"):
             return at
@@ -112,7 +112,7 @@ def _next_header(lines: Sequence[str], begin: int, stop: int) -> int:
 def _segment(
     lines: Sequence[str], begin: int, stop: int, wide: int, separator: str
 ) -> tuple[list[list[str]], list[int], int]:
-    """Rows of a segment, their line numbers, and the number of lines that are no rows."""
+    """Rows of a segment, their line numbers, and the number of lines that are not rows."""
     rows, numbers, odd = [], [], 0
     for at in range(begin, stop):
         cells = [cell.strip() for cell in lines[at].split(separator)]
@@ -129,7 +129,7 @@ def _segment(
 def _columns(
     named: Sequence[str], keys: dict[str, list[str]], x_columns: str, decimal: str
 ) -> tuple[list[str], list[str], list[int], list[tuple[float, float] | None]]:
-    """Names, units and positions of the columns; start and step of columns that are not written out."""
+    """Names, units and indices of the columns; start and step of columns whose values are not in the file."""
     y_units, dimensions = keys.get("Y_Unit_Label", []), keys.get("X_Dimension", [])
     is_time = (dimensions[0] if dimensions else "Time") == "Time"
     x_name, x_unit = ("Time", "s") if is_time else (dimensions[0], "")

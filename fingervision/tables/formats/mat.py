@@ -1,4 +1,4 @@
-"""MATLAB files: versions 4 to 7 by scipy, version 7.3 (HDF5) by h5py; only numbers are read, no objects and no code."""
+"""MATLAB files: versions 4 to 7 with scipy, version 7.3 (HDF5) with h5py; only numbers, no objects and no code."""
 
 import warnings
 from pathlib import Path
@@ -25,7 +25,7 @@ NOT_NUMBERS = frozenset({b"cell", b"function_handle", b"char", b"table", b"timet
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Recognise the file by its first bytes; the oldest version has no mark, and is recognised by its suffix."""
+    """Whether the first bytes are of a MATLAB file; the oldest version is recognised by its file suffix."""
     return head.startswith(b"MATLAB ") or _is_hdf5(head) or path.suffix.lower() == ".mat"
 
 
@@ -34,7 +34,7 @@ def _is_hdf5(head: bytes) -> bool:
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read vectors of equal length, a matrix or a structure of vectors."""
+    """Read vectors of equal length, a matrix, or a structure of vectors as a table."""
     with path.open("rb") as file:
         head = file.read(1024)
     if path.stat().st_size > MOST_BYTES:
@@ -66,7 +66,7 @@ def read(path: Path, given: Entry) -> RawTable:
 
 
 def _older(path: Path, passed: list[str]) -> dict[str, Any]:
-    """Read by scipy, which builds numbers, texts and structures and executes nothing."""
+    """Read versions 4 to 7 with scipy, which builds numbers, texts and structures and executes no code."""
     from scipy.io import loadmat, whosmat
 
     try:
@@ -93,7 +93,7 @@ def _older(path: Path, passed: list[str]) -> dict[str, Any]:
 
 
 def _plain(value: Any, name: str, passed: list[str], deep: int = 0) -> Any:
-    """Arrays of real numbers, and structures of such arrays; other values become None and are listed."""
+    """Return arrays of real numbers and structures of such arrays; other values become None and are listed."""
     if isinstance(value, dict) and deep < DEEPEST:
         return {key: _plain(item, f"{name}.{key}", passed, deep + 1) for key, item in value.items()}
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
@@ -105,7 +105,7 @@ def _plain(value: Any, name: str, passed: list[str], deep: int = 0) -> Any:
 
 
 def _hdf5(path: Path, passed: list[str]) -> dict[str, Any]:
-    """Read data sets in the file itself; links to other files are not followed."""
+    """Read version 7.3: data sets in the file itself; links to other files are not followed."""
     library = needed_library("h5py", path, "a MATLAB 7.3 file (HDF5)")
     try:
         with library.File(path, "r") as file:

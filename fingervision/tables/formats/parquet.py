@@ -1,4 +1,4 @@
-"""Parquet files, by pyarrow: columns of numbers, dates and texts."""
+"""Parquet files, read with pyarrow: columns of numbers, dates and texts."""
 
 from pathlib import Path
 from typing import Any
@@ -21,12 +21,12 @@ PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Recognise the file by its first bytes."""
+    """Whether the first bytes are those of a Parquet file."""
     return head.startswith(b"PAR1")
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read all flat columns."""
+    """Read all columns that are not nested."""
     parquet = needed_library("pyarrow.parquet", path, "a Parquet file")
     try:
         file = parquet.ParquetFile(path)

@@ -1,4 +1,4 @@
-"""National Instruments' .tdms files, by npTDMS: the channels of one group."""
+"""National Instruments' .tdms files, read with npTDMS: the channels of one group."""
 
 import logging
 from collections.abc import Iterator
@@ -25,12 +25,12 @@ UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Recognise the file by its first bytes."""
+    """Whether the first bytes are those of a .tdms file."""
     return head.startswith(b"TDSm")
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read a group's channels; times are a channel, or follow from the waveform's rate."""
+    """Read the channels of a group; times are a channel, or follow from the sampling rate of the waveform."""
     library = needed_library("nptdms", path, "a TDMS file")
     warned: list[str] = []
     try:

@@ -1,4 +1,4 @@
-"""Any text with one row per line: all variants of CSV, COMSOL's `%` tables, columns separated by blanks."""
+"""Text tables with one row per line: all variants of CSV, COMSOL's `%` tables, columns separated by white space."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read a table as text."""
+    """Read a text table."""
     with path.open("rb") as file:
         head = file.read(16)
     for magic, words in OTHERS.items():

@@ -27,7 +27,7 @@ EPOCH = datetime(1900, 1, 1)
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Recognise a workbook by the content of its archive."""
+    """Whether the file is a workbook, from the content of its archive."""
     if not head.startswith(b"PK"):
         return False
     try:
@@ -38,7 +38,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read the selected sheet."""
+    """Read the selected sheet of the workbook."""
     library = needed_library("openpyxl", path, "an Excel workbook")
     try:
         _check_archive(path)
@@ -65,7 +65,7 @@ def read(path: Path, given: Entry) -> RawTable:
 
 
 def _check_archive(path: Path) -> None:
-    """Refuse archives that unpack to more than a table, and XML with its own definitions."""
+    """Refuse archives that unpack to an unreasonable size, and XML that defines entities."""
     with zipfile.ZipFile(path) as archive:
         infos = archive.infolist()
         total = sum(info.file_size for info in infos)
@@ -91,12 +91,12 @@ def _is_value(cell: object) -> bool:
 
 
 def _first_row(rows: Sequence[tuple[Any, ...]]) -> int | None:
-    """First row with at least two values."""
+    """Find the first row with at least two values."""
     return next((at for at, row in enumerate(rows) if sum(map(_is_value, row)) >= 2), None)
 
 
 def _best_names(rows: Sequence[tuple[Any, ...]]) -> list[str]:
-    """Names above the first row of a sheet; column numbers where there are none."""
+    """Column names above the first row of a sheet; column numbers if there are no names."""
     first = _first_row(rows)
     if first is None:
         return []
@@ -108,13 +108,13 @@ def _best_names(rows: Sequence[tuple[Any, ...]]) -> list[str]:
 
 
 class _Sheet:
-    """Information that openpyxl's fast reader omits: merged cells, and formulas without a value."""
+    """Information on a sheet that openpyxl's fast reader omits: merged cells, and formulas without a value."""
 
     def __init__(self, path: Path, title: str, place: int, library: Any) -> None:
         self.path, self.title, self._place, self._library = path, title, place, library
 
     def merged(self) -> list[tuple[int, int, int, int]]:
-        """First and last row and column (from 1) of merged ranges."""
+        """Return first and last row and column (from 1) of each merged range."""
         from re import findall
 
         book = self._library.load_workbook(self.path, read_only=True, keep_links=False)
@@ -193,7 +193,7 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
 
 
 def _header(rows: Sequence[tuple[Any, ...]], first: int, given: Entry) -> tuple[list[str], list[str], int]:
-    """Names, units, and the row of the names (from 1; 0: none)."""
+    """Return column names, units, and the number of the row with the names (from 1; 0 without names)."""
     above = {
         at: [("" if cell is None else str(cell).strip()) for cell in rows[at]]
         for at in (range(max(0, first - 6), first) if given.header_line is None else [given.header_line - 1])
@@ -216,7 +216,7 @@ def _header(rows: Sequence[tuple[Any, ...]], first: int, given: Entry) -> tuple[
 
 
 def _column(name: str, unit: str, cells: Sequence[Any]) -> RawColumn:
-    """Numbers stay numbers, dates and times become seconds, everything else becomes text."""
+    """Convert the cells of a column: numbers stay numbers, dates and times become seconds, others become text."""
     kinds = {type(cell) for cell in cells if cell is not None and cell != ""}
     present = np.array([cell is not None and cell != "" for cell in cells], dtype=np.bool_)
     if kinds and kinds <= {int, float}:
@@ -233,7 +233,7 @@ def _column(name: str, unit: str, cells: Sequence[Any]) -> RawColumn:
 
 
 def _seconds(cell: datetime | date | time | timedelta) -> float:
-    """Seconds since 1900, of the day, or of a duration."""
+    """Convert a date to seconds since 1900, a time of day to seconds since midnight, or a duration to seconds."""
     if isinstance(cell, datetime):
         return (cell.replace(tzinfo=None) - EPOCH).total_seconds()
     if isinstance(cell, date):
