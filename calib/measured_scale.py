@@ -160,8 +160,16 @@ class Calibration:
         """Standard uncertainty of the edge bias."""
         return sqrt(float(self.covariance[1, 1]))
 
+    @property
+    def states_no_limits(self) -> bool:
+        """Whether the calibration has no limit of distance, tilt, lens and temperature: a file of another program."""
+        limits = (self.limits.plane_mm, self.limits.tilt_deg, self.limits.lens_relative, self.limits.temperature_k)
+        return not self.stated and not any(limits)
+
     def how_stated(self, name: str, unit: str) -> str:
-        """Limit `name` in words, with a note whether the user stated it."""
+        """Limit `name` in words, with a note whether the user stated it, or another program's file lacks it."""
+        if name not in self.stated and getattr(self.limits, name) == 0.0:
+            return f"0 {unit} (not in the calibration file)"
         return f"+-{getattr(self.limits, name):g} {unit} ({'stated' if name in self.stated else 'default'})"
 
     def flatten(self, points_px: Floats) -> Floats:

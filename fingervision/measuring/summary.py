@@ -24,6 +24,11 @@ LOSSLESS_ADVICE = (
     "The recording is lossy ({codec}): its errors are several times those of the camera's noise and correlated from "
     "pixel to pixel and frame to frame. Record losslessly (FFV1 or raw) where the last hundredth of a pixel counts."
 )
+NO_LIMITS = (
+    "The calibration {name} has no limits (its key budget.limits): a distance of the fingers from the plane of the "
+    "reference, a tilt, the lens and the temperature count as zero in u_gap_mm. Calibrate with "
+    "`fingervision calibrate`, or add the limits of the set-up."
+)
 # What stands beside an edge or has moved it: what it means, and what takes it away.
 BESIDE = {
     "wall": "the side wall of a thick part stands beside the edge: which edge is measured is stated by --face; "
@@ -119,9 +124,14 @@ def summarise(
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),
             *about_edges(series),
+            *([NO_LIMITS.format(name=scale_file or "given")] if _states_no_limits(scale) else []),
             *description.notes,
         ],
     }
+
+
+def _states_no_limits(scale: Scale) -> bool:
+    return isinstance(scale, Calibration) and scale.states_no_limits
 
 
 def _about_unseen(description: Description, series: GapSeries) -> list[str]:

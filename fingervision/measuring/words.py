@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.status import Status
+from fingervision.measuring.gap_budget import RESPONSE
 from fingervision.measuring.series import GapSeries
 
 COVERAGE_FACTOR = 2.0
@@ -38,10 +39,12 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
 def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
     """Sentence about the error due to an assumed response, if no budget includes it and it exceeds the uncertainty."""
     gap, settings = summary["gap"], summary["settings"]
-    if settings.get("response_known", True) or gap["median_u_gap_mm"] is not None:
+    in_budget = any(part["source"] == RESPONSE and part["rms_u_mm"] > 0.0 for part in summary["uncertainty"]["parts"])
+    if settings.get("response_known", True) or in_budget:
         return []
+    u_mm = gap["median_u_random_mm"] if gap["median_u_gap_mm"] is None else gap["median_u_gap_mm"]
     moved_mm = float(np.median(series.response_px)) / summary["scale"]["px_per_mm"]
-    if moved_mm <= COVERAGE_FACTOR * gap["median_u_random_mm"]:
+    if moved_mm <= COVERAGE_FACTOR * u_mm:
         return []
     return [
         f"The camera's response is not known and was taken as {settings['response']}; another usual one would move the "

@@ -11,7 +11,7 @@ another level lies over a part of a moving body.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -115,6 +115,22 @@ def mechanism_of():  # type: ignore[no-untyped-def]
     return mechanism_from_tables(TABLES, "lever")
 
 
+def joined_moves(centroids: Mapping[str, Array], turns: Array, slips: Array) -> dict[str, tuple[float, float, float]]:
+    """Move finger and shuttle as their necks let them: turns in rad about each neck, and what each neck gives in mm.
+
+    A neck is 6 mm long; bodies that no flexure could join would rightly have no pose.
+    """
+    first, second = (np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)]) for x0, x1, y0, y1 in NECKS)
+
+    def turned(by: float, arm: Array) -> Array:
+        c, s = np.cos(by), np.sin(by)
+        return np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]]) - arm
+
+    finger = slips[0] + turned(turns[0], centroids["finger"] - first)
+    shuttle = slips[0] + turned(turns[0], second - first) + slips[1] + turned(turns[1], centroids["shuttle"] - second)
+    return {"pillar": (0.0, 0.0, 0.0), "shuttle": (*shuttle, turns[1]), "finger": (*finger, turns[0])}
+
+
 def scale_of(kind: str, rng: np.random.Generator) -> tuple[Scale, float, float]:
     """Return the scale that is stated, the true one, and the true edge bias in px."""
     if kind in ("bare", "lossy", "covered"):
@@ -152,8 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             truth = Truth(
                 s_true, rng.uniform(-0.06, 0.06),
                 np.array([0.5 * WIDTH, 0.5 * HEIGHT]) + rng.uniform(-4.0, 4.0, 2), case % 4 == 3,
-                {name: (0.0, 0.0, 0.0) if name == "pillar" else
-                 (*rng.uniform(-0.8, 0.8, 2), rng.uniform(-0.012, 0.012)) for name in BOXES},
+                joined_moves(centroids, rng.uniform(-0.012, 0.012, 2), rng.uniform(-0.3, 0.3, (2, 2))),
                 (0.5 if dark else -0.5) * bias / s_true,
             )  # fmt: skip
             blur, noise = rng.uniform(0.7, 1.6), rng.uniform(1.0, 4.0)

@@ -69,7 +69,7 @@ def test_the_page_shows_records_and_saves(
     shown(page, "document.querySelector('#record').textContent === 'Stop'")
     page.fill("#below_tip", "0.4")
     page.press("#below_tip", "Enter")
-    says(page, "While a run is recorded the measurement stays as it is")
+    says(page, "The settings of the measurement cannot be changed while a run is recorded")
     page.press("#below_tip", "Escape")
     shown(page, "/Recording: [3-9][0-9] frames/.test(document.querySelector('#recording').textContent)")
     page.locator("body").press("r")

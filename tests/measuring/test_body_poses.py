@@ -112,7 +112,7 @@ def test_a_drawing_that_is_not_in_the_picture_is_refused(plate: MechanismPlate) 
     with pytest.raises(FingervisionError, match="cover"):
         by_silhouette(blank, plate.mechanism, SCALE)
     grey = frame(plate, 0.0, 1).pixels.astype(float)
-    with pytest.raises(FingervisionError, match="common"):
+    with pytest.raises(FingervisionError, match="overlap"):
         by_silhouette(grey, plate.mechanism, 2.5)
     wrong = points(Placement(SCALE, np.array([90.0, 380.0]), 0.3, False), (31, 5), (39, 5), (10, 60))
     tracker, pictures = BodyTracker(plate.mechanism, BareScale(SCALE), wrong), [frame(plate, 0.0, 1)]

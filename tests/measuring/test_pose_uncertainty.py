@@ -128,10 +128,10 @@ def test_a_scale_that_is_off_and_a_cast_shadow_are_refused_and_never_a_pose_besi
 def test_poses_through_a_lens_and_a_tilted_plane_are_those_of_the_drawing() -> None:
     rng = np.random.default_rng(3)
     scale, s_true, _ = scene.scale_of("lens", rng)
-    moves = {"pillar": (0.0, 0.0, 0.0), "shuttle": (0.3, -0.5, 0.004), "finger": (-0.6, 0.2, -0.008)}
     middle = np.array([0.5 * scene.WIDTH, 0.5 * scene.HEIGHT])
-    truth = scene.Truth(s_true, 0.03, middle, False, moves, 0.0)
     centroids = {name: scene.centroid(name) for name in scene.BOXES}
+    moves = scene.joined_moves(centroids, np.array([-0.008, 0.004]), np.array([[-0.3, 0.2], [0.25, -0.3]]))
+    truth = scene.Truth(s_true, 0.03, middle, False, moves, 0.0)
     clean = scene.picture(truth, centroids, scale, 1.0, True)
     grey = np.clip(np.round(clean + rng.normal(0.0, 2.0, clean.shape)), 0, 255).astype(np.uint8)
     points = tuple(scene.given_point(truth, scale, at, rng) for at in ((31.0, 0.0), (39.0, 0.0), (35.0, 20.0)))

@@ -51,3 +51,28 @@ def test_without_a_step_readings_are_taken_as_they_are() -> None:
         track.add(Reading(at_s, at_s, at_s, 0.3 * at_s, True))
     assert track.at_mm(0.5) == pytest.approx(0.15)
     assert track.at_mm(1.0) == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("every_s", [0.005, 0.02, 0.037])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_stage_that_slows_down_rests_where_its_encoder_says(every_s: float, sign: float) -> None:
+    """A fine encoder, several of whose steps lie between two readings: the last way is not left half done."""
+    step_mm, speed_mm_s, slowing_s = 0.0005, 0.5, 0.1
+    track = StageTrack(step_mm)
+    time_s = np.arange(0.0, 3.0, every_s)
+
+    def place_mm(at_s: float) -> float:
+        # Even motion from 0.5 s on, then an even deceleration that ends at 1.5 s.
+        even_s, left_s = min(max(at_s - 0.5, 0.0), 0.9), min(max(at_s - 1.4, 0.0), slowing_s)
+        return sign * speed_mm_s * (even_s + left_s - 0.5 * left_s**2 / slowing_s)
+
+    for at_s in time_s.tolist():
+        counted = round(place_mm(at_s) / step_mm) * step_mm
+        track.add(Reading(at_s, at_s, at_s, counted, 0.5 < at_s < 1.5))
+    resting = [track.at_mm(at_s, at_once=True) for at_s in time_s[time_s > 1.5 + every_s].tolist()]
+    assert resting == pytest.approx([place_mm(3.0)] * len(resting), abs=0.5 * step_mm + 1e-12)
+    way_s = np.arange(0.6, 1.5, 0.01)
+    found = np.array([track.at_mm(at_s, at_once=True) for at_s in way_s.tolist()])
+    true = np.array([place_mm(at_s) for at_s in way_s.tolist()])
+    # Between two readings the speed changes by at most deceleration times their distance.
+    assert np.max(np.abs(found - true)) < step_mm + 0.5 * speed_mm_s / slowing_s * every_s**2

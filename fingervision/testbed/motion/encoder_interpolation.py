@@ -18,6 +18,8 @@ BORDERS_FOR_SPEED = 6
 # A stage that is slower than its step in so much time is taken to go on as before: with the half second that rows wait
 # for company, less than a second is lost where the program is killed.
 WAIT_FOR_BORDER_S = 0.4
+# Steps between two readings up to which exactly one border was passed; readings are whole steps.
+MOST_FOR_ONE_BORDER = 1.5
 # Knots that are kept: a frame looks back over this wait, and no further.
 MOST_KNOTS = 4000
 
@@ -62,15 +64,25 @@ class StageTrack:
             self._note(Knot(reading.device_s, reading.value))
             return
         between_s = 0.5 * (last.device_s + reading.device_s)
-        if reading.moving and not last.moving:
+        starts, stops = reading.moving and not last.moving, last.moving and not reading.moving
+        if starts:
             self._borders.clear()
             if not self._lost:
                 self._note(Knot(between_s, self._knots[-1].position_mm))
+        several = abs(reading.value - last.value) > MOST_FOR_ONE_BORDER * self._step_mm
+        if several and not (last.moving and reading.moving):
+            # The stage speeds up or slows down between these readings, and borders were passed at unknown times: it is
+            # where each reading says, not half-way between them.
+            if not starts:
+                self._note(Knot(last.device_s, last.value))
+            self._note(Knot(reading.device_s, reading.value))
+            self._lost = False
+            return
         if reading.value != last.value:
             border = Knot(between_s, 0.5 * (last.value + reading.value))
             self._borders.append(border)
             self._note(border)
-        if last.moving and not reading.moving:
+        if stops:
             self._lost = len(self._borders) < 2
             if not self._lost:
                 self._note(Knot(between_s, self._onwards_mm(between_s, reading.value)))
