@@ -44,6 +44,6 @@ def with_rows_between(inputs: NDArray[np.float64], figures: ModelFigures) -> NDA
 
 
 def inputs_until_touch(figures: ModelFigures) -> NDArray[np.float64]:
-    """Inputs from the first touch to three times as far in the other direction: the published range."""
+    """Inputs (mm) from the first touch (closing) to three times this amount in opening: the published range."""
     touch = figures.contact_input_mm or -0.1
     return np.union1d(np.linspace(touch, 0.0, 26), np.linspace(0.0, -3.0 * touch, 76))

@@ -53,7 +53,7 @@ def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
 
 @dataclass(frozen=True, slots=True)
 class MotionAsked:
-    """Options of `model` for motion in time and frequency, checked before any computation."""
+    """Options of `model` for responses over time and frequency, checked before any computation."""
 
     drive: DriveHistory | None
     modes: ModesWanted | None

@@ -1,6 +1,6 @@
 """The file bodies.csv: poses of a mechanism's bodies and angles of its hinges in every video frame.
 
-This module also adds such columns to gaps.csv.
+The same quantities can also be added to gaps.csv as columns.
 """
 
 import csv

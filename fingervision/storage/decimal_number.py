@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 def decimal_number(cell: str) -> float:
-    """Read a number.
+    """Read a decimal number from a table cell.
 
     Raises
     ------

@@ -200,7 +200,7 @@ def _quantity(
 def _length(
     raw: RawTable, names: Sequence[ColumnName], place: int, role: str, given: Entry, questions: list[Question]
 ) -> Numbers:
-    """Return a column of lengths, converted to mm."""
+    """Return a column of lengths converted to mm; open questions about its unit are added to `questions`."""
     column = raw.columns[place]
     unit = given.units.get(role) or column.unit or names[place].unit
     size = factor(unit, "length") if unit else None

@@ -138,7 +138,7 @@ def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
 
 
 def _all_units(cells: Sequence[str]) -> bool:
-    """Whether a line contains only units, and at least one."""
+    """Whether a line contains only units and empty cells, with at least one unit."""
     # `t` is a name and a tonne, `s` a second: a word of a role is a name only beside others that are.
     return any(cells) and all(is_unit(cell) for cell in cells) and sum(role_of(cell) is not None for cell in cells) == 0
 

@@ -154,7 +154,7 @@ def _clock(text: str) -> float | None:
 
 
 def _offset(zone: str) -> float:
-    """Seconds by which a time zone is ahead of UTC."""
+    """Number of seconds by which a time zone is ahead of UTC."""
     if zone == "Z":
         return 0.0
     sign = -1.0 if zone[0] == "-" else 1.0

@@ -83,7 +83,7 @@ class ActuatorContract(_BedContract):
                 )
 
     def test_a_motion_takes_the_time_that_its_speed_says(self) -> None:
-        """The duration of a motion agrees with its speed within the accuracy at either end, by the actuator's clock."""
+        """By the actuator's clock, a motion's duration agrees with its speed within the accuracy of its end points."""
         self._needs_motor()
         with self._bed() as bed:
             before = bed.actuator.readings()[-1:]
