@@ -210,7 +210,9 @@ def _draw(rows: Mapping[str, NDArray[np.float64]], part: Part, name: str, path: 
         style = {"color": f"C{place}", "linestyle": ("-", "--", "-.")[place % 3]}
         upper.plot(table[:, 0], table[:, 3], label=kind, **style)
         lower.plot(table[:, 0], table[:, 4], **style)
-    upper.set_title(f"{name}: grip on a part of {part.width_mm:g} mm ({_stiff(part)}), small displacements")
+    upper.set_title(
+        f"{name}: grip on a part of {part.width_mm:g} mm ({_stiff(part)}), small displacements", fontsize="medium"
+    )
     upper.set_ylabel("grip of each finger / N")
     lower.set_ylabel("force at the drive / N")
     lower.set_xlabel("input / mm")

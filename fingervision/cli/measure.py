@@ -232,6 +232,11 @@ def _report(measured: "Measured", as_json: bool) -> None:
         _complain(
             f"Stopped by the user after {series.frames} frames; what was measured until then is in {folder.path}."
         )
+    elif not series.frames and (asked := summary["settings"]["frames"]) is not None and asked[0]:
+        _complain(
+            f"--frames must begin within the recording, but {summary['recording']['name']} ends before frame "
+            f"{asked[0]}: give an earlier one."
+        )
     elif not series.frames:
         _complain(f"{summary['recording']['name']} must have at least one picture, but has none: record it again.")
     elif not series.counts[Status.OK] and not measured.has_gauge_numbers:

@@ -9,7 +9,7 @@ from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
 from fingervision.diagnosis.inference.answer import judged, without_names
 from fingervision.diagnosis.inference.explanation_candidates import Progress
-from fingervision.diagnosis.inference.plausibility import gross_mistake, swapped_directions
+from fingervision.diagnosis.inference.plausibility import gross_mistake, mixed_rows, swapped_directions
 from fingervision.diagnosis.inference.refitted_search import Refitted, refitted_search
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
@@ -128,6 +128,8 @@ def _explained(
     data, found = refitted.data, refitted.found
     if mistake is None and (found.unknown is not None or not found.best.names):
         mistake = swapped_directions(data, found.problem)
+    if mistake is None and found.unknown is None and found.best.names:
+        mistake = mixed_rows(data, found.best, found.problem)
     if mistake is not None and mistake.blocks:
         data, found = without_names(data, found, mistake.words.rstrip("."))
         found = replace(found, left_over=None)

@@ -87,11 +87,14 @@ def parse_point(text: str) -> GivenPoint:
     """
     try:
         (x_px, y_px), (x_mm, y_mm) = (tuple(map(float, half.split(","))) for half in text.split("="))
+        is_point = bool(np.isfinite([x_px, y_px, x_mm, y_mm]).all())
     except ValueError:
+        is_point = False
+    if not is_point:
         raise UsageError(
             f"--at must be X,Y=XMM,YMM, a point in pixels and the same point of the drawing in mm, such as "
             f"312,80=2,100, but is {text}."
-        ) from None
+        )
     return GivenPoint(x_px, y_px, x_mm, y_mm)
 
 

@@ -11,7 +11,7 @@ from fingervision.domain.gripper import PointMm
 from fingervision.models.hinge_correction import plane_strain_share
 from fingervision.models.notch import Notch
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar
-from fingervision.models.strip_width import strip_share
+from fingervision.models.strip_width import stretched_share, strip_share
 from fingervision.models.width_effect import ConstrainedZone
 
 Array = NDArray[np.float64]
@@ -47,6 +47,9 @@ class Flexure:
         circular flexure. A leaf has no depth.
     fillet_mm : float
         Radius of the corners of a filleted flexure.
+    used : (float, float, float) or None
+        Shares of its strain energy by ends that turn against each other, that sway, and that stretch it; None where not
+        known.
     """
 
     name: str
@@ -57,6 +60,7 @@ class Flexure:
     half_length_mm: float
     depth_mm: float = 0.0
     fillet_mm: float = 0.0
+    used: tuple[float, float, float] | None = None
 
     def point_mm(self, along: Any, across: Any) -> tuple[Any, Any]:
         """Convert coordinates along and across the flexure's axis to a point, or to an array of points."""
@@ -106,7 +110,7 @@ class Flexure:
         return Notch(self.thickness_mm, self.half_length_mm, self.depth_mm, plate_mm)
 
     @property
-    def _bent_mm(self) -> float:
+    def bent_mm(self) -> float:
         """Length of a leaf or straight neck that bends; of fillets, the part with at most twice the stiffness."""
         straight, r = self.half_length_mm - self.fillet_mm, self.fillet_mm
         if r == 0.0:
@@ -117,21 +121,28 @@ class Flexure:
     def width_share(self, plate_mm: float) -> float:
         """Degree to which the plate's width constrains the bending: 0 for plane stress, 1 for plane strain.
 
-        For a leaf or a straight neck it is the mean of two cases: ends that rotate, and ends that keep their direction.
+        For a leaf or a straight neck it lies between two cases, ends that rotate and ends that keep their direction: by
+        their shares of the strain energy, or their mean where these are not known.
         """
         if self.is_notch:
             return plane_strain_share(self.notch(plate_mm))
-        return 0.5 * sum(strip_share(plate_mm / self._bent_mm, _POISSON))
+        bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
+        if self.used is None:
+            return 0.5 * (bent + swayed)
+        return (self.used[0] * bent + self.used[1] * swayed) / max(self.used[0] + self.used[1], 1e-300)
 
     def width_doubt(self, plate_mm: float) -> float:
         """Half range of `width_share`, because the boundary conditions of a strip's ends are not known."""
-        if self.is_notch:
+        if self.is_notch or self.used is not None:
             return 0.0
-        bent, swayed = strip_share(plate_mm / self._bent_mm, _POISSON)
+        bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
         return 0.5 * (swayed - bent)
 
     def zone(self, plate_mm: float) -> ConstrainedZone:
-        """Zone in which the plate's width restrains the flexure, and how strongly."""
+        """Zone in which the plate's width restrains the flexure, and how strongly, in the way that it is used."""
         share = self.width_share(plate_mm)
+        if self.used is not None:
+            stretched = stretched_share(plate_mm / self.bent_mm, _POISSON)
+            share += self.used[2] * (stretched - share)
         height = 0.5 * self.thickness_mm + self.depth_mm
         return ConstrainedZone(self.at_mm, self.axis_deg, self.half_length_mm, height, share)

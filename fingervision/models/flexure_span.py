@@ -19,6 +19,7 @@ from fingervision.models.hinge_correction import HingeTheory, hinge_ratio
 from fingervision.models.notch import Notch
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon
+from fingervision.models.strip_width import stretched_share
 
 Array = NDArray[np.float64]
 
@@ -108,22 +109,29 @@ class FlexureSpan:
             root = np.sqrt(hinge_ratio(wide, material, theory)[[0, 1, 5]])
             parts = [beam_compliance(notch, material, span)[_PLANAR] for span in spans]
             return np.asarray(root[:, None] * np.array(parts) * root)
-        share = self.flexure.zone(plate_mm).share if corrected and width_effect else 0.0
-        held = 1.0 - share * material.poisson_ratio**2
-        return np.array([_segment(self.flexure, span, plate_mm, material, held) for span in spans])
+        shares = (0.0, 0.0)
+        if corrected and width_effect:
+            ratio = plate_mm / self.flexure.bent_mm
+            shares = self.flexure.width_share(plate_mm), stretched_share(ratio, material.poisson_ratio)
+        bent, stretched = (1.0 - share * material.poisson_ratio**2 for share in shares)
+        return np.array([_segment(self.flexure, span, plate_mm, material, bent, stretched) for span in spans])
 
 
-def _segment(flexure: Flexure, span: tuple[float, float], plate_mm: float, material: Material, held: float) -> Array:
-    """Compliance of a Timoshenko beam of varying height between two positions along the flexure's axis."""
+def _segment(
+    flexure: Flexure, span: tuple[float, float], plate_mm: float, material: Material, bent: float, stretched: float
+) -> Array:
+    """Compliance of a Timoshenko beam of varying height between two positions along the flexure's axis.
+
+    `bent` and `stretched` are its compliances over those of a strip that no width holds back.
+    """
     nodes, weights = _GAUSS
     half = 0.5 * (span[1] - span[0])
     x, dx = 0.5 * (span[0] + span[1]) + half * nodes, half * weights
     h, arm = flexure.height_mm(x), span[1] - x
-    E, G, b = material.youngs_modulus_mpa / held, material.shear_modulus_mpa, plate_mm
+    E, G, b = material.youngs_modulus_mpa / bent, material.shear_modulus_mpa, plate_mm
     bending = [float(np.sum(dx * arm**k * 12.0 / (E * b * h**3))) for k in range(3)]
     shear = float(_SHEAR * np.sum(dx / (G * b * h)))
-    # Stretched, the strip is free to narrow.
-    return np.array([[float(np.sum(dx / (material.youngs_modulus_mpa * b * h))), 0.0, 0.0],
+    return np.array([[stretched * float(np.sum(dx / (material.youngs_modulus_mpa * b * h))), 0.0, 0.0],
                      [0.0, bending[2] + shear, bending[1]],
                      [0.0, bending[1], bending[0]]])  # fmt: skip
 

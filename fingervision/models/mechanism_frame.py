@@ -32,6 +32,7 @@ from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
 from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.strip_energy import used_in_frame
 from fingervision.models.triangulate import triangulate
 
 Array = NDArray[np.float64]
@@ -83,9 +84,27 @@ class MechanismFrame:
         self.spans = tuple(span_of(flexure, region) for flexure in mechanism.flexures)
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
         mesh = triangulate(cut, _ACROSS, _BODY * region.size_mm)
+        self._mesh, self._size_mm = mesh, region.size_mm
+        self._assemble()
+        if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures):
+            # How a strip is held back depends on how it is bent: that is known now.
+            loads = self._end_loads(self.driven.unit_displacement, large=False)
+            whole = 0.5 * self.stiffness_n_mm
+            self.spans = tuple(
+                span
+                if span.flexure.is_notch
+                else replace(span, flexure=used_in_frame(span, loads[list(own)], self.plate, whole))
+                for span, own in zip(self.spans, self.segments, strict=True)
+            )
+            self.mechanism = replace(mechanism, flexures=tuple(span.flexure for span in self.spans))
+            del self.driven
+            self._assemble()
+
+    def _assemble(self) -> None:
+        mechanism = self.mechanism
         zones = tuple(f.zone(mechanism.plate_mm) for f in mechanism.flexures if not f.is_notch)
-        self.plate = PlaneStressPlate(mesh, mechanism.material, mechanism.plate_mm, zones if width_effect else ())
-        self._size_mm = region.size_mm
+        used = zones if self._width_effect else ()
+        self.plate = PlaneStressPlate(self._mesh, mechanism.material, mechanism.plate_mm, used)
         self.assembly = assemble_bodies(self.plate, mechanism, self.spans, self._size_mm)
         self._make_flexures()
 

@@ -1,5 +1,6 @@
 """A planar mechanism by finite elements: any topology, small or large displacements, stress and natural modes."""
 
+from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -18,7 +19,9 @@ from fingervision.models.mechanism_state import MechanismState, pair_distances_m
 from fingervision.models.modal_model import FreeModes, ModalModel, Observable
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.strip_energy import used_in_plate
 from fingervision.models.triangulate import PlaneMesh, triangulate
+from fingervision.models.width_effect import ConstrainedZone
 
 Array = NDArray[np.float64]
 
@@ -58,13 +61,26 @@ class MechanismPlate:
         check_mechanism(mechanism, region)
         self._size_mm = region.size_mm
         self.mesh: PlaneMesh = triangulate(region, _ACROSS * refine, _BODY * self._size_mm / refine)
-        zones = tuple(flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures)
-        used = zones if width_effect else ()
-        self.plate = PlaneStressPlate(self.mesh, mechanism.material, mechanism.plate_mm, used)
+        zones = self._hold_back(width_effect=width_effect)
         middles = self.mesh.nodes_mm[:, self.mesh.triangles[:3]].mean(axis=1)
         inside = [zone.holds(middles) for zone in zones] or [np.ones(middles.shape[1], dtype=bool)]
         self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, middles)
         self._support()
+        if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures) and not self._wanders():
+            # How a strip is held back depends on how it is bent: that is known now.
+            moved, whole = self.driven.unit_displacement, 0.5 * self.driven.input_stiffness_n_mm
+            flexures = (f if f.is_notch else used_in_plate(f, self.plate, moved, whole) for f in mechanism.flexures)
+            self.mechanism = replace(mechanism, flexures=tuple(flexures))
+            del self.driven
+            self._hold_back(width_effect=True)
+
+    def _hold_back(self, *, width_effect: bool) -> tuple[ConstrainedZone, ...]:
+        """Make the plate, whose flexures its width holds back."""
+        mechanism = self.mechanism
+        zones = tuple(flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures)
+        used = zones if width_effect else ()
+        self.plate = PlaneStressPlate(self.mesh, mechanism.material, mechanism.plate_mm, used)
+        return zones
 
     def _beside_sharp_corners(self, region: PlanarRegion, points: Array) -> NDArray[np.bool_]:
         """Points within half a thickness of a sharp re-entrant corner, where the elastic stress is singular."""

@@ -47,6 +47,49 @@ def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]
     return bent * width_over_length / ratio, swayed * width_over_length / ratio
 
 
+def stretched_share(width_over_length: float, poisson: float) -> float:
+    """Share of plane strain of a strip that its bodies stretch, and that may not narrow where it meets them.
+
+    By Ritz's method for the strip in plane stress across its thickness; parameters as in `strip_share`.
+    """
+    if poisson <= 0.0:
+        return 0.0
+    ratio = max(width_over_length, _NARROW)
+    return _stretched(round(float(np.log(ratio)), _DIGITS), poisson) * width_over_length / ratio
+
+
+@lru_cache(maxsize=512)
+def _stretched(log_width: float, poisson: float) -> float:
+    width = float(np.exp(log_width))
+    x, x_weights = (0.5 * (part + 1.0) if i == 0 else 0.5 * part for i, part in enumerate(legendre.leggauss(24)))
+    y, y_weights = legendre.leggauss(24)
+    along = [poly.polymul([0.0, 1.0, -1.0], _shifted(m)) for m in range(_ALONG)]
+    f, fx = (np.array([poly.polyval(x, poly.polyder(p, k)) for p in along]) for k in range(2))
+
+    def across(first: int) -> tuple[Array, Array]:
+        shapes = [legendre.leg2poly(np.eye(2 * _ACROSS)[2 * n + first]) for n in range(_ACROSS)]
+        g, gy = (np.array([poly.polyval(y, poly.polyder(q, k)) for q in shapes]) for k in range(2))
+        return g, gy * 2.0 / width
+
+    def product(a: Array, b: Array) -> Array:
+        return np.asarray(np.einsum("mx,ny->mnxy", a, b).reshape(_ALONG * _ACROSS, -1))
+
+    (even, even_y), (odd, odd_y) = across(0), across(1)
+    none = np.zeros((_ALONG * _ACROSS, x.size * y.size))
+    stretch = np.vstack([product(fx, even), none])
+    narrowing = np.vstack([none, product(f, odd_y)])
+    shear = np.vstack([product(f, even_y), product(fx, odd)])
+    weights = np.outer(x_weights, 0.5 * width * y_weights).ravel()
+    law = 0.5 * (1.0 - poisson)
+    energy = (stretch * weights) @ stretch.T + (narrowing * weights) @ narrowing.T + law * (shear * weights) @ shear.T
+    mixed = poisson * (stretch * weights) @ narrowing.T
+    pull = (stretch + poisson * narrowing) @ weights
+    # The stretch itself is uniform; what is added to it makes the energy least.
+    stiffness = (width - pull @ np.linalg.lstsq(energy + mixed + mixed.T, pull, rcond=None)[0]) / width
+    stiffness /= 1.0 - poisson**2
+    return float(np.clip((1.0 - 1.0 / stiffness) / poisson**2, 0.0, 1.0))
+
+
 @lru_cache(maxsize=512)
 def _shares(log_width: float, poisson: float) -> tuple[float, float]:
     """Compute the two shares of `strip_share` for a strip of length 1, not narrow."""

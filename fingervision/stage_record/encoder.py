@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from fingervision.domain.effect import Array
+from fingervision.stage_record.differences import differences
 
 RESOLVED_MM = 1e-7
 """Differences of recorded inputs below this value are rounding in the file's last digits."""
@@ -51,20 +52,32 @@ FEWEST_SINGLE = 3
 """Least number of single steps that distinguish an encoder from set points in round numbers."""
 
 
-def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]:
-    """Estimate the standard uncertainty of a recorded input, and the encoder's step, from the record itself.
+def input_sigma(input_mm: Array, runs: tuple[slice, ...], time_s: Array | None = None) -> tuple[float, float]:
+    """Estimate the standard uncertainty of one recorded input, and the encoder's step, from the record itself.
 
-    High-order differences of a smooth motion vanish, so that only noise is left. For motion at constant speed a low
-    order is sufficient, for an oscillation a higher order is needed; the smallest estimate over the orders is used. The
-    median of the absolute differences is robust against reversals.
+    Parameters
+    ----------
+    input_mm : ndarray of float, shape (n,)
+        Recorded input.
+    runs : tuple of slice
+        Samples of each run.
+    time_s : ndarray of float, shape (n,), or None
+        Their times, increasing within each run; None where they follow at equal steps.
 
     Returns
     -------
     sigma_mm, step_mm : float
         Standard uncertainty of one value, and the encoder's step; the step is 0 if the values do not lie on a grid.
+
+    Notes
+    -----
+    High-order differences of a smooth motion vanish, so that what they leave is noise. For a straight motion a low
+    order is sufficient, for an oscillation a higher one is needed; the smallest estimate over the orders is used. Their
+    median is robust against reversals.
     """
     orders = ORDERS if input_mm.size >= MANY else ORDERS[:1]
-    sigma = min(_sigma_by_differences(input_mm, runs, order) for order in orders)
+    times = np.arange(float(input_mm.size)) if time_s is None else time_s
+    sigma = min(_sigma_by_differences(input_mm, times, runs, order) for order in orders)
     step = _grid(input_mm)
     # Rounding that is finer than the noise is no encoder's: it averages out with the noise.
     if step < sigma or not _rounds(input_mm, runs, step):
@@ -151,10 +164,10 @@ def _characteristic(values: Array, frequency: Array) -> NDArray[np.complex128]:
     return np.asarray((first @ then.T).ravel()[: frequency.size] / values.size)
 
 
-def _sigma_by_differences(input_mm: Array, runs: tuple[slice, ...], order: int) -> float:
-    differences = np.concatenate([np.diff(input_mm[run], order) for run in runs])
+def _sigma_by_differences(input_mm: Array, time_s: Array, runs: tuple[slice, ...], order: int) -> float:
+    taken = np.concatenate([differences(input_mm[run], time_s[run], order) for run in runs])
     gain = float(np.sqrt(comb(2 * order, order)))
-    return float(np.median(np.abs(differences))) / NORMAL_MEDIAN / gain if differences.size else np.inf
+    return float(np.median(np.abs(taken))) / NORMAL_MEDIAN / gain if taken.size else np.inf
 
 
 def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:

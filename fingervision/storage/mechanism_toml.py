@@ -220,7 +220,10 @@ class _Reader(DrawingReader):
                 f"{what}.fillet_mm in {self.origin} must be at most half_length_mm and depth_mm, but is "
                 f"{values['fillet_mm']:g}."
             )
-        return Flexure(name, kind, (at[0], at[1]), self.value(table, "axis_deg", what), **values)
+        return Flexure(
+            name, kind, (at[0], at[1]), self.value(table, "axis_deg", what), values["thickness_mm"],
+            values["half_length_mm"], values.get("depth_mm", 0.0), values.get("fillet_mm", 0.0),
+        )  # fmt: skip
 
     def face(self, table: Mapping[str, Any], what: str) -> Face:
         name = str(table.get("name", what))

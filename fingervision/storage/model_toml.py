@@ -80,7 +80,7 @@ def read_model(
     kind = str(document.get("kind", kind))
     named = document["base"]
     if not (isinstance(named, str) and named.strip() and "\0" not in named):
-        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: mend it.")
+        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: correct it.")
     base = read_model(path.parent / named, kind, (*inside, place), table)
     names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
     if names and isinstance(base.base, FunctionModel):

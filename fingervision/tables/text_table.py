@@ -1,5 +1,6 @@
 """Convert lines of text to a raw table: header, units, comments, repeated headers, and lines that are not rows."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,6 +25,9 @@ from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, names_in
 
 NUMBER_BEGINS = frozenset("0123456789+-., \t")
+BETWEEN = re.compile(r"[\s,;|]+")
+MOST_PROSE = 0.5
+"""Share of the lines that may be words: a logger's notes between the rows are fewer, a text's lines nearly all are."""
 MOST_ODD = 0.05
 """Share of rows that may have another number of cells: more are not a logger's hiccup but a wrong separator."""
 
@@ -174,6 +178,13 @@ class _Rows:
             else:
                 odd.append((line, len(cells)))
         if len(odd) > max(1.0, MOST_ODD * len(rows)):
+            told = [text for text in body if text.strip() and not is_comment(text)]
+            prose = sum(_is_prose(text, self._dialect.decimal) for text in told)
+            if prose > MOST_PROSE * len(told):
+                raise DataError(
+                    f"{self._path} is no table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
+                    "words, and a table has rows of two numbers or more. Name the file that holds the table."
+                )
             raise DataError(
                 f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
                 f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
@@ -202,6 +213,12 @@ class _Rows:
             return True
         same = sum(a.lower() == b.lower() for a, b in zip(cells, names, strict=True))
         return same > len(cells) // 2 and not any(is_number(cell, self._dialect.decimal) for cell in cells)
+
+
+def _is_prose(text: str, decimal: str) -> bool:
+    """Whether most of what a line holds between blanks and separators is no number, date or empty cell."""
+    parts = BETWEEN.split(text.strip())
+    return sum(is_value(part, decimal) for part in parts) < 0.5 * len(parts)
 
 
 def _count(number: int, noun: str) -> str:

@@ -32,6 +32,7 @@ from fingervision.vision.residuals import (
     shared_points,
     spread,
 )
+from fingervision.vision.rough_corner import with_corner_doubt
 from fingervision.vision.roughness import roughness, shared_along, with_roughness
 from fingervision.vision.third_tone import THIRD_TONE
 
@@ -118,6 +119,8 @@ def measure_gap(
     fitted = [
         measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
     ]
+    if rough is not None:
+        fitted = with_corner_doubt(list(points), [left, right], fitted, below_tip_px, rough.shared_px)
     stray = 1.0 if rough is None else rough.shared_px
     holds = [shape_holds(*one, below_tip_px, stray) for one in zip(points, (left, right), fitted, strict=True)]
     refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)

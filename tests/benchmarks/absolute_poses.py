@@ -6,7 +6,8 @@ The scenes share nothing with the product: a body is boxes, a box seen through a
 differences of error functions in its own axes, exactly; a pixel is the mean of it by Gauss and Legendre's points.
 Every case draws where the mechanism lies (mirrored in every fourth), how each body moved, blur, noise, and with
 `calibrated` the true scale and edge bias out of the calibration's own uncertainty, with `lens` a distortion and a
-perspective that the calibration knows. With `lossy` the pictures are JPEG of quality 85.
+perspective that the calibration knows. With `lossy` the pictures are JPEG of quality 85. With `covered` a hand of
+another level lies over a part of a moving body.
 """
 
 import argparse
@@ -116,7 +117,7 @@ def mechanism_of():  # type: ignore[no-untyped-def]
 
 def scale_of(kind: str, rng: np.random.Generator) -> tuple[Scale, float, float]:
     """Return the scale that is stated, the true one, and the true edge bias in px."""
-    if kind in ("bare", "lossy"):
+    if kind in ("bare", "lossy", "covered"):
         return BareScale(SCALE), SCALE, 0.0
     u_scale, u_bias, bias = 2e-4 * SCALE, 0.05, 0.12
     none = Limits(estimator_px=0.0, plane_mm=0.0, tilt_deg=0.0, lens_relative=0.0, temperature_k=0.0)
@@ -157,6 +158,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             )  # fmt: skip
             blur, noise = rng.uniform(0.7, 1.6), rng.uniform(1.0, 4.0)
             clean = picture(truth, centroids, scale, blur, dark)
+            if kind == "covered":
+                hand(clean, truth, rng)
             grey = np.clip(np.round(clean + rng.normal(0.0, noise, clean.shape)), 0, 255).astype(np.uint8)
             coding = Coding.LOSSLESS
             if kind == "lossy":
@@ -190,6 +193,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"  {part}: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {z.size} within 1.96 u (RMS of error / u "
                   f"{np.sqrt(np.mean(z**2)):.2f}, largest {np.abs(z).max():.1f}); by the frame's own part alone "
                   f"{100 * np.mean(np.abs(r) < 1.96):.1f} %", flush=True)  # fmt: skip
+
+
+def hand(clean: Array, truth: Truth, rng: np.random.Generator) -> None:
+    """Cover a disc of 6 to 10 mm about a point of a moving body's outline, with an edge blurred by 3 px."""
+    at = np.array([(18.0, 70.0), (10.0, 60.0), (28.0, 50.0), (22.0, 20.0)][int(rng.integers(4))])
+    away = at - MIDDLE_MM
+    c, s, side = np.cos(truth.angle), np.sin(truth.angle), 1.0 if truth.is_mirrored else -1.0
+    x, y = np.array([c * away[0] - side * s * away[1], s * away[0] + side * c * away[1]]) * truth.scale + truth.shift_px
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    share = ndtr((rng.uniform(6.0, 10.0) * truth.scale - np.hypot(columns - x, rows - y)) / 3.0)
+    clean += share * (rng.uniform(90.0, 170.0) - clean)
 
 
 def given_point(truth: Truth, scale: Scale, at: tuple[float, float], rng: np.random.Generator) -> GivenPoint:

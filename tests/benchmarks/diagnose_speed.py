@@ -1,6 +1,6 @@
 """Seconds of a diagnosis by length of the table; prints a table, asserts nothing.
 
-    python -m tests.benchmarks.diagnose_speed [--samples 2000,20000] [--hidden backlash,nothing,two]
+    python -m tests.benchmarks.diagnose_speed [--samples 100,2000,20000] [--hidden backlash,nothing,two]
 
 The bench drives a stage through loops, holds and reversals at two speeds in six runs, reads its input with jitter, and
 hides play, nothing, or play and an offset. Wall time is that of this machine with whatever else runs on it (the load is
@@ -19,7 +19,7 @@ from fingervision.diagnosis.diagnose import diagnose
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
-BARS_S = {2000: 10.0, 20000: 60.0}
+BARS_S = {100: 2.0, 2000: 5.0, 20000: 60.0}
 RATE_HZ = 20.0
 EDGE_MM, INPUT_MM = 0.005, 0.0004
 RUNS = 6
@@ -69,7 +69,7 @@ def write(folder: Path, samples: int, hidden: str, seed: int) -> None:
 def main() -> None:
     """Read the options, time, print."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--samples", default="2000,20000")
+    options.add_argument("--samples", default="100,2000,20000")
     options.add_argument("--hidden", default=",".join(HIDDEN))
     chosen = options.parse_args()
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; the first line compiles where nothing is cached")

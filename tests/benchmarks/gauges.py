@@ -233,9 +233,14 @@ def silence(each: int, folder: Path) -> None:
         "circle": ("diameter_px = 30", drawn(SHAPE, 60, [(disc(55, 55, 15), 160)])),
         "marker": ('size_px = 21\nshape = "cross"', drawn(SHAPE, 60, [(cross(55, 55, 0.1, 4, 8), 160)])),
         "patch": ("width_px = 31\nheight_px = 31", shown),
+        "gap": (
+            "width_px = 90\nheight_px = 90",
+            drawn(SHAPE, 200, [(lambda x, y, at=at: np.minimum(9 - np.abs(x - at), y - 30), 50) for at in (36, 74)]),
+        ),
     }
     for kind, (keys, light) in things.items():
-        gauges = gauges_of(folder, f'kind = "{kind}"\nx_px = 55\ny_px = 55\nreach_px = 8\n{keys}')
+        reach = "" if kind == "gap" else "reach_px = 8\n"
+        gauges = gauges_of(folder, f'kind = "{kind}"\nx_px = 55\ny_px = 55\n{reach}{keys}')
         # A texture is what a patch measures: in a first frame any will do.
         before, after = _empty(rng, SHAPE, kind != "patch"), _empty(rng, SHAPE, True)
         fresh = sum(bool(followed(gauges, [next(before)])[0][0].quantities) for _ in range(each * 5))

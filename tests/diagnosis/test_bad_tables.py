@@ -7,7 +7,12 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
+from fingervision.diagnosis.inference.hypothesis import Explanation
+from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.plausibility import mixed_rows
+from fingervision.diagnosis.inference.searched import problem_of
 from fingervision.diagnosis.input.preparation import prepare
+from fingervision.diagnosis.report.open_parameters import open_parameters
 from fingervision.domain.errors import ExitCode, FingervisionError
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
@@ -88,3 +93,52 @@ def test_a_refused_table_leaves_no_empty_folder(tmp_path: Path, command: str) ->
     out.mkdir()
     assert CliRunner().invoke(cli, asked).exit_code != ExitCode.DONE
     assert out.exists()
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("right", None),
+        ("scattered", "lie together"),
+        ("shifted", "two groups about 0.4 mm"),
+        ("halved", "two groups about 0.4 mm"),
+    ],
+)
+def test_rows_that_are_no_one_measurement_are_asked_about(tmp_path: Path, kind: str, words: str | None) -> None:
+    """Two rows of three hold anything at all, or half of them another zero: no name would be right."""
+    rng = np.random.default_rng(4)
+    at = rng.uniform(-0.9, 1.9, 240)
+    wrong = rng.random(at.size) < (0.5 if kind == "halved" else 2.0 / 3.0)
+    away = {"scattered": 0.5 * rng.standard_normal(at.size), "right": np.zeros(at.size)}.get(
+        kind, np.full(at.size, 0.4)
+    )
+    gap = 4.0 + 7.7 * at + 0.05 + 0.003 * rng.standard_normal(at.size) + np.where(wrong, away, 0.0)
+    rows = "\n".join(f"{u:.6f},{g:.6f}" for u, g in zip(at, gap, strict=True))
+    data = prepare(
+        read_measured_table(write(tmp_path, "input_mm,gap_mm\n" + rows)),
+        read_model(write(tmp_path, "input_mm,gap_mm\n-1,-3.7\n2,19.4", "sim.csv")),
+    )
+    problem = problem_of(data, None)
+    found = fit(problem, ("rest_gap_error",), {"rest_gap_error": {}})
+    finding = mixed_rows(data, found, problem)
+    if words is None:
+        assert finding is None
+    else:
+        assert finding is not None
+        assert finding.blocks
+        assert words in finding.words
+
+
+@pytest.mark.parametrize(("u_s", "is_open"), [(50.0, False), (1500.0, True)])
+def test_a_warming_slower_than_the_data_show_is_open_ended(tmp_path: Path, u_s: float, is_open: bool) -> None:
+    rows = "\n".join(f"{60 * k},{0.1 * (k % 8)},{4.0 + 0.77 * (k % 8)}" for k in range(24))
+    data = prepare(
+        read_measured_table(write(tmp_path, "time_s,input_mm,gap_mm\n" + rows)),
+        read_model(write(tmp_path, "input_mm,gap_mm\n-1,-3.7\n2,19.4", "sim.csv")),
+    )
+    problem = problem_of(data, None)
+    warming = {"thermal_drift": {"amplitude_mm": 0.1, "tau_s": 2000.0}}
+    found = Explanation(("thermal_drift",), warming, 0.0, problem.measured, np.diag([1e-6, u_s**2]), 2, (0.0,))
+    assert [(name, parameter.name) for name, parameter in open_parameters(found, problem)] == (
+        [("thermal_drift", "tau_s")] if is_open else []
+    )

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -161,6 +162,41 @@ def test_a_lost_frame_is_shown_as_lost(playback: Playback) -> None:
     assert seen.row is not None
     assert (seen.row.status, seen.row.gap_mm, seen.row.frame) == (Status.DAMAGED, None, 4)
     assert np.ptp(seen.frame.pixels) == 0
+
+
+@pytest.mark.parametrize("name", ["images", "ffv1.mkv"])
+def test_a_recording_that_is_moved_away_while_it_plays_is_said_and_goes_on_when_it_is_back(
+    recordings: dict[str, Path], tmp_path: Path, name: str
+) -> None:
+    path = tmp_path / name
+    (shutil.copytree if recordings[name].is_dir() else shutil.copy)(recordings[name], path)
+    view = Playback(recorded(str(path), 25.0 if path.is_dir() else None, Choices(), ()), tmp_path / "out")
+    view.start()
+    try:
+        obey(view, {"do": "play", "on": True, "speed": 1.0})
+        until(lambda: view.frame > 3)
+        path.rename(path.with_suffix(".away"))
+        # What the system still holds open plays on; a step back reads anew.
+        until(lambda: view.frame > 5 or bool(view.trouble))
+        obey(view, {"do": "play", "on": False, "speed": 1.0})
+        obey(view, {"do": "seek", "frame": 40})
+        obey(view, {"do": "seek", "frame": 1})
+        until(lambda: bool(view.trouble) or (view.seen is not None and view.seen.frame.index == 1))
+        if path.is_dir() or view.trouble:
+            assert "cannot be read any more" in view.trouble
+            assert path.name in view.trouble
+        path.with_suffix(".away").rename(path)
+        obey(view, {"do": "seek", "frame": 7})
+        until(lambda: view.seen is not None and number_in(view.seen.frame.pixels) == 7 and not view.trouble)
+    finally:
+        view.stop()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
 
 
 def frames_of(measured: Path) -> list[int]:

@@ -120,7 +120,7 @@ def test_a_drawing_that_is_not_in_the_picture_is_refused(plate: MechanismPlate) 
         list(tracker.poses(pictures))
 
 
-@pytest.mark.parametrize("text", ["", "1,2", "1,2=3", "a,b=c,d", "1,2=3,4,5", "1;2=3;4"])
+@pytest.mark.parametrize("text", ["", "1,2", "1,2=3", "a,b=c,d", "1,2=3,4,5", "1;2=3;4", "nan,2=3,4", "1,inf=3,4"])
 def test_a_point_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="X,Y=XMM,YMM"):
         parse_point(text)

@@ -6,7 +6,7 @@ import subprocess
 import zipfile
 from pathlib import Path
 
-SOURCE = Path(__file__).parent / "fmu_gripper.c"
+SOURCE, REFERENCE = Path(__file__).parent / "fmu_gripper.c", Path(__file__).parent / "fmu_reference.c"
 TOKEN = "{8c4e810f-3df3-4a00-8276-176fa3c9f000}"
 KINDS = {"cs": ("CoSimulation",), "me": ("ModelExchange",)}
 
@@ -22,10 +22,21 @@ def can_build():
 
 def build_fmu(folder, version=2, kind="cs", name="gripper", more=(), platform=None, unit="m", extra=""):
     """Compile the gripper and pack it; `more` are options of gcc."""
+    library = _compiled(SOURCE, folder, version, name, more)
+    here = platform or ("linux64" if version == 2 else "x86_64-linux")
+    document = _fmi2(kind, unit, extra) if version == 2 else _fmi3(kind, unit, extra)
+    target = folder / f"{name}.fmu"
+    with zipfile.ZipFile(target, "w") as packed:
+        packed.writestr("modelDescription.xml", document)
+        packed.write(library, f"binaries/{here}/gripper{'.dll' if 'win' in here else '.so'}")
+    return target
+
+
+def _compiled(source, folder, version, name, more):
+    """Compile a source with stubs for the functions of the standard that it leaves out."""
     import fmpy
 
-    library = folder / f"{name}.so"
-    code = SOURCE.read_text()
+    code = source.read_text()
     package = Path(fmpy.__file__).parent
     wanted = set(re.findall(rf"\bfmi{version}[A-Z]\w+", (package / f"c-code/fmi{version}Functions.h").read_text()))
     wanted = {one for one in wanted if not one.endswith("TYPE") and "FullName" not in one}
@@ -33,13 +44,24 @@ def build_fmu(folder, version=2, kind="cs", name="gripper", more=(), platform=No
     stubs = folder / "stubs.c"
     stubs.write_text("\n".join(f"int {one}(void) {{ return 3; }}" for one in missing))
     options = ["-shared", "-fPIC", "-O1", "-w", f"-DFMI={version}", *more]
-    subprocess.run(["gcc", *options, str(SOURCE), str(stubs), "-o", str(library), "-lm"], check=True)
-    here = platform or ("linux64" if version == 2 else "x86_64-linux")
-    document = _fmi2(kind, unit, extra) if version == 2 else _fmi3(kind, unit, extra)
+    library = folder / f"{name}.so"
+    subprocess.run(["gcc", *options, str(source), str(stubs), "-o", str(library), "-lm"], check=True)
+    return library
+
+
+def pack_fmu2(folder, name, variables, kind, *more):
+    """Compile fmu_reference.c as an FMU of FMI 2 with the variables of a document; `more` are options of gcc."""
+    library = _compiled(REFERENCE, folder, 2, name, more)
+    kinds = "".join(f'<{one} modelIdentifier="{name}"/>' for one in KINDS[kind])
+    document = (
+        '<?xml version="1.0" encoding="UTF-8"?>'
+        f'<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{TOKEN}" numberOfEventIndicators="0">{kinds}'
+        f"<ModelVariables>{variables}</ModelVariables><ModelStructure/></fmiModelDescription>"
+    )
     target = folder / f"{name}.fmu"
     with zipfile.ZipFile(target, "w") as packed:
         packed.writestr("modelDescription.xml", document)
-        packed.write(library, f"binaries/{here}/gripper{'.dll' if 'win' in here else '.so'}")
+        packed.write(library, f"binaries/linux64/{name}.so")
     return target
 
 

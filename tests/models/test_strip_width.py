@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import skfem
-from skfem.helpers import dd
+from skfem.helpers import dd, ddot, sym_grad, trace
 
-from fingervision.models.strip_width import strip_share
+from fingervision.models.strip_width import stretched_share, strip_share
 
 NU = 0.34
 MORLEY = 0.04
@@ -44,3 +44,24 @@ def test_the_share_is_that_of_a_clamped_plate(width: float) -> None:
         bar = width * (1.0 if place == 0 else 1.0 / 3.0)
         stiffness = (bar + load @ moved) / (bar * (1.0 - NU**2))
         assert strip_share(width, NU)[place] == pytest.approx((1.0 - 1.0 / stiffness) / NU**2, abs=MORLEY)
+
+
+@pytest.mark.parametrize("width", [0.3, 1.0, 4.0])
+def test_a_stretched_strip_is_held_back_at_its_ends(width: float) -> None:
+    """Quadratic elements of scikit-fem's in plane stress, clamped at one end and pulled as a whole at the other."""
+    mesh = skfem.MeshTri.init_tensor(np.linspace(0.0, 1.0, 33), np.linspace(0.0, width, 33))
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP2()))
+
+    @skfem.BilinearForm
+    def energy(u, v, _):  # type: ignore[no-untyped-def]
+        a, b = sym_grad(u), sym_grad(v)
+        return ddot(a, b) / (1.0 + NU) + NU / (1.0 - NU**2) * trace(a) * trace(b)
+
+    stiffness = energy.assemble(basis)
+    ends = basis.get_dofs(lambda x: (x[0] < 1e-9) | (x[0] > 1.0 - 1e-9))
+    pulled = basis.get_dofs(lambda x: x[0] > 1.0 - 1e-9).all("u^1")
+    moved = np.zeros(basis.N)
+    moved[pulled] = 1.0
+    moved = skfem.solve(*skfem.condense(stiffness, x=moved, D=ends))
+    ratio = float(moved @ (stiffness @ moved)) / width
+    assert stretched_share(width, NU) == pytest.approx((1.0 - 1.0 / ratio) / NU**2, abs=0.02)

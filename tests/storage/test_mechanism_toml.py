@@ -35,11 +35,15 @@ WRONG = [
     (
         'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "leaf", "leaf + block"]',
         "box_mm = [100, 120, 100, 120]",
-        "one piece",
+        "connected piece",
     ),
-    ('box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "-block", 0.0]', "box_mm = [5, -5, -3, 0]", "both growing"),
+    (
+        'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "-block", 0.0]',
+        "box_mm = [5, -5, -3, 0]",
+        "[x from, x to, y from, y to]",
+    ),
     ('kind = "leaf"', 'kind = "spring"', "must be one of circular, elliptic, filleted, leaf"),
-    ("axis_deg = 90.0", "axis_deg = 0.0", "one piece"),
+    ("axis_deg = 90.0", "axis_deg = 0.0", "connected piece"),
     ('at_mm = ["-apart / 2", "leaf / 2"]', 'at_mm = ["-apart / 2"]', "list of 2 numbers"),
     ("direction = [1.0, 0.0]", "direction = [0.0, 0.0]", "drive.direction"),
     ('across = "free"', 'across = "maybe"', "drive.across"),
@@ -71,6 +75,38 @@ def test_faces_that_hold_nothing_or_too_much_are_refused(old: str, new: str, nam
     mechanism = mechanism_from_tables(tomllib.loads(STAGE.replace(old, new, 1)), "m.toml")
     with pytest.raises(FingervisionError, match=named):
         MechanismPlate(mechanism)
+
+
+@pytest.mark.parametrize("kind", ["circular", "elliptic"])
+def test_a_cut_that_is_a_closed_hole_is_refused(kind: str) -> None:
+    """Cuts of 1 mm in a post of 10 mm leave a strip beside each: the neck is not what bends."""
+    sizes = "radius_mm = 1.0" if kind == "circular" else "half_length_mm = 2.0\ndepth_mm = 1.0"
+    post = f"""
+name = "post"
+plate_mm = 3.0
+{STAGE[STAGE.index("[material]") : STAGE.index("[lengths]")]}
+[[body]]
+box_mm = [0, 10, 0, 30]
+[[flexure]]
+name = "neck"
+kind = "{kind}"
+at_mm = [5, 15]
+axis_deg = 90
+thickness_mm = 0.4
+{sizes}
+[[fixed]]
+box_mm = [0, 10, 0, 0]
+[drive]
+box_mm = [0, 10, 30, 30]
+direction = [1, 0]
+"""
+    with pytest.raises(FingervisionError) as refused:
+        mechanism_from_tables(tomllib.loads(post), "post.toml")
+    assert "flexure neck of post" in str(refused.value)
+    assert "closed hole" in str(refused.value)
+    assert "\n" not in str(refused.value)
+    open_cuts = post.replace("box_mm = [0, 10, 0, 30]", "box_mm = [3.8, 6.2, 0, 30]")
+    assert mechanism_from_tables(tomllib.loads(open_cuts), "post.toml").flexures
 
 
 def test_a_mechanism_that_nothing_holds_is_refused() -> None:
@@ -179,11 +215,11 @@ box_mm = ["apart / 2 + 5", "apart / 2 + 5", "leaf", "leaf + block"]
 wall_mm = [22, 0, 22, 100]
 """
 WRONG_CONTACTS = [
-    ("wall_mm = [22, 0, 22, 100]", "", "against_box_mm, a face, and wall_mm"),
+    ("wall_mm = [22, 0, 22, 100]", "", "wall_mm (two points"),
     ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22, 0]", "two different points"),
     ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22]", "list of 4 numbers"),
     ("wall_mm = [22, 0, 22, 100]", "wall = [22, 0, 22, 100]", "did you mean wall_mm?"),
-    ("wall_mm = [22, 0, 22, 100]", "against_box_mm = [5, 1, 0, 1]", "both growing"),
+    ("wall_mm = [22, 0, 22, 100]", "against_box_mm = [5, 1, 0, 1]", "[x from, x to, y from, y to]"),
 ]
 
 

@@ -205,3 +205,13 @@ def test_prose_given_as_a_model_is_said_to_be_none(tmp_path: Path) -> None:
         read_model(prose)
     assert "simulation table" in str(caught.value)
     assert "FMU" in str(caught.value)
+
+
+def test_a_text_with_a_table_in_it_is_no_table(tmp_path: Path) -> None:
+    """A README has some lines with numbers; a separator would not help, another file does."""
+    words = "\n".join(f"It was measured {k} times{', and once more' * (k % 4)}; {k} of them hold." for k in range(30))
+    path = tmp_path / "README.md"
+    path.write_text(f"# Title\n\n| what | mm |\n|---|---|\n| one | 3 |\n| two | 4 |\n\n{words}\n")
+    for read in (read_measured_table, read_drive, read_model):
+        with pytest.raises(DataError, match=r"no table|no model"):
+            read(path)

@@ -12,9 +12,11 @@ Flags = NDArray[np.bool_]
 _KNOTS = 8
 """Number of pieces of the spline over the input, whose fit is not counted as noise, whatever its cause."""
 _FEWEST_A_PIECE = 12
+"""Rows that a piece needs: its coefficient then takes a twelfth of their noise at most."""
 _OUTLIER = 5.0
 """Standard deviations from the spline beyond which a row is excluded: 1 in 2 million by chance."""
 _MOST_CORRELATED = 0.97
+"""Largest correlation of neighbouring rows: beyond it the noise is a drift over some 30 rows, and its sum diverges."""
 _RANK = 1e-9
 """Smallest variance, relative to the largest, of the scaled channels: a smaller one means a channel that is determined
 exactly by the others."""

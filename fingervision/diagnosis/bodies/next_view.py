@@ -18,6 +18,7 @@ ASSUMED = {"_mm": 0.001, "mrad": 0.05, "ce_n": 0.01}
 """Assumed standard uncertainty of a reading of a proposed view, if no similar quantity was measured: a pose of a link
 of 15 mm at 34 px/mm; a load cell with 0.2 % of 5 N."""
 MOST_MEMBERS = 6
+"""Explanations, best first, that a view is to separate: 15 pairs; the time it takes grows with their square."""
 
 
 @dataclass(frozen=True, slots=True)

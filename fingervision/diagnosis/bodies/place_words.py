@@ -19,6 +19,7 @@ SIGNIFICANT = 5.0
 """Standard deviations of a part's mean from which it is significant: by chance in one of 17 000 tables of a hundred
 parts."""
 MOST = 6
+"""Parts or places that a sentence lists: more are no longer read."""
 
 
 def fitted_words(fitted: Fitted) -> str:

@@ -55,6 +55,9 @@ def ambiguity_set(
                 again = fit(problem, other.names, imitation.values, iterations=MANY_STEPS)
                 other = min(other, again, key=lambda explanation: explanation.score)
         worse = other.score - best.score
+        # If the best is true, it leads by this distance; where it leads by far less, its form is not the truth's
+        # either, and what explains the data nearly as well with no more effects is no worse an answer.
+        contested = worse < min(admissible, -_least_refuted(distance)) and len(other.names) <= len(best.names)
         if distance >= INDISTINGUISHABLE and worse < admissible:
             distance = min(distance, _imitation(problem, other, best, best.sigma_mm).score)
         distances[other.names] = distance
@@ -64,7 +67,7 @@ def ambiguity_set(
         close = distance < INDISTINGUISHABLE and not idle and worse < admissible
         # More effects fit better whatever is true.
         unrefuted = len(other.names) <= len(best.names) and worse < _least_refuted(distance)
-        if close or unrefuted or _simpler_form(problem, nothing, best, other):
+        if close or unrefuted or (contested and not idle) or _simpler_form(problem, nothing, best, other):
             members.append(other)
 
     for other in pool:

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis import Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array, DriveEffect
 from fingervision.effects.play_operator import play
@@ -29,6 +30,19 @@ LEAST_NORM = 1e-6
 from these."""
 WIDTHS = 25
 """Number of widths of the play that are tried."""
+
+
+NARROW = 0.25
+"""Standard deviations about zero within which values are counted: normal noise has 20 % there, Laplace's 30 %,
+Student's with three degrees of freedom 31 %, a sinusoid 11 %."""
+SHARES = (0.05, 0.4)
+"""Shares of values there below which they form two groups, and above which most of them repeat far better than the
+rest: beyond what any one noise of the above has."""
+STRETCH_SIGMAS = 3.0
+"""Standard deviations, each 1 / sqrt(n), by which neighbours must be alike for rows to lie in stretches:
+a servo at rest repeats far better than on its way, and nothing is wrong with it."""
+FEWEST_VALUES = 30
+"""Values from which such a share is told from 20 %: 40 % of 30 are 2.8 standard deviations more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +81,60 @@ def gross_mistake(data: Observations) -> Finding | None:
             blocks=True,
         )
     return None
+
+
+def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Finding | None:
+    """Check whether the residual is one noise: rows that are right and rows that are wrong make two.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    found : Explanation
+        The answer.
+    problem : Problem
+        Its noise; gross errors that were set aside do not count.
+    """
+    n = data.chain.history.input_mm.size
+    kept = ~problem.whitener.aside[:n]
+    residual_mm = (data.stacked_mm - data.chain.stacked(found.values))[:n][kept]
+    if residual_mm.size < FEWEST_VALUES or data.position_map is not None or data.run_gains is not None:
+        return None
+    sigma = float(np.std(residual_mm))
+    # Digits that are coarser than the band put all values, or none, into it.
+    if NARROW * sigma < resolution(data.table.gap_mm):
+        return None
+    both = (residual_mm, found.residual[:n][kept])
+    between = max(_share_near(values, float(np.mean(values))) for values in both)
+    together = min(_share_near(values, float(np.median(values))) for values in both)
+    if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
+        return None
+    if between < SHARES[0]:
+        above = residual_mm > np.mean(residual_mm)
+        apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
+        words = f"what is left falls into two groups about {apart_mm:.2g} mm apart"
+    elif together > SHARES[1]:
+        words = f"{100.0 * together:.0f} % of the rows lie together, and the others off them by {sigma:.2g} mm and more"
+    else:
+        return None
+    return Finding(
+        f"the rows are no one measurement with one noise: {words}; look at the rows that lie apart before anything is "
+        "named.",
+        blocks=True,
+    )
+
+
+def _in_stretches(values: Array) -> bool:
+    """Whether neighbouring rows are alike in lying near the median: a stage that moves and rests, and no wrong rows."""
+    near = (np.abs(values - np.median(values)) < NARROW * np.std(values)).astype(np.float64)
+    near -= near.mean()
+    power = float(near @ near)
+    return power > 0.0 and float(near[:-1] @ near[1:]) / power > STRETCH_SIGMAS / float(np.sqrt(near.size))
+
+
+def _share_near(values: Array, middle: float) -> float:
+    """Share of values within `NARROW` standard deviations of a middle."""
+    return float(np.mean(np.abs(values - middle) < NARROW * float(np.std(values))))
 
 
 def swapped_directions(data: Observations, problem: Problem) -> Finding | None:

@@ -18,10 +18,10 @@ from fingervision.domain.reference_slot import ReferenceSlot
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue, that_show
 
-# Chi-square a slot by which another explanation foretells it better: three standard uncertainties.
 REFUTED = 9.0
-# Step of a parameter, in its standard uncertainties, for what its uncertainty does to a slot.
+"""Chi-square per slot by which another explanation foretells it better: three standard uncertainties."""
 STEP = 0.1
+"""Step of a parameter, in its standard uncertainties, for what its uncertainty does to a slot."""
 
 Values = Mapping[str, Mapping[str, float]]
 

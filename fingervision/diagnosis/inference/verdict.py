@@ -9,7 +9,7 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
 from fingervision.diagnosis.inference.search import Findings
-from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.observations import FORM_SHARE_OF_RIGS, Observations
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.residual_scatter import most_noise
@@ -80,8 +80,18 @@ class Standing:
 
     @property
     def is_little(self) -> bool:
-        """Whether the remaining residual is noise, or a small part of the disagreement."""
-        return self.after_mm <= max(STANDING_SHARE * self.before_mm, STANDING_NOISES * self.noise_mm)
+        """Whether the remaining residual is noise, or a small part of the disagreement.
+
+        Where repeats tell the noise, structure beyond it is known for what it is, and may be no more than the forms of
+        effects leave over on real stages.
+        """
+        if self.after_mm <= STANDING_SHARE * self.before_mm:
+            return True
+        structure_mm = float(np.sqrt(max(0.0, self.after_mm**2 - self.noise_mm**2)))
+        told = self.noise_degrees is not None and not self.is_noise
+        return self.after_mm <= STANDING_NOISES * self.noise_mm and not (
+            told and structure_mm > FORM_SHARE_OF_RIGS * self.before_mm
+        )
 
     @property
     def is_noise(self) -> bool:

@@ -16,8 +16,16 @@ from fingervision.diagnosis.inference.verdict import verdict
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.force_hint import force_hint
+from fingervision.diagnosis.report.open_parameters import open_parameters
 from fingervision.diagnosis.report.residual_channels import by_channel, places
-from fingervision.diagnosis.report.sentences import answer, input_dominates, outliers, remaining, rows_beyond_model
+from fingervision.diagnosis.report.sentences import (
+    answer,
+    beyond_the_search,
+    input_dominates,
+    outliers,
+    remaining,
+    rows_beyond_model,
+)
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect
 from fingervision.effects import catalogue
@@ -89,6 +97,7 @@ def diagnosis_report(
             *_trend(errors),
             *force_hint(data, found.alternatives),
             *further_evidence(found.alternatives),
+            *beyond_the_search(best, found.problem),
             *rows_beyond_model(data, best),
             *input_dominates(data, found.problem),
         ),
@@ -135,11 +144,14 @@ def _unit(channel: str) -> str:
 def _named(data: Observations, found: Findings) -> tuple[NamedEffect, ...]:
     listed = [entry for entry in found.problem.parameters(found.best.names) if entry[1].run is None]
     root = np.sqrt(np.maximum(np.diag(found.best.covariance), 0.0))
+    open_ended = {name for name, _ in open_parameters(found.best, found.problem)}
     out = {}
     for name in found.best.names:
         known = {
             parameter.name: Estimate(
-                found.best.values[name][parameter.name], float(root[i]) if root[i] > 0.0 else None, parameter.unit
+                found.best.values[name][parameter.name],
+                float(root[i]) if root[i] > 0.0 and name not in open_ended else None,
+                parameter.unit,
             )
             for i, (owner, parameter) in enumerate(listed)
             if owner == name

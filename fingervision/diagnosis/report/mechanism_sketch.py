@@ -25,6 +25,7 @@ TIME_STEPS, FEWEST_STEPS = 24, 4
 SHOWN = 0.05
 """Largest displayed difference, as a share of the mechanism's size."""
 CHORDS = 9
+"""Points of a drawn arc: chords of a quarter circle then miss it by half a per cent of its radius."""
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 COLOURS = (("#7a8b99", 3.0), ("#c9a227", 6.0), ("#c1440e", np.inf))
 """Colour of a body whose mean deviation is up to a given number of standard deviations."""

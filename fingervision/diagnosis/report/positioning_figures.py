@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from scipy.special import stdtrit
 
 UP, DOWN = 1, -1
+"""Directions of approach, as signs of the motion."""
 COVERAGE = 2.0
 """Coverage factor of ISO 230-2: standard deviations on each side of a mean (R_up = 4 s)."""
 FEWEST_TARGETS = 5

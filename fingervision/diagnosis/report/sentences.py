@@ -5,6 +5,7 @@ import numpy as np
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.verdict import Standing
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.report.open_parameters import open_parameters
 from fingervision.domain.effect import Array
 from fingervision.domain.report import Disagreement, NamedEffect, Verdict
 
@@ -90,6 +91,16 @@ def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
     moved = data.chain.driven_mm(best.values)
     rows = int(np.sum((moved < low) | (moved > high)))
     return (f"for {rows} rows the model was extended by a straight line beyond its inputs.",) if rows else ()
+
+
+def beyond_the_search(best: Explanation, problem: Problem) -> tuple[str, ...]:
+    """Sentences on parameters that may lie beyond the range in which they were sought."""
+    return tuple(
+        f"{effect}: the {parameter.words} may lie beyond {parameter.upper:.4g} {parameter.unit}, the end of its search "
+        "range: it is longer than these data can show, and so the effect's other parameters have no uncertainty "
+        "either; only what it does within the table is known."
+        for effect, parameter in open_parameters(best, problem)
+    )
 
 
 def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:

@@ -149,12 +149,12 @@ class FollowedPatch:
             return self._never(
                 GaugeStatus.LOW_CONTRAST, "the first frame shows no texture there that tells how it moves"
             )
-        chance = chance_correlation(reference.template)
-        if chance > MOST_BY_CHANCE:
-            return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
         template = Template(reference.template)
         if not template.best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX]).is_alone:
             return self._never(GaugeStatus.AMBIGUOUS, "its pattern repeats within 1.5 reach_px: lower reach_px")
+        chance = chance_correlation(reference.template)
+        if chance > MOST_BY_CHANCE:
+            return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
         self._least_correlation = max(LEAST_CORRELATION, chance)
         self._aliased_px = _aliased_px(reference)
         self.reference = reference

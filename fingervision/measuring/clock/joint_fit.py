@@ -21,10 +21,7 @@ CREEP_PRIOR = 0.02
 """Prior standard deviation of the creep's share of the motion at each time constant: metals creep by 0.1 % of a strain,
 printed polymers by one to five per cent per decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
 STEPS = 12
-"""Most Gauss-Newton steps; from a peak of the correlation three to five suffice."""
-CLUSTERS = 24
-"""Stretches of the recording whose contributions to the parameters are taken as independent: 24 of them determine the
-scatter to a fifth, and each still contains a move or two of an ordinary recording."""
+"""Gauss-Newton steps at most; from the correlation's peak three to five suffice."""
 SETTLED = 1e-3
 """Step, in standard uncertainties, below which the iteration has converged."""
 OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
@@ -82,13 +79,13 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
     Variable projection: Golub & Pereyra 1973, doi:10.1137/0710036, with Kaufman's approximation.
     """
     at = start
-    solved = _solve(motion, at)
+    solved = solve(motion, at)
     longest_mm = 0.9 * float(np.ptp(motion.drive.input_mm))
     damping = 1e-6
     for _ in range(STEPS):
         jacobian = _jacobian(motion, at, solved, free_play=free_play)
         variance = solved.squares / max(solved.degrees, 1)
-        prior = _prior(jacobian.shape[1]) * variance
+        prior = prior_of(jacobian.shape[1]) * variance
         pull = prior @ np.array([0.0, at.rate, at.start, 0.0][: jacobian.shape[1]])
         normal = jacobian.T @ jacobian + prior
         root = np.sqrt(np.maximum(np.diag(normal), 1e-30))
@@ -96,7 +93,7 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
         for _ in range(6):
             step = np.linalg.solve(scaled + damping * np.eye(root.size), (jacobian.T @ solved.white - pull) / root)
             moved = _moved(at, step / root, longest_mm)
-            tried = _solve(motion, moved)
+            tried = solve(motion, moved)
             if _total(tried, moved, variance) <= _total(solved, at, variance):
                 break
             damping = max(10.0 * damping, 1e-3)
@@ -106,37 +103,14 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
         damping *= 0.1
         if float(np.max(np.abs(step))) < SETTLED * np.sqrt(variance):
             break
-    normal, _ = _information(motion, at, solved, free_play=free_play)
+    normal, _ = information(motion, at, solved, free_play=free_play)
     squares = _total(solved, at, solved.squares / max(solved.degrees, 1))
     return Fit(at, squares, solved.degrees, normal, solved.residual_mm, float(solved.weights[1]))
 
 
 def squares_at(motion: Motion, at: Alignment) -> float:
-    """Sum of squares at given offset, rate and play, after scale, bends and creep were fitted, in mm^2."""
-    return _solve(motion, at).squares
-
-
-def inflation(motion: Motion, at: Alignment) -> Array:
-    """Ratio of the variance of offset, rate and play to its value for independent residuals.
-
-    An error of the input persists while the stage is at rest, or until it reverses, and the model of the motion is
-    never exact; the residuals are therefore correlated. The residuals' contributions to the parameters are summed over
-    stretches of the recording, and the variance follows from the scatter of these sums (White 1980,
-    doi:10.2307/1912934, applied to clusters).
-    """
-    solved = _solve(motion, at)
-    rows = solved.white.size - solved.weights.size + 2
-    clusters = min(CLUSTERS, rows // 8)
-    free_play = at.play_mm > 10.0 * PLAY_STEP
-    normal, jacobian = _information(motion, at, solved, free_play=free_play)
-    variance = solved.squares / max(solved.degrees, 1)
-    parts = np.array_split(jacobian[:rows] * solved.white[:rows, None] / variance, clusters)
-    pulls = np.stack([part.sum(axis=0) for part in parts])
-    meat = pulls.T @ pulls * (clusters / max(clusters - pulls.shape[1], 1)) + _prior(pulls.shape[1])
-    bread = np.linalg.pinv(normal)
-    ratio = np.diag(bread @ meat @ bread) / np.maximum(np.diag(bread), 1e-300)
-    kept = ratio[[0, 1, 3]] if free_play else np.array([ratio[0], ratio[1], max(ratio[0], ratio[1])])
-    return np.maximum(kept, 1.0)
+    """Sum of squares that scale, bend and creep leave at an alignment, in mm^2."""
+    return solve(motion, at).squares
 
 
 def shift_by_creep(motion: Motion, found: Fit) -> Array:
@@ -153,33 +127,38 @@ def _change(to: Alignment, since: Alignment) -> Array:
     return np.array([to.offset_s - since.offset_s, to.rate - since.rate, to.play_mm - since.play_mm])
 
 
-def shift_by_turns(motion: Motion, found: Fit) -> Array:
-    """Change of offset, rate and play (s, 1, mm), shape (3,), if the log's reversals lay farther out.
-
-    Every reversal is moved outwards by its uncertainty.
-
-    If the stage moves at constant speed, only the duration for which the gap stops at a reversal contains information
-    on the play.
-    """
-    path = motion.path
-    drive = replace(path.drive, input_mm=path.turned_mm)
-    pushed = replace(motion, path=replace(path, drive=drive))
-    return _change(fit(pushed, found.at, free_play=True).at, found.at)
-
-
-def _prior(size: int) -> Array:
+def prior_of(size: int) -> Array:
+    """Information of the priors on offset, rate, start (and play); shape (size, size)."""
     return np.diag([OFFSET_PRIOR_S**-2, RATE_PRIOR**-2, START_PRIOR**-2, PLAY_PRIOR_MM**-2][:size])
 
 
-def _information(motion: Motion, at: Alignment, solved: "_Solved", *, free_play: bool) -> tuple[Array, Array]:
-    """Normal matrix (divided by the residual variance, priors included), and the Jacobian."""
+def information(motion: Motion, at: Alignment, solved: "Solved", *, free_play: bool) -> tuple[Array, Array]:
+    """Normal matrix divided by the residual's variance, priors included, and the Jacobian."""
     jacobian = _jacobian(motion, at, solved, free_play=free_play)
     variance = solved.squares / max(solved.degrees, 1)
-    return jacobian.T @ jacobian / variance + _prior(jacobian.shape[1]), jacobian
+    return jacobian.T @ jacobian / variance + prior_of(jacobian.shape[1]), jacobian
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Solved:
+class Solved:
+    """Scale, bends and creep that fit best at an alignment.
+
+    Parameters
+    ----------
+    weights : ndarray of float, shape (k,)
+        Of the columns of `Motion.design`.
+    white : ndarray of float, shape (m + k - 2,)
+        Whitened residual of the frames, then one row for each bend's prior.
+    residual_mm : ndarray of float, shape (n,)
+        Gap minus prediction.
+    basis : ndarray of float, shape (m + k - 2, k)
+        Orthonormal basis of the whitened columns.
+    squares : float
+        Of `white`, in mm^2.
+    degrees : int
+        Degrees of freedom.
+    """
+
     weights: Array
     white: Array
     residual_mm: Array
@@ -188,7 +167,7 @@ class _Solved:
     degrees: int
 
 
-def _solve(motion: Motion, at: Alignment) -> _Solved:
+def solve(motion: Motion, at: Alignment) -> Solved:
     """Solve for scale and bends, with a prior that keeps the bends small compared with the scale."""
     design = motion.design(at)
     white_design, white_gap = motion.whitened(design), motion.whitened(motion.gap_mm)
@@ -210,11 +189,11 @@ def _solve(motion: Motion, at: Alignment) -> _Solved:
         weights = np.linalg.solve(triangle, basis.T @ aim)
     white = aim - whole @ weights
     degrees = max(white_gap.size - 5 - bends, 1)
-    return _Solved(weights, white, motion.gap_mm - design @ weights, basis, float(white @ white), degrees)
+    return Solved(weights, white, motion.gap_mm - design @ weights, basis, float(white @ white), degrees)
 
 
-def _jacobian(motion: Motion, at: Alignment, solved: _Solved, *, free_play: bool) -> Array:
-    """Derivatives of the whitened prediction, projected off scale and bends; shape (m + knots, 3 or 4)."""
+def _jacobian(motion: Motion, at: Alignment, solved: Solved, *, free_play: bool) -> Array:
+    """Derivatives of the whitened prediction, after projection on scale and bends; shape (m + knots, 3 or 4)."""
     columns = []
     for name, step in (
         ("offset_s", OFFSET_STEP_S),
@@ -241,5 +220,5 @@ def _moved(at: Alignment, by: Array, longest_mm: float) -> Alignment:
     )
 
 
-def _total(solved: _Solved, at: Alignment, variance: float) -> float:
+def _total(solved: Solved, at: Alignment, variance: float) -> float:
     return solved.squares + variance * ((at.rate / RATE_PRIOR) ** 2 + (at.start / START_PRIOR) ** 2)

@@ -5,37 +5,21 @@ from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
-from fingervision.measuring.clock.log_turns import turned
+from fingervision.measuring.clock.path_between_rows import STANDS, piece
 from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
-FINER = 6
-"""Points of the path per row of the log: the sagitta of a chord falls with the square, to a thirtieth."""
-FEWEST = 5
-"""Least number of rows for a curve, and for fourth differences."""
-CORNER = 0.07
-"""Ratio of the standard deviation of an interpolated input to the fourth differences at the two ends of its interval. A
-corner of the motion anywhere between two rows causes an RMS error of 0.105 times the change of step (integral of x^2 (1
-- x)^2, times 1/3), which is 0.07 times the fourth differences that it causes; for noise of the rows the estimate is
-within a tenth of the noise."""
-
-SHARP = 5.0
-"""Change of the step in an interval, relative to that beside it and to a row's uncertainty, from which on it counts as
-a corner."""
 CORNER_ROWS = 3
 """Rows on either side of a corner that smoothing distorts."""
 LONG_ROWS = 4 * CORNER_ROWS
 """Number of rows from which on the ends of a stretch are left out when its rounding errors are examined."""
 AVERAGED = 0.5
-"""Leverage below which a smoothed row is the mean of several rows, and has a common error with its neighbours."""
-TURN_SIGMAS, LEAST_TURN = 6.0, 0.01
-"""Least return motion of a reversal, in standard deviations of a row, and as a share of the log's range."""
-STANDS = 0.1
-"""Step, relative to its neighbour's, below which the stage is at rest; the noise of a log is seldom larger."""
+"""Leverage below which a row is the mean of several, and shares its error with its neighbours."""
+LEAST_LEVERAGE = 1.0 / 241.0
+"""That of the widest window of the smoothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +42,32 @@ class SharedErrors:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ErrorParts:
+    """Where a path's uncertainty comes from, for draws of it with its correlation.
+
+    Parameters
+    ----------
+    rows_mm : ndarray of float, shape (rows,)
+        Standard uncertainty of each row by its own noise or rounding.
+    span : ndarray of float, shape (rows,)
+        Rows over which the noise was averaged.
+    between_mm : ndarray of float, shape (n,)
+        Standard uncertainty of the curve at each point of the path, zero at a row; towards the outside of its bend.
+    interval : ndarray of int, shape (n,)
+        Interval between two rows in which each point lies.
+    corner_s, turn_mm_s : ndarray of float, shape (c,)
+        Times at which two straight lines meet, and the change of speed there.
+    """
+
+    rows_mm: Array
+    span: Array
+    between_mm: Array
+    interval: NDArray[np.intp]
+    corner_s: Array
+    turn_mm_s: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class LogPath:
     """Path of the input, interpolated between the rows of the log.
 
@@ -68,21 +78,21 @@ class LogPath:
     u_mm : ndarray of float, shape (n,)
         Standard uncertainty of the input at each point: random error, and interpolation between rows.
     shared : SharedErrors
-        Errors that are common to neighbouring rows.
-    turned_mm : ndarray of float, shape (n,)
-        Input with all reversals moved outwards by their uncertainty.
+        What neighbours are off by alike.
     rows : DriveHistory
         The log itself.
     step_mm : float
-        Step of the encoder; 0 if none is visible in the log.
+        Its encoder's step; 0 where none is seen.
+    parts : ErrorParts
+        Where the uncertainty comes from.
     """
 
     drive: DriveHistory
     u_mm: Array
     shared: SharedErrors
-    turned_mm: Array
     rows: DriveHistory
     step_mm: float
+    parts: ErrorParts
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
@@ -98,7 +108,7 @@ class LogPath:
         ends = np.cumsum([0, *lengths])
         runs = tuple(slice(int(begin), int(end)) for begin, end in pairwise(ends))
         snapped_mm = on_lines(log.input_mm, runs)
-        sigma_mm, step_mm = input_sigma(snapped_mm, runs)
+        sigma_mm, step_mm = input_sigma(snapped_mm, runs, log.time_s)
         smooth_mm, leverage = snapped_mm.copy(), np.zeros(snapped_mm.size)
         if sigma_mm > 0.0:
             smooth_mm, leverage = smoothed(snapped_mm, log.time_s, runs, sigma_mm, step_mm)
@@ -109,12 +119,19 @@ class LogPath:
         shared = SharedErrors(np.zeros(0), np.zeros(1), np.zeros(1, dtype=np.bool_))
         if step_mm > 0.0:
             shared, u_mm = _shared_errors(log.time_s, snapped_mm, smooth_mm, u_mm, leverage, still, step_mm)
-        pieces = [_piece(log.time_s[run], smooth_mm[run], u_mm[run]) for run in runs]
-        of_runs = tuple(names[run.start] for run, piece in zip(runs, pieces, strict=True) for _ in piece[0])
-        time_s, input_mm, errors = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        pieces = [piece(log.time_s[run], smooth_mm[run], u_mm[run]) for run in runs]
+        of_runs = tuple(names[run.start] for run, part in zip(runs, pieces, strict=True) for _ in part[0])
+        time_s, input_mm, errors = (np.concatenate([part[k] for part in pieces]) for k in range(3))
         drive = DriveHistory(time_s, input_mm, None if log.run is None else of_runs)
-        least_mm = max(2.0 * step_mm, TURN_SIGMAS * sigma_mm, LEAST_TURN * float(np.ptp(input_mm)))
-        return cls(drive, errors, shared, turned(input_mm, errors, least_mm), log, step_mm)
+        before = np.cumsum([0, *(part[0].size for part in pieces[:-1])])
+        parts = ErrorParts(
+            u_mm,
+            np.ones(u_mm.size) if step_mm > 0.0 else 1.0 / np.clip(leverage, LEAST_LEVERAGE, 1.0),
+            np.concatenate([part[3] for part in pieces]),
+            np.concatenate([part[4] + int(first) for part, first in zip(pieces, before, strict=True)]),
+            *(np.concatenate([part[k] for part in pieces]) for k in (5, 6)),
+        )
+        return cls(drive, errors, shared, log, step_mm, parts)
 
 
 def _shared_errors(
@@ -182,44 +199,6 @@ def _shared_errors(
     return SharedErrors(time_s[rows[1:]], errors, halts), scatter_mm
 
 
-def _piece(time_s: Array, input_mm: Array, u_mm: Array) -> tuple[Array, Array, Array]:
-    """Times, inputs and uncertainties of the points of one run."""
-    if time_s.size < FEWEST:
-        return time_s, input_mm, u_mm
-    places = np.arange(FINER * (time_s.size - 1) + 1) / FINER
-    interval = np.minimum(places.astype(int), time_s.size - 2)
-    fine_s = np.interp(places, np.arange(time_s.size), time_s)
-    second = np.abs(np.pad(np.diff(input_mm, 2), 1, mode="edge"))
-    fourth = np.abs(np.pad(np.diff(input_mm, 4), 2, mode="edge"))
-    between = CORNER * np.minimum(fourth[:-1] + fourth[1:], 3.0 * np.minimum(second[:-1], second[1:]))
-    fine_mm = _curve(time_s, input_mm, fine_s, interval)
-    sharp, at_s, at_mm = _corners(time_s, input_mm, second, u_mm)
-    of_corner = np.isin(interval, sharp)
-    if sharp.size:
-        between[sharp] = second[sharp - 1] + second[sharp + 2]
-        rows_s = np.insert(time_s, sharp + 1, at_s)
-        fine_mm[of_corner] = np.interp(fine_s[of_corner], rows_s, np.insert(input_mm, sharp + 1, at_mm))
-    errors = np.hypot(between[interval], np.interp(fine_s, time_s, u_mm))
-    new = np.searchsorted(fine_s, at_s)
-    return np.insert(fine_s, new, at_s), np.insert(fine_mm, new, at_mm), np.insert(errors, new, between[sharp])
-
-
-def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """Intervals in which two straight lines meet, and the point where they do, such as a reversal between two rows."""
-    k = np.arange(2, time_s.size - 3)
-    bend, beside = second[k] + second[k + 1], second[k - 1] + second[k + 2]
-    speed = np.diff(input_mm) / np.diff(time_s)
-    apart = speed[k - 1] - speed[k + 1]
-    met_s = np.where(
-        apart != 0.0,
-        (input_mm[k + 1] - input_mm[k] - speed[k + 1] * (time_s[k + 1] - time_s[k])) / np.where(apart, apart, 1.0),
-        -1.0,
-    )
-    isolated = (bend > SHARP * beside) & (bend > SHARP * u_mm[k]) & (met_s > 0.0) & (met_s < np.diff(time_s)[k])
-    found = k[isolated]
-    return found, time_s[found] + met_s[isolated], input_mm[found] + speed[found - 1] * met_s[isolated]
-
-
 def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
     """Step from row to row below which the stage is at rest; 0 if it never moves (mm).
 
@@ -256,17 +235,3 @@ def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
             below = input_mm[far] < level
             out[rows] = np.minimum(out[rows], level) if below else np.maximum(out[rows], level)
     return out
-
-
-def _curve(time_s: Array, input_mm: Array, fine_s: Array, interval: NDArray[np.intp]) -> Array:
-    """Akima's curve through the rows; next to an interval at rest, the curve stays within the range of the rows.
-
-    A stage that arrives and stops has not been beyond its position of rest; an overshoot of the curve would falsify the
-    play, which depends on the extreme position.
-    """
-    curve = np.asarray(Akima1DInterpolator(time_s, input_mm)(fine_s), dtype=np.float64)
-    steps = np.abs(np.diff(input_mm))
-    beside = np.minimum(np.append(steps[1:], np.inf), np.insert(steps[:-1], 0, np.inf))
-    low = np.minimum(input_mm[:-1], input_mm[1:])[interval]
-    high = np.maximum(input_mm[:-1], input_mm[1:])[interval]
-    return np.where((beside < STANDS * steps)[interval], np.clip(curve, low, high), curve)

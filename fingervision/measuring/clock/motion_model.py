@@ -58,7 +58,9 @@ class Noise:
     unit : ndarray of float, shape (n - p,)
         Effect of a common error on the whitened rows, normalised to length 1 within each stretch.
     shrink : ndarray of float, shape (g,)
-        Share of a stretch's projection on `unit` that is removed, 1 - 1 / sqrt(1 + variance ratio).
+        Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
+    variance_mm2 : float
+        Of the frames' own noise, after the autoregression is taken out.
     """
 
     terms: Array
@@ -66,6 +68,7 @@ class Noise:
     starts: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     unit: Array = field(default_factory=lambda: np.empty(0))
     shrink: Array = field(default_factory=lambda: np.empty(0))
+    variance_mm2: float = 0.0
 
 
 WHITE = Noise(np.empty(0), np.empty(0))
@@ -164,8 +167,22 @@ class Motion:
         table = out if out.ndim == 2 else out[:, None]
         if noise.weights.size:
             table *= noise.weights[:, None]
-        if noise.starts.size:
-            counts = np.diff(np.append(noise.starts, table.shape[0]))
-            along = np.add.reduceat(table * noise.unit[:, None], noise.starts, axis=0) * noise.shrink[:, None]
-            table -= noise.unit[:, None] * np.repeat(along, counts, axis=0)
+        table = self._without_shared(table)
         return np.asarray(table if out.ndim == 2 else table[:, 0])
+
+    def _without_shared(self, table: Array) -> Array:
+        """Take a share of the shared error's course out of whitened columns; shape (m, k)."""
+        noise = self.noise
+        if not noise.starts.size:
+            return table
+        counts = np.diff(np.append(noise.starts, table.shape[0]))
+        along = np.add.reduceat(table * noise.unit[:, None], noise.starts, axis=0) * noise.shrink[:, None]
+        return np.asarray(table - noise.unit[:, None] * np.repeat(along, counts, axis=0))
+
+    def weighed(self, pulls: Array) -> Array:
+        """Weights that sums over whitened frames give to the frames' own noise, white after the autoregression.
+
+        The transpose of the weights in `whitened`, which is symmetric in the shared errors; shape (m, k).
+        """
+        table = self._without_shared(pulls)
+        return table * self.noise.weights[:, None] if self.noise.weights.size else table

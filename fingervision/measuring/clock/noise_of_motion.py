@@ -88,13 +88,14 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
         extra += share**2 * input_mm2[order - k : input_mm2.size - k]
     weights = 1.0 / np.sqrt(1.0 + extra / white_mm2)
     if not shared_mm.any():
-        return Noise(terms, weights)
+        return Noise(terms, weights, variance_mm2=white_mm2)
     starts = np.flatnonzero(np.diff(stretch[order:], prepend=-1))
     course = weights * (1.0 - float(terms.sum()))
     lengths = np.sqrt(np.add.reduceat(course**2, starts))
     counts = np.diff(np.append(starts, course.size))
     ratio = (shared_mm[order:][starts] * lengths) ** 2 / white_mm2
-    return Noise(terms, weights, starts, course / np.repeat(lengths, counts), 1.0 - 1.0 / np.sqrt(1.0 + ratio))
+    shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio)
+    return Noise(terms, weights, starts, course / np.repeat(lengths, counts), shrink, white_mm2)
 
 
 SEEN_SHARED = 0.5

@@ -12,8 +12,10 @@ from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
 """Least number of frames with a gap, and of log rows: the fit has eight parameters."""
 LEAST_GAIN = 40.0
-"""Least gain in chi-square of the fitted motion over a constant gap: a gain of 20 occurs by chance once in 10^4
-recordings (four parameters); another 20 allow for the choice among many offsets."""
+"""Gain in chi-square of the motion over a gap that stands: by chance 20 come once in 10^4 recordings (four parameters),
+as much again for the offsets among which was chosen."""
+MOST_LEFT_OUT = 0.15
+"""Share of the frames that may be taken for wrong: a contact's kink spoils a twelfth, a few are wrong besides."""
 LEAST_SHARE = 0.5
 """Least share of the gap's variance that a log must explain to belong to this recording."""
 
@@ -27,6 +29,18 @@ def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffs
     if float(np.ptp(gap_mm)) == 0.0:
         return NoClockOffset("the gap does not move: record a run that does.")
     return None
+
+
+def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset | None:
+    """Refuse an offset that explains the frames only without many of them, as at a wrong step of a staircase."""
+    left_out = within_log - motion.time_s.size
+    if left_out <= MOST_LEFT_OUT * within_log:
+        return None
+    return NoClockOffset(
+        f"at the best offset, {found.at.offset_s:.3f} s, {left_out} of {within_log} frames do not follow the drive: "
+        "with a play as wide as the steps of a motion, another step may fit as well, or the gap moves by something "
+        "else. Record a run with longer strokes, or state --drive-offset-s."
+    )
 
 
 def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:

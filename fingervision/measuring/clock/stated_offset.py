@@ -3,10 +3,13 @@
 import numpy as np
 
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
+from fingervision.measuring.clock.corner_rounding import Rounding
 from fingervision.measuring.clock.correlation import LARGEST_RATE
-from fingervision.measuring.clock.joint_fit import Fit, inflation, shift_by_creep, shift_by_turns
-from fingervision.measuring.clock.log_path import FINER, LogPath
+from fingervision.measuring.clock.joint_fit import Fit, shift_by_creep
+from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.offset_covariance import inflation
+from fingervision.measuring.clock.path_between_rows import FINER
 from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
 from fingervision.measuring.clock.set_points import gap_arrives
@@ -34,14 +37,15 @@ def crossed_in_s(path: LogPath) -> float:
     return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
 
 
-def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOffset | NoClockOffset:
-    """Convert the fitted offset and rate to the log's clock at the log's first row, with all uncertainties."""
+def stated(motion: Motion, at: Posterior, best: Fit, rounding: Rounding, frame_s: float) -> ClockOffset | NoClockOffset:
+    """Put the fit into the terms of the log's clock, at the log's first row."""
     first_s = float(motion.drive.time_s[0])
     more = np.sqrt(inflation(motion, best.at))
-    offset_s, rate, covariance = at.offset_s, at.rate, at.covariance * np.outer(more[:2], more[:2])
-    shifts = [shift_by_turns(motion, best), shift_by_creep(motion, best)]
-    # Without their correlation: by chance it would cancel at one instant what is off at all others.
-    covariance = covariance + np.diag(sum(shift[:2] ** 2 for shift in shifts))
+    offset_s, rate = at.offset_s + float(rounding.shift[0]), at.rate + float(rounding.shift[1])
+    covariance = at.covariance * np.outer(more[:2], more[:2])
+    shift = shift_by_creep(motion, best)
+    # Without its correlation: by chance it would cancel at one instant what is off at all others.
+    covariance = covariance + np.diag(shift[:2] ** 2) + rounding.covariance[:2, :2]
     # Recording's time at which the log begins; there the offset is middle's plus the rate times the way to it.
     begins_s = (first_s + offset_s - rate * motion.middle_s) / (1.0 - rate)
     away_s = np.append(motion.time_s, begins_s) - motion.middle_s
@@ -111,8 +115,8 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
         u_rate=u_rate,
         reference_s=first_s,
         u_time_s=u_time_s,
-        play_mm=at.play_mm,
-        u_play_mm=float(np.sqrt((at.u_play_mm * more[2]) ** 2 + sum(shift[2] ** 2 for shift in shifts))),
+        play_mm=max(at.play_mm + float(rounding.shift[2]), 0.0),
+        u_play_mm=float(np.sqrt((at.u_play_mm * more[2]) ** 2 + shift[2] ** 2 + rounding.covariance[2, 2])),
         explained_share=share,
         notes=tuple(notes),
     )

@@ -1,0 +1,74 @@
+"""How long a stage takes to turn a corner that lies between two rows of its log, which the frames can tell."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+from fingervision.measuring.clock.joint_fit import Fit, fit
+from fingervision.measuring.clock.log_path import LogPath
+from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.play_posterior import most_likely
+
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
+"""Durations of a corner that are tried, over the time between two rows: a longer one would show in the rows."""
+STRETCHES = 24
+"""Independent stretches of a recording: what is wrong about a corner is common to the frames of a move, so that a
+likelihood by frames would be far too sure (as `offset_covariance.CLUSTERS`)."""
+NEAR_PLAYS = (0.02, 0.08)
+"""Plays from which each is fitted besides, over the largest: the play takes the place of a wrong corner."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rounding:
+    """Spread of a fit over the durations of a corner that explain the frames.
+
+    Parameters
+    ----------
+    shift : ndarray of float, shape (3,)
+        Mean of offset, rate and play over them, from the best one.
+    covariance : ndarray of float, shape (3, 3)
+        Of the three, about that mean.
+    """
+
+    shift: Array
+    covariance: Array
+
+
+def rounded(path: LogPath, corner_s: float) -> LogPath:
+    """Let every corner take some time, as a stage that accelerates evenly does: two tangents and a parabola."""
+    if corner_s == 0.0 or not path.parts.corner_s.size:
+        return path
+    time_s, input_mm = path.drive.time_s, path.drive.input_mm.copy()
+    for at_s, turn in zip(path.parts.corner_s, path.parts.turn_mm_s, strict=True):
+        near = slice(*np.searchsorted(time_s, (at_s - 0.5 * corner_s, at_s + 0.5 * corner_s)))
+        input_mm[near] += turn / (2.0 * corner_s) * (0.5 * corner_s - np.abs(time_s[near] - at_s)) ** 2
+    return replace(path, drive=replace(path.drive, input_mm=input_mm))
+
+
+def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Rounding]:
+    """Choose the duration of all corners that explains the frames best, and the spread of the fit over the others.
+
+    Rows before and after a corner lie on two lines, whether the stage turned at once where these meet or over the time
+    between the rows. All turns of a stage are alike, so that its play would be off by twice what each is cut, and with
+    it the offset, however many turns there are. Frames that follow faster than the rows tell the difference.
+    """
+    path = motion.path
+    row_s = float(np.median(np.diff(path.rows.time_s)))
+    tried = list(_tried(motion, found, row_s)) if path.parts.corner_s.size else [(motion, found)]
+    squares = np.array([one.squares for _, one in tried])
+    best = int(np.argmin(squares))
+    weights = (squares / squares[best]) ** (-0.5 * min(STRETCHES, found.degrees))
+    weights /= weights.sum()
+    at = np.array([[one.at.offset_s, one.at.rate, one.at.play_mm] for _, one in tried])
+    shift = weights @ at - at[best]
+    away = at - at[best] - shift
+    return *tried[best], Rounding(shift, np.einsum("k,ki,kj->ij", weights, away, away))
+
+
+def _tried(motion: Motion, found: Fit, row_s: float) -> Iterator[tuple[Motion, Fit]]:
+    for share in SHARES:
+        turned = replace(motion, path=rounded(motion.path, share * row_s))
+        near = fit(turned, found.at, free_play=True)
+        yield turned, min(near, most_likely(turned, found.at, NEAR_PLAYS), key=lambda one: one.squares)

@@ -1,0 +1,46 @@
+"""Variance of a fit's offset, rate and play: the frames' noise, and the errors of the path through the log's rows."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+from fingervision.measuring.clock.joint_fit import PLAY_STEP, information, prior_of, solve
+from fingervision.measuring.clock.log_errors import DRAWS, drawn_paths
+from fingervision.measuring.clock.motion_model import Alignment, Motion
+
+CLUSTERS = 24
+"""Stretches of the recording whose pulls are taken for independent: their scatter is known to a fifth, and a stretch of
+an ordinary recording holds a move or two."""
+
+
+def inflation(motion: Motion, at: Alignment) -> Array:
+    """Ratio of the variance of offset, rate and play to its value by the fit's own weights; shape (3,).
+
+    The weights take the log's errors for what they are from frame to frame. What they do to the fit is computed here:
+    another path that the log allows (`log_errors`) changes the prediction, and the fit passes a share of that change
+    on to its parameters (sandwich estimator: White 1980, doi:10.2307/1912934). Where the residuals' own pulls, summed
+    over stretches of the recording, scatter by more than this, their scatter counts: something else moves the gap too.
+    """
+    solved = solve(motion, at)
+    free_play = at.play_mm > 10.0 * PLAY_STEP
+    normal, jacobian = information(motion, at, solved, free_play=free_play)
+    variance = solved.squares / max(solved.degrees, 1)
+    frames = solved.white.size - solved.weights.size + 2
+    jacobian = jacobian[:frames] / variance
+    prior = prior_of(jacobian.shape[1])
+    of_frames = motion.weighed(jacobian)
+    expected = motion.noise.variance_mm2 * of_frames.T @ of_frames + prior
+    expected_mm = motion.design(at) @ solved.weights
+    for path in drawn_paths(motion.path):
+        changed_mm = replace(motion, path=path).design(at) @ solved.weights - expected_mm
+        pull = jacobian.T @ motion.whitened(changed_mm)
+        expected += np.outer(pull, pull) / DRAWS
+    clusters = min(CLUSTERS, frames // 8)
+    parts = np.array_split(jacobian * solved.white[:frames, None], clusters)
+    pulls = np.stack([part.sum(axis=0) for part in parts])
+    seen = pulls.T @ pulls * (clusters / max(clusters - pulls.shape[1], 1)) + prior
+    bread = np.linalg.pinv(normal)
+    by_fit = np.maximum(np.diag(bread), 1e-300)
+    ratio = np.maximum(np.diag(bread @ expected @ bread), np.diag(bread @ seen @ bread)) / by_fit
+    return ratio[[0, 1, 3]] if free_play else np.array([ratio[0], ratio[1], max(ratio[0], ratio[1])])

@@ -1,0 +1,125 @@
+"""Path of a stage between two rows of its log: Akima's curve, and corners where two straight lines meet."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
+
+from fingervision.domain.effect import Array
+from fingervision.stage_record.differences import differences
+
+FINER = 6
+"""Points that a row becomes: the sag of a chord falls with its square, to a thirtieth."""
+FEWEST = 5
+"""Rows that draw a curve, and of which fourth differences are taken."""
+CORNER = 0.07
+"""Standard deviation of an interpolated input over the fourth differences at both ends of its interval. A corner of the
+motion anywhere between two rows leaves 0.105 of the change of step as RMS (integral of x^2 (1 - x)^2, times 1/3), which
+is 0.07 of the fourth differences that it makes; noise of the rows comes out within a tenth of itself."""
+
+SHARP = 5.0
+"""Change of the step in an interval over that beside it, and over a row's uncertainty, from which on it is a corner."""
+BUMP = float(np.sqrt(30.0))
+"""A parabola that is zero at both rows and has an RMS of 1 between them."""
+STANDS = 0.1
+"""Step over its neighbour's below which the stage stands: noise of a log is seldom more."""
+
+
+def piece(
+    time_s: Array, input_mm: Array, u_mm: Array
+) -> tuple[Array, Array, Array, Array, NDArray[np.intp], Array, Array]:
+    """Times, inputs, uncertainties, the curve's own part of these and intervals of one run's points; its corners."""
+    if time_s.size < FEWEST:
+        none = np.zeros(0)
+        return time_s, input_mm, u_mm, np.zeros(time_s.size), np.arange(time_s.size), none, none
+    places = np.arange(FINER * (time_s.size - 1) + 1) / FINER
+    interval = np.minimum(places.astype(int), time_s.size - 2)
+    fine_s = np.interp(places, np.arange(time_s.size), time_s)
+    second_signed = np.pad(differences(input_mm, time_s, 2), 1, mode="edge")
+    second = np.abs(second_signed)
+    fourth = np.abs(np.pad(differences(input_mm, time_s, 4), 2, mode="edge"))
+    between = CORNER * np.minimum(fourth[:-1] + fourth[1:], 3.0 * np.minimum(second[:-1], second[1:]))
+    fine_mm = _curve(time_s, input_mm, fine_s, interval)
+    found = _corners(time_s, input_mm, second, u_mm)
+    for one in found:
+        inside = (fine_s >= time_s[one.first]) & (fine_s <= time_s[one.last])
+        fine_mm[inside] = one.at_mm + np.where(fine_s < one.at_s, one.before, one.after)[inside] * (
+            fine_s[inside] - one.at_s
+        )
+        between[one.first : one.last] = one.u_mm
+    errors = np.hypot(between[interval], np.interp(fine_s, time_s, u_mm))
+    at_s = np.array([one.at_s for one in found])
+    new = np.searchsorted(fine_s, at_s)
+    out_s, of = np.insert(fine_s, new, at_s), np.insert(interval, new, interval[np.maximum(new - 1, 0)])
+    out_mm = np.insert(fine_mm, new, [one.at_mm for one in found])
+    share = (out_s - time_s[of]) / np.diff(time_s)[of]
+    bent = second_signed[of] + second_signed[of + 1]
+    curve_mm = -np.sign(bent) * between[of] * BUMP * share * (1.0 - share)
+    turn_mm_s = np.array([one.after - one.before for one in found])
+    return out_s, out_mm, np.insert(errors, new, [one.u_mm for one in found]), curve_mm, of, at_s, turn_mm_s
+
+
+@dataclass(frozen=True, slots=True)
+class Corner:
+    """Point where two straight stretches of a stage's path meet.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows on either line, before and after it.
+    at_s, at_mm : float
+        Where the lines meet.
+    before, after : float
+        Speeds, in mm/s.
+    u_mm : float
+        Standard uncertainty of the place.
+    """
+
+    first: int
+    last: int
+    at_s: float
+    at_mm: float
+    before: float
+    after: float
+    u_mm: float
+
+
+def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> list[Corner]:
+    """Corners with no row in them: a reversal lies between two rows."""
+    k = np.arange(2, time_s.size - 3)
+    bend, beside = second[k] + second[k + 1], second[k - 1] + second[k + 2]
+    speed = np.diff(input_mm) / np.diff(time_s)
+    apart = speed[k - 1] - speed[k + 1]
+    met_s = np.where(
+        apart != 0.0,
+        (input_mm[k + 1] - input_mm[k] - speed[k + 1] * (time_s[k + 1] - time_s[k])) / np.where(apart, apart, 1.0),
+        -1.0,
+    )
+    isolated = (bend > SHARP * beside) & (bend > SHARP * u_mm[k]) & (met_s > 0.0) & (met_s < np.diff(time_s)[k])
+    return [
+        Corner(
+            row,
+            row + 1,
+            float(time_s[row] + after),
+            float(input_mm[row] + speed[row - 1] * after),
+            float(speed[row - 1]),
+            float(speed[row + 1]),
+            float(uncertain),
+        )
+        for row, after, uncertain in zip(k[isolated].tolist(), met_s[isolated], beside[isolated], strict=True)
+    ]
+
+
+def _curve(time_s: Array, input_mm: Array, fine_s: Array, interval: NDArray[np.intp]) -> Array:
+    """Draw Akima's curve; next to an interval in which the stage is at rest it stays between its rows.
+
+    A stage that arrives and stops has not been beyond its position of rest, and the play depends on the extreme
+    position.
+    """
+    curve = np.asarray(Akima1DInterpolator(time_s, input_mm)(fine_s), dtype=np.float64)
+    steps = np.abs(np.diff(input_mm))
+    beside = np.minimum(np.append(steps[1:], np.inf), np.insert(steps[:-1], 0, np.inf))
+    low = np.minimum(input_mm[:-1], input_mm[1:])[interval]
+    high = np.maximum(input_mm[:-1], input_mm[1:])[interval]
+    return np.where((beside < STANDS * steps)[interval], np.clip(curve, low, high), curve)

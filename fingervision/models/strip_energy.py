@@ -1,0 +1,65 @@
+"""How a leaf or a straight neck is used: bent by ends that turn against each other, by ends that sway, or stretched.
+
+The plate's width holds the three back differently (`strip_width`). The strain energies of a bar whose ends move by
+rotations, a chord's rotation and an elongation are E I / 2 L times the squares below (Timoshenko, Strength of
+Materials); their shares are all that is needed, and they change little when the bar is held back.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.flexure import Flexure
+from fingervision.models.flexure_span import FlexureSpan
+from fingervision.models.plane_stress import PlaneStressPlate
+
+Array = NDArray[np.float64]
+
+_ACROSS = 0.4
+"""Of the thickness: two points that far from the axis tell a section's rotation."""
+_LEAST = 1e-3
+"""Of the whole strain energy: what a strip with less is taken for changes the force by less than 1e-4."""
+
+
+def used_in_plate(flexure: Flexure, plate: PlaneStressPlate, moved: Array, whole_n_mm: float) -> Flexure:
+    """Give a strip the shares of its strain energy from the displacements of a meshed plate.
+
+    One with next to nothing of the whole energy is left as it is: its shares would be those of rounding.
+    """
+    length, t = flexure.bent_mm, flexure.thickness_mm
+    along, across = (np.subtract(flexure.point_mm(*way), flexure.at_mm) for way in ((1.0, 0.0), (0.0, 1.0)))
+    shifts, turns = [], []
+    for x in (-0.5 * length, 0.5 * length):
+        low, high = (plate.rows_at(flexure.point_mm(x, side * _ACROSS * t)) @ moved for side in (-1.0, 1.0))
+        shifts.append(0.5 * (low + high))
+        turns.append(float(along @ (low - high)) / (2.0 * _ACROSS * t))
+    apart = shifts[1] - shifts[0]
+    chord = float(across @ apart) / length
+    parts = np.array(
+        [
+            (turns[1] - turns[0]) ** 2,
+            3.0 * (turns[0] + turns[1] - 2.0 * chord) ** 2,
+            12.0 * (float(along @ apart) / t) ** 2,
+        ]
+    )
+    return _with(
+        flexure, parts * plate.material.youngs_modulus_mpa * plate.plate_mm * t**3 / (24.0 * length), whole_n_mm
+    )
+
+
+def used_in_frame(span: FlexureSpan, end_loads: Array, plate: PlaneStressPlate, whole_n_mm: float) -> Flexure:
+    """Give a strip the shares of its strain energy from the loads at the ends of its segments; see `used_in_plate`."""
+    tension, first, last = float(end_loads[:, 0].mean()), -float(end_loads[0, 1]), float(end_loads[-1, 2])
+    t = span.flexure.thickness_mm
+    parts = np.array([(0.5 * (first + last)) ** 2, (0.5 * (first - last)) ** 2 / 3.0, (tension * t) ** 2 / 12.0])
+    stiffness = plate.material.youngs_modulus_mpa * plate.plate_mm * t**3 / (6.0 * span.flexure.bent_mm)
+    return _with(span.flexure, parts / stiffness, whole_n_mm)
+
+
+def _with(flexure: Flexure, energies_n_mm: Array, whole_n_mm: float) -> Flexure:
+    total = float(energies_n_mm.sum())
+    if total <= _LEAST * whole_n_mm:
+        return flexure
+    bent, swayed, stretched = (energies_n_mm / total).tolist()
+    return replace(flexure, used=(bent, swayed, stretched))
