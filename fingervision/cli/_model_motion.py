@@ -162,7 +162,7 @@ def words_of(motion: Motion, column: str) -> str:
 
 
 _SEEN_ROWS = 60
-"""Fewer rows are drawn as points."""
+"""Number of rows below which the rows are also plotted as points."""
 
 
 def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Path) -> None:

@@ -20,7 +20,7 @@ Flags = NDArray[np.bool_]
 
 
 REZEROED = "rezeroed"
-"""Word in the name of a run that came after a re-zeroing of the stage."""
+"""Word in the name of a run that was recorded after a re-zeroing of the stage."""
 
 
 class Stage(StrEnum):

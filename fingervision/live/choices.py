@@ -12,7 +12,7 @@ from fingervision.measuring.scale import Scale
 from fingervision.measuring.task import Task
 
 MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
-"""After a change of these a gap is another one."""
+"""Settings whose change invalidates the zero."""
 ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region or direction."
 
 

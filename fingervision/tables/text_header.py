@@ -12,16 +12,16 @@ from fingervision.tables.units import is_unit, known_unit
 from fingervision.tables.words import role_of
 
 HEADER_LINES = 6
-"""Lines above the numbers that are looked at for names and units."""
+"""Number of lines above the numbers that are searched for names and units."""
 LAST_REMARK = frozenset({"", "comment", "comments", "kommentar", "bemerkung", "commentaire", "comentario", "commento"})
-"""Names of a last column that rows may leave out."""
+"""Names of a last column that may be missing in rows."""
 
 LABEL_NAMES = frozenset({"long name", "long names"})
 LABEL_UNITS = frozenset({"unit", "units", "einheit", "einheiten"})
 LABEL_REMARKS = frozenset({"comment", "comments", "kommentar", "kommentare", "f(x)", "f(x)=", "sampling interval"})
-"""What stands in the first column of a worksheet's header rows, above an empty column (OriginLab's ASCII export)."""
+"""Labels in the first column of a worksheet's header rows (ASCII export of OriginLab), above an empty column."""
 ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
-"""A column's name in a line of its own (the data recorders of Physik Instrumente write `# NAME0 = ...`)."""
+"""Pattern of a line that names a single column (data recorders of Physik Instrumente write `# NAME0 = ...`)."""
 
 
 @dataclass(frozen=True, slots=True)
