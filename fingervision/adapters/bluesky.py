@@ -24,7 +24,8 @@ from fingervision.testbed.run.synchronised_acquisition import Sight
 
 POLL_S = 0.005
 FRAMES_TO_JOIN = 5
-"""Frames after the last motion that are waited for: the stage's place is known between readings on either side."""
+"""Number of frames to wait for after the last motion, because the stage's position is interpolated between readings
+before and after a frame."""
 JOINED_WITHIN_S = 5.0
 """Twenty answers of a slow line; until then nothing tells which reading belongs to which frame."""
 

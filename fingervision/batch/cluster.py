@@ -15,9 +15,10 @@ from fingervision.batch.work import work
 from fingervision.domain.errors import MissingLibraryError, ProcessError, UsageError
 
 PATIENCE_S = 10
-"""How long a scheduler may take to answer, and a worker to be there."""
+"""Longest wait for a response of the scheduler, and for a worker."""
 WINDOW = 4
-"""Tasks that a thread of a worker has waiting: it never idles, and the scheduler holds few of ten thousand."""
+"""Number of queued tasks per worker thread, so that the thread is never idle, while the scheduler holds only few of
+many thousand tasks."""
 
 
 @contextmanager

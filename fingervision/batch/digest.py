@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 Cell = str | float | int | None
 CURVE_POINTS = 48
-"""Points of a small picture: its width is about 150 px, and ten thousand of them shall make a page of a few MB."""
+"""Number of points in a small plot, whose width is about 150 px; a page with ten thousand small plots then has a few
+MB."""
 
 
 @dataclass(frozen=True, slots=True)

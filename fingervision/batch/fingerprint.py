@@ -6,9 +6,10 @@ from time import time_ns
 
 BYTES_AT_ONCE = 1 << 20
 COLUMNS = "columns.toml"
-"""Says what the columns of the tables beside it are."""
+"""Name of the file that states the meaning of the columns of tables in the same folder."""
 SETTLED_NS = 3_000_000_000
-"""A file that changed so shortly ago may change again within the same tick of a coarse file system's clock (2 s)."""
+"""Age below which a file may change again without a change of its modification time, whose resolution is 2 s on some
+file systems."""
 
 
 def files_of(path: Path) -> list[Path]:

@@ -16,7 +16,7 @@ from fingervision.batch.work import work
 from fingervision.domain.errors import ProcessError
 
 ATTEMPTS = 2
-"""Times that a task is tried whose process dies under it: once may have been the system's choice of victim."""
+"""Number of attempts for a task whose process dies; the system may have ended the first process for lack of memory."""
 
 
 @dataclass(slots=True)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 BETWEEN = "__"
 LONGEST = 200
-"""Characters; file systems take 255 bytes, and a part's name is longer than its folder's."""
+"""Largest length of a name in characters; file systems allow 255 bytes, and the temporary name of a folder is
+longer."""
 
 
 def folder_names(inputs: Sequence[Path], taken: Collection[str]) -> tuple[str, ...]:

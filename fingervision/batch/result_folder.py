@@ -17,7 +17,7 @@ from fingervision.batch.digest import Digest
 
 RECORD = "record.json"
 TABLES = (".csv", ".json", ".toml")
-"""What others read on; a picture that is missing is no result that is missing."""
+"""File suffixes of results that other programs read; a missing picture does not make a result incomplete."""
 SCHEMA = 1
 PART = re.compile(r"\.(?P<name>.+)\.part~(?P<host>[^~]+)~(?P<pid>\d+)~[0-9a-f]{8}")
 

@@ -19,7 +19,7 @@ COLUMNS = ("verdict", "effects", "alternatives", "parameters", *RMS)
 COLOURS = {"agrees": "#5b8c5a", "named": "#11507a", "ambiguous": "#d99a2b", "unknown": "#c0392b"}
 MOST_ANSWERS = 20
 FEWEST_PLACES = 6
-"""Room for so many bars at least: a single one would fill the figure."""
+"""Smallest number of bars for which the plot has room, because a single bar would otherwise fill it."""
 
 
 def digest_of(folder: Path) -> Digest:

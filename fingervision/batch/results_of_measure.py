@@ -25,7 +25,7 @@ STATISTICS = (
 )
 COLUMNS = ("frames", "ok_frames", *STATISTICS)
 MOST_NAMES = 40
-"""More names than this cannot be read along the axis; recordings are then counted."""
+"""Largest number of readable names along the axis; more recordings are numbered instead."""
 
 
 def digest_of(folder: Path) -> Digest:

@@ -17,9 +17,10 @@ from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 
 
 class Commands(click.Group):
-    """Every module in this package whose name has no leading underscore is a command of that name.
+    """Command group in which every module of this package without a leading underscore is a command.
 
-    The module defines the command as `command` and imports nothing heavy at its top, so that `--help` stays fast.
+    The module's name is that of the command, and its variable `command` is the command itself. It imports no large
+    libraries at module level, so that `--help` is fast.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

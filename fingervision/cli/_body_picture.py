@@ -15,13 +15,13 @@ Array = NDArray[np.float64]
 
 _LEAST_INCHES, _MOST_INCHES = 5.0, 9.0
 _TITLE_INCHES, _BESIDE_INCHES = 1.2, 1.8
-"""What title and axis need above and below, axis and colour bar to the left and right."""
+"""Height needed by title and axis labels, and width needed by axis labels and colour bar, in inches."""
 _LEAST_WIDE_INCHES = 7.5
-"""Two lines of a title in words need that."""
+"""Smallest width in inches, which a title of two lines needs."""
 _ON_AXIS = 1e-9
-"""Of the body's size: edges nearer to the symmetry axis lie on it."""
+"""Tolerance relative to the size of the body: edges that are nearer to the symmetry axis lie on the axis."""
 _COLOURS = "YlOrRd"
-"""Pale where there is no stress, so that the body is seen as a body."""
+"""Colour map that is pale at zero stress, so that the shape of the body remains visible."""
 
 
 def framed(low: Array, high: Array) -> tuple[Figure, Axes]:

@@ -11,7 +11,7 @@ class KindChoice(click.ParamType):  # type: ignore[type-arg]  # generic in new v
     Parameters
     ----------
     also : str
-        Words that stand for more than one kind.
+        Additional accepted words, which denote several kinds (such as `all`).
     """
 
     name = "kind"

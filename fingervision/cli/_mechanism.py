@@ -29,7 +29,7 @@ _KINDS = ("finite_element", "lumped")
 _ROWS = 21
 _MOST_ROWS = 41
 _OF_YIELD = 0.5
-"""Without a drive, inputs up to half of what makes the flexures yield are answered, either way."""
+"""Range of inputs without a drive table, in both directions, as a fraction of the input at which the flexures yield."""
 
 
 def predict(

@@ -12,7 +12,8 @@ from fingervision.tables.read import read_drive
 
 _METRES_BELOW_OF_HEIGHT = 1e-4
 _ROWS_BETWEEN = 61
-"""Over the range of a drive, in the deformed shape: straight lines between them are within 1 um for the sample."""
+"""Number of inputs over the range of a drive; the error of linear interpolation between them is below 1 µm for the
+sample gripper."""
 _MOST_ROWS = 401
 
 
@@ -44,6 +45,6 @@ def with_rows_between(inputs: NDArray[np.float64], figures: ModelFigures) -> NDA
 
 
 def inputs_until_touch(figures: ModelFigures) -> NDArray[np.float64]:
-    """Inputs from the first touch to three times as far in the other direction: the published range."""
+    """Inputs (mm) from the first touch (closing) to three times this amount in opening: the published range."""
     touch = figures.contact_input_mm or -0.1
     return np.union1d(np.linspace(touch, 0.0, 26), np.linspace(0.0, -3.0 * touch, 76))

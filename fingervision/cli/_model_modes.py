@@ -21,7 +21,8 @@ from fingervision.models.mode_shapes import ModeShape, ModesWanted, gripper_mode
 
 _A_ROW = 6
 _PICTURES, _PERIODS, _A_SECOND = 24, 4, 24
-"""Pictures in a period, periods in the film, pictures a second: one period takes one second, whatever the frequency."""
+"""Pictures per period, periods in the film, and pictures per second: one period takes one second for every
+frequency."""
 _FILM_DPI = 80
 _MARGIN = 0.02
 _MOST_FILM_MODES = 18

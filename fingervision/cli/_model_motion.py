@@ -53,7 +53,7 @@ def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
 
 @dataclass(frozen=True, slots=True)
 class MotionAsked:
-    """Options of `model` for motion in time and frequency, checked before any computation."""
+    """Options of `model` for responses over time and frequency, checked before any computation."""
 
     drive: DriveHistory | None
     modes: ModesWanted | None
@@ -162,7 +162,7 @@ def words_of(motion: Motion, column: str) -> str:
 
 
 _SEEN_ROWS = 60
-"""Fewer rows are drawn as points."""
+"""Number of rows below which the rows are also plotted as points."""
 
 
 def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Path) -> None:

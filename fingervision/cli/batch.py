@@ -43,7 +43,7 @@ BAD_SHOWN = 10
 
 @click.group(epilog=EXAMPLES)
 def command() -> None:
-    """Run one command on many inputs, each into its own folder, with an overview of all results."""
+    """Run one command on many inputs, with a result folder for each input and an overview of all results."""
 
 
 def _batch_of(name: str) -> click.Command:

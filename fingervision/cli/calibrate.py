@@ -113,7 +113,7 @@ def _size_options(command: Command) -> Command:
 @limit_options
 @_output_options
 def bar(**options: Any) -> None:
-    """Calibrate on bars: objects with two parallel straight edges a known distance apart.
+    """Calibrate on bars: objects with two parallel straight edges at a known distance.
 
     Each picture shows one object, in any direction; the object may extend beyond the picture. Three sizes give scale
     and edge bias. Fewer sizes give only the scale; the edge bias is then not corrected, and its limit enters the
@@ -127,7 +127,7 @@ def bar(**options: Any) -> None:
 @limit_options
 @_output_options
 def slot(**options: Any) -> None:
-    """Calibrate on slots: gaps between two parallel straight edges a known distance apart.
+    """Calibrate on slots: openings between two parallel straight edges at a known distance.
 
     Everything else is as for `bar`. To add bars, prefix an item: bar:ref5.png=5.000.
     """

@@ -24,7 +24,7 @@ _PREDICTED = (
     "frequency.csv", "frequency.png", "grip.csv", "grip.png", "response.csv", "response.png", "uncertainty.csv",
     "uncertainty.png", "modes.mp4",
 )  # fmt: skip
-"""Files of the two kinds of call, whichever of them a call writes."""
+"""Names of the result files of the two kinds of call."""
 _EPILOG = """\b
 Examples:
   fingervision model gripper.toml --kind all --drive drive.csv --out model

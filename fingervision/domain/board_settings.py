@@ -48,7 +48,7 @@ class BoardSettings:
     Parameters
     ----------
     port : str
-        Name of the serial port.
+        Name of the serial port to which the board is connected.
     lines : mapping of Role to Line
         The wiring. It contains all of the roles `NEEDED_TO_MOVE` or none of them; a board without these roles serves as
         a force sensor only.

@@ -19,7 +19,7 @@ class DriveHistory:
     run : tuple of str, length n, or None
         Name of the run to which each sample belongs.
     force_n : ndarray of float, shape (n,), or None
-        Force at the drive.
+        Force at the drive; None if not recorded.
     """
 
     time_s: NDArray[np.float64]

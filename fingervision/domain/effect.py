@@ -20,7 +20,7 @@ Flags = NDArray[np.bool_]
 
 
 REZEROED = "rezeroed"
-"""Word in the name of a run that came after a re-zeroing of the stage."""
+"""Word in the name of a run that was recorded after a re-zeroing of the stage."""
 
 
 class Stage(StrEnum):
@@ -115,12 +115,12 @@ class History:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputPath:
-    """Path of the input, with points between and outside the measured rows, for effects with memory such as backlash.
+    """Path of the input with points besides the measured rows, as needed for effects with memory such as backlash.
 
     Parameters
     ----------
     history : History
-        The chain's history at every point of the path, of which there are m.
+        History at all m points of the path.
     rows : ndarray of int, shape (n,)
         Index of the path's point at which each measured row lies.
     owner : ndarray of int, shape (m,)
@@ -171,9 +171,9 @@ class Effect:
     Parameters
     ----------
     name : str
-        Canonical name.
+        Name of the effect in the catalogue, as used in all files.
     stage : Stage
-        Drive, mechanism or camera.
+        Stage of the measuring chain in which the effect acts: drive, mechanism or camera.
     order : float
         Position in the chain within the stage: effects act in ascending order. The built-in effects have multiples of
         ten (`fingervision effects NAME` prints the number), so that a user-defined effect may be put between two of

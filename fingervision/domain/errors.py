@@ -1,21 +1,21 @@
 """Errors for users: each message says in one sentence what is wrong, what is expected, what was found, and what to do.
 
-Code that catches an error relies on its class and on the facts that it carries; the wording may change with any
+Programs that catch an error should rely on its class and attributes; the wording of messages may change with any
 version.
 
     FingervisionError                exit code 1
     ├── UsageError                   the request is wrong; exit code 2
     │   └── ArgumentError            one argument or option, also a ValueError
     │       ├── ArgumentTypeError    of the wrong kind, also a TypeError
-    │       └── UnknownNameError     no such name, with the nearest one that there is
+    │       └── UnknownNameError     an unknown name; the message gives the nearest known name
     ├── InputFileError               a file or folder cannot be found or read; also an OSError
-    ├── DataError                    a file, recording or array does not hold what it must; also a ValueError
+    ├── DataError                    the content of a file, recording or array is not valid; also a ValueError
     ├── OutputError                  a result cannot be written; also an OSError
     ├── NoCalibrationError           pictures of known sizes give no calibration; also a ValueError
-    ├── ModelError                   a model of the mechanism has no answer
-    ├── DeviceError                  a camera, stage, board or sensor fails or does not answer
-    ├── LimitError                   a motion beyond what bed or device allows
-    ├── StateError                   not now: busy, recording, position unknown, nobody there to ask
+    ├── ModelError                   a model of the mechanism has no solution
+    ├── DeviceError                  a camera, stage, board or sensor fails or does not respond
+    ├── LimitError                   a motion beyond the limits of the test bed or device
+    ├── StateError                   not possible in the present state (busy, recording, position unknown)
     ├── ProcessError                 a worker process, cluster or server cannot be started or was lost
     ├── InstallationError            a part of fingervision itself is missing
     │   └── MissingLibraryError      an optional library is not installed; also an ImportError

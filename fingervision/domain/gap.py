@@ -16,7 +16,7 @@ class FingerEdge:
     Parameters
     ----------
     x_px, y_px : float
-        The measuring point.
+        Coordinates of the measuring point.
     tip_px : float
         The tip's coordinate along the fingers' axis (y for tips up or down, x for tips left or right).
     u_across_px : float
@@ -87,7 +87,7 @@ class GapMeasurement:
     left, right : FingerEdge
         `left` is the finger with the smaller coordinate across the fingers.
     direction : Direction
-        Where the tips point.
+        Direction in which the tips point.
     u_gap_px : float
         Random standard uncertainty of `gap_px` (from frame to frame).
     light_gap : bool

@@ -38,7 +38,7 @@ class Material:
     youngs_modulus_mpa, poisson_ratio : float
         Linear elastic constants.
     density_kg_m3 : float
-        Mass per volume.
+        Density in kg/m^3.
     yield_mpa : float
         Yield stress, beyond which the result of an elastic model is invalid.
     thermal_expansion_per_k : float or None
@@ -120,7 +120,7 @@ class Lever:
     hinge1_axis_deg, hinge2_axis_deg : float
         Angle of each hinge's longitudinal axis from the x axis.
     drive_mm : (float, float)
-        The drive point O_A on the symmetry axis.
+        Position of the drive point O_A on the symmetry axis.
     drive_face_y_mm, drive_face_half_width_mm : float
         Height and half width of the face on which the actuator pushes.
     """
@@ -147,9 +147,9 @@ class Links:
     pillar_and_root_mm, drive_block_mm : (float, float, float, float)
         Axis-parallel rectangles: x from, x to, y from, y to. The pillar is clamped at its lower face.
     shuttle_from_mm, shuttle_to_mm, shuttle_width_mm : (float, float), (float, float), float
-        Bar from the drive point through hinge 2.
+        Start point, end point and width of the bar from the drive point through hinge 2.
     cross_bar_mm, finger_mm : (float, float, float, float)
-        Bars: x, y of one end, x, y of the other.
+        Bars, each given by x and y of one end and x and y of the other end.
     cross_bar_width_mm, finger_width_mm : float
         Widths of the cross bar and the finger bar.
     tip_polygon_mm : tuple of (float, float)

@@ -84,7 +84,7 @@ class Estimate:
     Parameters
     ----------
     value : float
-        Best value.
+        Best estimate of the parameter.
     u : float or None
         Standard uncertainty; None if the data do not determine it (the value lies at a bound, or was set by the user).
     unit : str

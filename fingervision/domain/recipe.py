@@ -8,7 +8,7 @@ Step = TypeVar("Step")
 
 @dataclass(frozen=True, slots=True)
 class Recipe(Generic[Step]):
-    """The steps of a run.
+    """A recipe with its name, its force limit and its steps.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ class EffectList(ModuleType):
     --------
     >>> import fingervision as fv
     >>> fv.effects["backlash"].words
-    'motion reverses only after the play is taken up'
+    'after a reversal, the mechanism moves only once the play is taken up'
     >>> [effect.name for effect in fv.effects if effect.stage == "drive"][:2]
     ['drive_lag', 'input_offset']
     >>> "backlash" in fv.effects

@@ -7,7 +7,7 @@ _play, _sliders = loop("play_operator_play"), loop("play_operator_sliders")
 
 
 def play(input_mm: Array, width_mm: float, start: float) -> Array:
-    """Output of a play of full width `width_mm` for one run's input; shape (n,).
+    """Output of a play operator of full width `width_mm` for the input of one run; shape (n,).
 
     The initial output lies `start` half widths above the first input; -1 and 1 are the two ends of the play.
     """
@@ -15,9 +15,10 @@ def play(input_mm: Array, width_mm: float, start: float) -> Array:
 
 
 def drawn_sliders(input_mm: Array, reach_mm: float, count: int, start: float) -> Array:
-    """Sum of the extensions of elastic sliders with reaches of k / count of `reach_mm`, along one run's input; (n,).
+    """Sum of the extensions of `count` elastic sliders, along the input of one run; shape (n,).
 
-    The extension of slider k is the difference between the input and the output of a play operator whose full width is
-    twice the slider's reach. The initial extension of every slider is the fraction `start` of its reach.
+    The reach (largest extension) of slider k is k / count of `reach_mm`, and its extension is the difference between
+    the input and the output of a play operator whose full width is twice the slider's reach. The initial extension of
+    every slider is the fraction `start` of its reach.
     """
     return filled(_sliders, input_mm, reach_mm, count, start)

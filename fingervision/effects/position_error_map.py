@@ -9,10 +9,10 @@ from fingervision.domain.effect import Array, DriveEffect, History, Stage, Value
 from fingervision.domain.parameter import Parameter
 
 FEWEST_PLACES = 5
-"""Different inputs that show more than a straight line and a bend."""
+"""Smallest number of different inputs from which more than a straight line and a curvature can be estimated."""
 TYPICAL_NODES = 65
 TYPICAL_SEED = 230
-"""Of the curve that stands for a map whose points are not given."""
+"""Random seed of the representative curve for a map whose points are not given."""
 
 
 def covariance(inputs_mm: Array, length_mm: float) -> Array:

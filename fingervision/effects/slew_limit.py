@@ -9,14 +9,16 @@ from fingervision.domain.loops import filled, loop
 from fingervision.domain.parameter import Parameter
 
 SLOWEST_SHARE, FASTEST_SHARE = 0.05, 0.98
-"""Share of the moving samples that are slower than what is called the slowest motion, and than the fastest: the ends of
-strokes are slower, and errors of the recorded input make single samples seem faster."""
+"""Quantiles of the speeds of moving samples that are taken as the slowest and the fastest motion: samples at the ends
+of strokes are slower, and errors of the recorded input make single samples appear faster."""
 WINDOW, ONE_WAY = 9, 0.8
-"""Samples over which a speed is taken, and share of the travel by which the stage must have come on meanwhile."""
+"""Number of samples over which a mean speed is computed, and fraction of the travelled distance that the net
+displacement over these samples must reach."""
 JUMP_RANGE = 0.01
-"""Lowest speed that is searched under step commands, over the fastest one that they ask for."""
+"""Lowest speed limit that is searched with step commands, relative to the fastest commanded speed."""
 APART = 1.5
-"""Fastest over slowest motion above which a limit between them is told from a record of one speed and its errors."""
+"""Ratio of fastest to slowest motion above which a speed limit between both can be distinguished from a record of a
+single speed with errors."""
 
 _follow = loop("slew_limit_follow")
 

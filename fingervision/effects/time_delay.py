@@ -9,9 +9,9 @@ from fingervision.domain.effect import Array, History
 from fingervision.domain.parameter import Parameter
 
 COMMANDED_STARTS = 60
-"""Delays that are tried under step commands: each an eighth longer than the one before, which a scan spans."""
+"""Number of delays that are tried with step commands; each is an eighth longer than the preceding delay."""
 FEWEST = 4
-"""Samples of a run that draw a curve."""
+"""Smallest number of samples in a run for curved interpolation."""
 
 
 def late(signal: Array, history: History, delay_s: float, *, curved: bool = False) -> Array:

@@ -13,9 +13,9 @@ from fingervision.domain.response import Response
 from fingervision.plugins.faults import MisfitError
 
 BUILT_IN: list[Effect] = []
-"""The package's own effects; the package fills it."""
+"""The built-in effects; the package `fingervision.effects` fills this list."""
 SAMPLES = 12
-"""Of the trial: two runs there and back, so that memory, reversals and starts of runs are all met."""
+"""Number of samples in the trial: two runs of opening and return, with reversals and starts of runs."""
 
 
 class EffectAnswerError(FingervisionError):

@@ -9,7 +9,8 @@ from fingervision.live.guard import LOOPBACK_NAMES
 from fingervision.storage.plain_file import plain
 
 LEAST_LETTERS = 12
-"""Guesses are answered one a second (`guard.GUESS_COSTS_S`): so many letters outlast any bench."""
+"""Smallest length of a password; one guess per second is allowed (`guard.GUESS_COSTS_S`), so that guessing is
+hopeless."""
 PLAIN = (
     "The page is served beyond this machine, over plain HTTP: who can listen to the network can read it, its token and "
     "its password. Use it on a bench's own network alone, through an SSH tunnel, or with --tls-cert and --tls-key."

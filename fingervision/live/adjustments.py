@@ -8,7 +8,7 @@ from fingervision.domain.errors import DeviceError, FingervisionError, StateErro
 from fingervision.frames.controls import CameraControl, adjust, controls_of
 
 ANSWERED_WITHIN_S = 3.0
-"""A change waits for the next frame, and for cameras that start anew for another frame rate."""
+"""Longest wait for a change, which is applied between frames; some cameras restart for another frame rate."""
 
 
 @dataclass(slots=True, eq=False)

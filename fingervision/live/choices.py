@@ -12,7 +12,7 @@ from fingervision.measuring.scale import Scale
 from fingervision.measuring.task import Task
 
 MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
-"""After a change of these a gap is another one."""
+"""Settings whose change invalidates the zero."""
 ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region or direction."
 
 
@@ -37,7 +37,7 @@ class Choices:
     zero_mm : float
         Value subtracted from the displayed gap; files contain the gap without this subtraction.
     least_mm, greatest_mm : float or None
-        Tolerance limits.
+        Lower and upper tolerance limit of the gap; None without a limit.
     """
 
     scale: Scale | None = None
@@ -113,7 +113,7 @@ class Choices:
             )
 
     def verdict(self, gap_mm: float | None, u_mm: float | None) -> str:
-        """Whether a gap is within the limits, with regard to its uncertainty (ISO 14253-1).
+        """State whether a gap is within the limits, taking its uncertainty into account (ISO 14253-1).
 
         Parameters
         ----------

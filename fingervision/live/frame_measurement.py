@@ -19,7 +19,7 @@ class Seen:
     Parameters
     ----------
     frame : Frame
-        The picture.
+        The frame with its picture.
     outcome : GapMeasurement, NoGap or None
         Result of the measurement; None until the scale is known.
     row : GapRow or None

@@ -19,9 +19,10 @@ from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 
 FRAMES_KEPT = 16
-"""A page is sent the newest picture: half a second of readings at 25 frames a second is more than it asks for."""
+"""Number of frames whose readings are kept; pages only need the newest picture, and this number covers half a second at
+25 frames per second."""
 FRAMES_COUNTED = 100
-"""Of so many of the newest frames the page is told how many were measured without gauges."""
+"""Number of the most recent frames among which those measured without gauges are counted for the page."""
 
 
 class LiveGauges:

@@ -15,7 +15,7 @@ class Pen:
         self._holder: object = None
 
     def may_write(self, page: object) -> bool:
-        """Whether a page may write now."""
+        """Whether a page may change settings now."""
         return self._holder is None or self._holder is page
 
     def write(self, page: object) -> None:

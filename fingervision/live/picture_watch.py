@@ -16,7 +16,7 @@ class PictureWatch:
     Parameters
     ----------
     view : View
-        What is shown.
+        The live measurement or recording that is shown.
     """
 
     def __init__(self, view: View) -> None:

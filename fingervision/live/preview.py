@@ -47,7 +47,7 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """A message, and what the page has after receiving it."""
+    """A message, and the data that the page has after receiving this message."""
 
     content: bytes
     known: Known

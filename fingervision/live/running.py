@@ -166,7 +166,7 @@ def _announce(page: Page, outlet: Outlet, *, browser: bool) -> None:
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Whether a stream is a terminal with a person; a closed stream is not."""
+    """Whether a stream is an interactive terminal; a closed stream is not."""
     try:
         return stream is not None and stream.isatty()
     except ValueError:

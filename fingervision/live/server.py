@@ -37,7 +37,7 @@ DOOR = ".live_page.html"
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """Bind the address at which the page is served.
+    """Bind a socket to the address at which the browser page is served.
 
     Raises
     ------

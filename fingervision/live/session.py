@@ -36,7 +36,7 @@ FRAMES_UNTIL_HURRY = 1
 
 
 ROWS_SHOWN = 3000
-"""Rows that a page which comes new is sent: two minutes at 25 frames a second."""
+"""Number of rows that are sent to a new page: two minutes at 25 frames per second."""
 
 DrivenAt = Callable[[float | None], Driven | None]
 RowListener = Callable[[GapRow, float], None]

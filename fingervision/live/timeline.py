@@ -21,7 +21,7 @@ class Timeline:
         self._last: tuple[float, float, float] | None = None  # on the source's clock, on the host's, as given
 
     def cut(self) -> None:
-        """Record an interruption of the source, after which its clock may start again."""
+        """Record an interruption of the source, after which the clock of the source may start again."""
         self._offset_s = None
 
     def at(self, source_s: float, arrived_s: float) -> tuple[float, float]:

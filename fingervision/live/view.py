@@ -13,7 +13,7 @@ from fingervision.storage.gaps_csv import GapRow
 
 
 class View(Protocol):
-    """A live measurement or a recording, as used by the page and its commands.
+    """A live measurement or a recording, as used by the browser page and its commands.
 
     Attributes
     ----------

@@ -13,9 +13,9 @@ T = TypeVar("T")
 
 VARIABLE = "FINGERVISION_PLUGIN_SECONDS"
 USUAL_S = 20.0
-"""Importing a large library for the first time takes about ten seconds from a slow disk; twice that is not reached."""
+"""Default time limit in seconds: twice the time of the first import of a large library from a slow disk."""
 LET_END_S = 0.5
-"""Time to end in, once it was told to."""
+"""Time in which code must end after the exception was raised in it."""
 
 
 class OutOfTimeError(Exception):

@@ -7,14 +7,16 @@ from itertools import pairwise
 import numpy as np
 
 NOMINAL_S = 30.0
-"""Time from one row to the next where a table has none. A published log of a stage against a laser has 28.5 s from
-reading to reading: move, settle, average. Effects of a second and less are then rightly taken for unseen."""
+"""Assumed time between rows of a table without times. In a published log of a stage measured with a laser, the time
+between readings (move, settle, average) is 28.5 s. Effects with time constants of a second or less are then correctly
+treated as invisible."""
 SWAPPED = 0.75
-"""Share of the moves from target to target that go against the stated direction, above which the directions stand the
-wrong way round. Right, hardly any do: the way back of cycles in one direction, one in as many as there are targets."""
+"""Fraction of the moves between targets that contradict the stated direction, above which the directions are considered
+as interchanged. With correct directions, hardly any move contradicts: only the return of one-directional cycles, one
+move per number of targets."""
 LONGEST_OVERSHOOT_MM = 0.5
-"""Longest way beyond a target: the largest play that the catalogue knows. Shorter where the targets lie closer, so that
-no target is approached over a longer way than its neighbours."""
+"""Longest assumed overshoot beyond a target: the largest play in the catalogue of effects. The overshoot is shorter if
+the targets are closer together, so that it does not pass a neighbouring target."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ _FUNCTIONS: Mapping[str, Callable[[float], float]] = MappingProxyType(
     }
 )
 LARGEST = 1e5
-"""Nothing drawn is larger than 100 m, or has more degrees."""
+"""Largest number in a drawing: 100 m in mm, or as many degrees."""
 
 
 def number(raw: Any, names: Mapping[str, float], what: str) -> float:

@@ -3,18 +3,18 @@
 schema = 1
 port = "/dev/ttyACM0"
 force_rate_hz = 200                      # 1000 / n, at most 250; 200 if not given
-silence_ms = 80                          # without a word for so long the drive line drops; 10 to 95
-settle_ms = 5                            # from select to drive line; 0: in the same instant
+silence_ms = 80                          # time without a message after which the drive line drops; 10 to 95
+settle_ms = 5                            # time from select lines to drive line; 0: at the same instant
 [lines]
-select = ["D2", "D3", "D4", "D5"]        # bit 0 first; with drive on one port: D2-D7, D8-D13 or A0-A5
+select = ["D2", "D3", "D4", "D5"]        # bit 0 first; on one port with drive: D2-D7, D8-D13 or A0-A5
 drive = "D6"
-enable = "D7"                            # servo on, if the controller wants one
-hold = "D11"                             # made active when the drive line is dropped, if there is one
+enable = "D7"                            # servo on, if the controller needs it
+hold = "D11"                             # optional; made active when the drive line drops
 busy = "D8"
 alarm = "D9"
-in_position = "D10"                      # if there is one
+in_position = "D10"                      # optional
 force = "A0"                             # if there is a sensor; without select, drive, busy and alarm: a sensor only
-active_low = ["busy", "alarm"]           # lines whose low level means yes
+active_low = ["busy", "alarm"]           # lines whose low level means true
 """
 
 from pathlib import Path

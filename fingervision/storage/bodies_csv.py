@@ -1,6 +1,6 @@
 """The file bodies.csv: poses of a mechanism's bodies and angles of its hinges in every video frame.
 
-This module also adds such columns to gaps.csv.
+The same quantities can also be added to gaps.csv as columns.
 """
 
 import csv
@@ -16,8 +16,9 @@ COLUMNS = (
     "cov_x_y_mm2", "cov_x_angle_mm_mrad", "cov_y_angle_mm_mrad", "u_random_x_mm", "u_random_y_mm",
     "u_random_angle_mrad",
 )  # fmt: skip
-"""A row a body or hinge and frame; a hinge has an angle alone. `u_` and `cov_` hold everything that is known (where the
-drawing was laid, the calibration), `u_random_` the part that differs from frame to frame."""
+"""Columns; each row is one body or hinge in one frame, and a hinge has only an angle. The uncertainties `u_` and
+covariances `cov_` contain all known contributions (including alignment of the drawing and calibration), and `u_random_`
+only the part that differs from frame to frame."""
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 
 

@@ -12,10 +12,10 @@ from fingervision.storage.number_columns import Numbers, numbers_in
 
 UNITS = ("_mm", "_mrad")
 U_PREFIXES = ("u_random_", "u_")
-"""Standard uncertainties of a channel's readings: what differs from row to row where the table says it, else all of it,
-as with `u_random_mm` and `u_gap_mm` of the gap."""
+"""Prefixes of columns with standard uncertainties of a channel, in order of preference: the random part if the table
+states it, otherwise the total, as with `u_random_mm` and `u_gap_mm` of the gap."""
 NO_CHANNELS = ("held_mm", "target_mm", "encoder_mm", "u_force_n")
-"""Columns of the project's own tables that end so and are no channel."""
+"""Columns of fingervision's own tables whose names end like those of channels, but that are not channels."""
 
 
 def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:

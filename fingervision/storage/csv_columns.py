@@ -15,7 +15,8 @@ from fingervision.storage.number_block import number_block
 from fingervision.storage.plain_file import why
 
 CHUNK_LINES = 1000
-"""Lines that are taken apart at once: their cells stay in the cache. All at once take ten times the file in memory."""
+"""Number of lines that are split at a time, so that the cells fit into the cache; splitting all lines at once would
+need ten times the file's size in memory."""
 
 
 def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) -> dict[str, list[str]]:

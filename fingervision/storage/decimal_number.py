@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 def decimal_number(cell: str) -> float:
-    """Read a number.
+    """Read a decimal number from a table cell.
 
     Raises
     ------
@@ -21,7 +21,7 @@ def decimal_number(cell: str) -> float:
     >>> decimal_number("1_0")
     Traceback (most recent call last):
     ...
-    ValueError: 1_0 is no decimal number
+    ValueError: 1_0 is not a decimal number
     """
     if not are_decimal((cell,)):
         raise ValueError(f"{cell} is not a decimal number")

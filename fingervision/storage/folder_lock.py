@@ -21,7 +21,7 @@ class FolderLock:
     Parameters
     ----------
     path : Path
-        The folder.
+        The folder to lock.
 
     Raises
     ------

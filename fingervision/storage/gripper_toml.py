@@ -24,13 +24,14 @@ _MAY_BE_ANY_SIGN = frozenset({"lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "leve
                               "lever.hinge2_axis_deg", "lever.drive_face_y_mm",
                               "material.thermal_expansion_per_k"})  # fmt: skip
 _STATED = 1.05
-"""Of a drawn width: how far a stated one may be above it."""
+"""Largest ratio of a stated width to the width that follows from the drawing."""
 _MEET_MM = 0.02
 _METRES_BELOW_MM = 2.0
 _LEAST_DENSITY, _MOST_DENSITY = 30.0, 25000.0
-"""kg/m3: rigid foam and osmium lie between."""
+"""Plausible range of densities in kg/m3, which includes rigid foam and osmium."""
 _LEAST_YIELD_STRAIN, _MOST_YIELD_STRAIN = 1e-4, 0.1
-"""Lead yields at 5e-4, rubber-like polymers beyond 0.1: what lies outside is a modulus in another unit."""
+"""Plausible range of the yield strain: lead yields at 5e-4, rubber-like polymers at about 0.1; a value outside this
+range indicates a modulus in another unit."""
 _LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {
         "_mm": (1e-4, 1e5),

@@ -21,7 +21,7 @@ from fingervision.storage.plain_file import plain
 
 TARGET = "target_mm"
 QUANTITIES = {"position_mm": 1.0, "position_um": 1e-3, "deviation_mm": 1.0, "deviation_um": 1e-3}
-"""Columns of a reading and their factor to mm."""
+"""Names of the columns of readings, with the factor to convert each to mm."""
 FROM_BELOW = "+ +1 1 up u forward forwards fwd positive pos increasing ascending rising ↑"
 FROM_ABOVE = "- -1 down d backward backwards bwd reverse rev negative neg decreasing descending falling ↓"
 SIDES = dict.fromkeys(FROM_BELOW.split(), 1) | dict.fromkeys(FROM_ABOVE.split(), -1)
@@ -30,13 +30,13 @@ MATRIX = re.compile(
     r"(?P<side>[^\d\s_]+)_?(?P<cycle>\d+)_(?P<quantity>(?:position|deviation)_(?:mm|um))", re.IGNORECASE
 )
 FORWARD = {"forward", "forwards", "fwd"}
-"""Words that say along the axis to one author and towards its zero to another."""
+"""Ambiguous words for a direction: some authors mean along the axis, others towards its zero."""
 UNSIDED = "cycle"
 SMALLEST_TRAVEL = 0.05
-"""Range of the positions over that of the targets below which they are deviations under a wrong name."""
+"""Ratio of the range of positions to the range of targets below which the positions must be mislabelled deviations."""
 LARGEST_DEVIATION = 0.5
-"""Range of the deviations over that of the targets above which they are positions under a wrong name: no axis errs by
-half its travel."""
+"""Ratio of the range of deviations to the range of targets above which the deviations must be mislabelled positions,
+because no axis has an error of half its travel."""
 
 
 @dataclass(frozen=True, slots=True)

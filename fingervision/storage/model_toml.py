@@ -27,7 +27,7 @@ from fingervision.storage.plain_file import in_utf8, plain, why
 from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
-"""Key of the curve of a map of position errors: pairs of input and error, in mm."""
+"""Key of the curve of a position error map: pairs of input and error, in mm."""
 # A fit that ends at a bound may be beyond it by rounding.
 BOUND_SLACK = 1e-6
 

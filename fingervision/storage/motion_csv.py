@@ -20,7 +20,7 @@ def write_motion(
     *,
     symmetric: bool = False,
 ) -> None:
-    """Write one row per sample of the drive.
+    """Write a measured table with one row per sample of the drive.
 
     Parameters
     ----------

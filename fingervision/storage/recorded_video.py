@@ -61,7 +61,7 @@ class RecordedVideo:
             raise self._failed(error) from error
 
     def add(self, item: Frame | LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
-        """Write one frame.
+        """Write one frame to the file.
 
         Returns
         -------

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from fingervision.domain.response import Response
 
 POSE = ("x_mm", "y_mm", "angle_mrad")
-"""Of every body: displacement of the centroid of its area as drawn, and rotation from x (right) towards y (up)."""
+"""Pose columns of every body: displacement of the centroid of its area from the drawing, and rotation from x (right)
+towards y (up)."""
 
 
 def pose_columns(bodies: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:

@@ -2,9 +2,9 @@
 
 schema = 1
 name = "open and push"
-start_mm = 0.0                       # position before the first; 0 if not given
-sequence = [1, 2, 2]                 # order of running; each block once, by number, if not given
-[[step]]                             # block 1; `number = 3` leaves numbers out
+start_mm = 0.0                       # position before the first block; 0 if not given
+sequence = [1, 2, 2]                 # order of execution; if not given, each block once, by number
+[[step]]                             # block 1; a key such as `number = 3` sets another number
 target_mm = 5.0
 coordinates = "absolute"             # or "relative"; absolute if not given
 operation = "moving"                 # or "pushing", with pushing_force_n; moving if not given

@@ -20,9 +20,11 @@ MRAD = {
     **dict.fromkeys(("mdeg", "millidegree", "millidegrees"), float(np.pi) / 180.0),
     **dict.fromkeys(("arcsec", "″"), 1e3 * float(np.pi) / 648_000.0),
 }
-"""Units of angle as tables write them, in mrad. Not `grad`: German degrees and surveyors' gons are both called so."""
+"""Units of angle as written in tables, in mrad. `grad` is omitted, because it denotes degrees in German and gons in
+surveying."""
 BARE = frozenset({"mm", "um", "nm", "mrad", "urad", "µrad", "rad", "deg", "mdeg"})
-"""Units that may end a name without brackets: `in`, `m` and the like are parts of words there."""
+"""Units that are recognised at the end of a name without brackets; `in`, `m` and similar units would be ambiguous
+there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
 
 NEEDED = {"measured": ("input", "gap"), "drive": ("time", "input"), "simulation": ("input", "gap")}
-"""Roles that a table of each kind must have; left and right stand for the gap."""
+"""Roles that a table of each kind must have; left and right together can replace the gap."""
 WANTED = {
     "measured": ("time", "run", "left", "right", "force", "u_gap", "u_random"),
     "drive": ("run", "force"),
@@ -22,7 +22,7 @@ LENGTHS = ("input", "gap", "left", "right", "u_gap", "u_random", "target", "posi
 DIMENSION = {**dict.fromkeys(LENGTHS, "length"), "time": "time", "force": "force"}
 UNIT = {"length": "mm", "time": "s", "force": "n"}
 CANONICAL = {role: f"{role}_{UNIT[dimension]}" for role, dimension in DIMENSION.items()}
-"""Names of the columns in the project's own tables."""
+"""Names of the columns in fingervision's own tables, by role."""
 
 
 @dataclass(slots=True)

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 COMMENT_MARKS = ("#", "%", "//", "!", "'")
 NAMES = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma", None: "blanks"}
-"""Separators, likeliest first: one that stands in every line at all is hardly ever anything else than the separator."""
+"""Separators, most probable first: a mark of the first kinds that occurs in every line is almost always the
+separator."""
 BY_NAME = {"tab": "\t", "\t": "\t", ";": ";", "semicolon": ";", "|": "|", "bar": "|", ",": ",", "comma": ","}
 BY_NAME_OR_BLANK: dict[str, str | None] = {**BY_NAME, "blank": None, "blanks": None, " ": None}
 MISSING = frozenset(
     ["", "nan", "na", "n/a", "null", "none", "-", "--", "---", "#n/a", "#nv", "#na", "1.#qnan", "-1.#ind", "1.#ind"]
 )
-"""What programs write where there is no number (lower case)."""
+"""Texts that programs write for a missing number, in lower case."""
 NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
@@ -23,9 +24,9 @@ GROUPED = {
     ".": re.compile(r"[+-]?\d{1,3}([,' \u00a0\u202f]\d{3})+(\.\d+)?"),
     ",": re.compile(r"[+-]?\d{1,3}([.' \u00a0\u202f]\d{3})+(,\d+)?"),
 }
-"""Numbers whose thousands are set apart."""
+"""Patterns of numbers with thousands separators, by decimal mark."""
 THOUSANDS = {",": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+"), ".": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")}
-"""Numbers whose mark may set thousands apart as well as decimals."""
+"""Patterns of numbers whose mark may be either a thousands separator or a decimal mark."""
 DATE_LIKE = re.compile(r"[\d./\-]+([T ]\d.*)?|\d{1,2}:\d{2}(:\d{2}([.,]\d*)?)?( ?[AaPp][Mm])?Z?")
 MINUS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{NO-BREAK SPACE}": " "})
 SAMPLE_LINES = 2000

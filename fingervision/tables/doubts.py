@@ -14,20 +14,22 @@ from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import Question
 
 LEAST_RATIO, GREATEST_RATIO = 0.1, 100.0
-"""Range of the gap over that of the input. Compliant grippers have 0.3 to 50 (the paper's 10.4); a factor of 1000,
-which metres and micrometres called millimetres make, leads out of this range from anywhere in it."""
+"""Plausible ratio of the range of the gap to the range of the input. Compliant grippers have 0.3 to 50 (the published
+gripper 10.4); a factor of 1000, from metres or micrometres labelled as millimetres, always leads out of this range."""
 LEAST_INPUT_MM, GREATEST_INPUT_MM = 0.002, 300.0
-"""Range of the input. A stage's encoder resolves a micrometre; no micro-gripper is driven by a third of a metre."""
+"""Plausible range of the input. The encoder of a stage resolves a micrometre; no micro-gripper is driven by a third of
+a metre."""
 GREATEST_GAP_MM = 500.0
-"""Beyond any bench's picture."""
+"""Largest plausible gap, beyond the field of view of any such set-up."""
 LEAST_SPEED_MM_S, GREATEST_SPEED_MM_S = 2e-3, 50.0
 USUAL_STEPS_S = (1e-3, 1.0)
-"""Path of the input over its time while it moves, and time from row to row. Benches drive at 0.01 to 2 mm/s and record
-5 to 1000 rows a second: a thousand times slower (or faster) in both is another unit of time, or a log of hours, which
-the user may say."""
+"""Speed of the input during motions (mm/s) and time between rows (s). Usual set-ups move at 0.01 to 2 mm/s and record 5
+to 1000 rows per second; if both are slower (or faster) by a factor of a thousand, times have another unit, or the log
+spans hours, which the user may confirm."""
 FEWEST_FOR_SPEED = 20
 LEAST_OVERLAP = 0.5
-"""Share of the rows with a gap that have an input: fewer, and two records have hardly met."""
+"""Smallest fraction of the rows with a gap that should have an input; with a smaller fraction, the two records hardly
+overlap."""
 EPSILON_MM = 1e-9
 
 

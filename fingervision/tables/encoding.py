@@ -15,7 +15,7 @@ WESTERN = frozenset(
     "äöüÄÖÜßàâçéèêëîïôùûüÿæœÀÂÇÉÈÊËÎÏÔÙÛÜŸñÑáíóúÁÍÓÚ¿¡ìòÌÒãõÃÕåÅøØ°µ²³±·„…€§«»\xa0"
     "\u00d7\u2013\u2014\u2018\u2019\u201c\u201d"
 )
-"""Characters that a header in a Western language holds. Others show that the bytes are of another encoding."""
+"""Non-ASCII characters that are usual in Western languages; any other character indicates another encoding."""
 SAMPLE_BYTES = 65536
 
 

@@ -33,7 +33,7 @@ FROM_ABOVE = (
     "ab abwarts ruckwarts zuruck negativ arriere retour descente negatif vuelta atras negativo ritorno indietro"
 )
 OTHER_SIDES = dict.fromkeys(FROM_BELOW.split(), "up") | dict.fromkeys(FROM_ABOVE.split(), "down")
-"""Words of direction besides those of the project's own tables, without accents."""
+"""Words for directions besides those of fingervision's own tables, without accents."""
 CYCLES = frozenset(["cycle", "zyklus", "ciclo", "lauf", "run", "messreihe", "serie", "reihe", "i", "j"])
 ARROWS = {"↑": " up ", "↓": " down ", "→": " up ", "←": " down "}
 
@@ -200,7 +200,7 @@ def _quantity(
 def _length(
     raw: RawTable, names: Sequence[ColumnName], place: int, role: str, given: Entry, questions: list[Question]
 ) -> Numbers:
-    """Return a column of lengths, converted to mm."""
+    """Return a column of lengths converted to mm; open questions about its unit are added to `questions`."""
     column = raw.columns[place]
     unit = given.units.get(role) or column.unit or names[place].unit
     size = factor(unit, "length") if unit else None

@@ -24,7 +24,7 @@ WORDS = {
     "runs": ("restart", "one"),
     "date_order": ("dmy", "mdy", "ymd"),
 }
-"""Keys with a few words to choose from."""
+"""Keys whose value must be one of a few words."""
 TEXTS = ("encoding", "part")
 ACCEPTED = ("constant_input", "backward_time", "repeated_time", "sizes", "speed", "overlap", "unreadable_cells")
 KEYS = ("file", "as", "columns", "units", *WORDS, *TEXTS, "header_line", "accept")

@@ -74,7 +74,7 @@ class RawTable:
 
     @property
     def rows(self) -> int:
-        """Number of rows."""
+        """Number of rows in the table."""
         return len(self.columns[0]) if self.columns else 0
 
     def place(self, row: int) -> str:

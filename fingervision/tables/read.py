@@ -23,7 +23,7 @@ from fingervision.tables.understanding import Understood, understand
 
 TEXT_ENDINGS = ("", ".asc", ".csv", ".dat", ".log", ".lvm", ".out", ".prn", ".tab", ".tsv", ".txt")
 TABLE_ENDINGS = frozenset((*TEXT_ENDINGS, ".mat", ".parquet", ".tdms", ".xls", ".xlsm", ".xlsx"))
-"""How tables are named; a file of another name that cannot be read as one was most likely never meant to be."""
+"""File suffixes of tables; a file with another suffix that cannot be read as a table was probably named by mistake."""
 
 
 def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTable:

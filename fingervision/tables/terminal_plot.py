@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 WIDE, HIGH = 56, 10
-"""Characters; a braille character has two by four dots."""
+"""Width and height of the plot in characters; a braille character has two by four dots."""
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 EMPTY = 0x2800
 FINEST = 1e-12

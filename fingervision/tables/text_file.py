@@ -6,9 +6,9 @@ from fingervision.domain.errors import DataError, FingervisionError, InputFileEr
 from fingervision.tables.encoding import decode
 
 MOST_BYTES = 1_000_000_000
-"""Cells as text take about ten times their bytes in memory: more than a desktop has."""
+"""Largest size of a file, because cells as text need about ten times the size of the file in memory."""
 LONGEST_LINE = 1_000_000
-"""No table has a row of a million characters (a hundred thousand columns); a file without line ends has."""
+"""Longest line in characters; only a file without line ends, not a table, has longer lines."""
 
 
 def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:

@@ -12,16 +12,16 @@ from fingervision.tables.units import is_unit, known_unit
 from fingervision.tables.words import role_of
 
 HEADER_LINES = 6
-"""Lines above the numbers that are looked at for names and units."""
+"""Number of lines above the numbers that are searched for names and units."""
 LAST_REMARK = frozenset({"", "comment", "comments", "kommentar", "bemerkung", "commentaire", "comentario", "commento"})
-"""Names of a last column that rows may leave out."""
+"""Names of a last column that may be missing in rows."""
 
 LABEL_NAMES = frozenset({"long name", "long names"})
 LABEL_UNITS = frozenset({"unit", "units", "einheit", "einheiten"})
 LABEL_REMARKS = frozenset({"comment", "comments", "kommentar", "kommentare", "f(x)", "f(x)=", "sampling interval"})
-"""What stands in the first column of a worksheet's header rows, above an empty column (OriginLab's ASCII export)."""
+"""Labels in the first column of a worksheet's header rows (ASCII export of OriginLab), above an empty column."""
 ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
-"""A column's name in a line of its own (the data recorders of Physik Instrumente write `# NAME0 = ...`)."""
+"""Pattern of a line that names a single column (data recorders of Physik Instrumente write `# NAME0 = ...`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
 
 
 def _all_units(cells: Sequence[str]) -> bool:
-    """Whether a line contains only units, and at least one."""
+    """Whether a line contains only units and empty cells, with at least one unit."""
     # `t` is a name and a tonne, `s` a second: a word of a role is a name only beside others that are.
     return any(cells) and all(is_unit(cell) for cell in cells) and sum(role_of(cell) is not None for cell in cells) == 0
 

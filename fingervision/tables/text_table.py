@@ -27,9 +27,11 @@ from fingervision.tables.text_header import HEADER_LINES, Header, find_header, f
 NUMBER_BEGINS = frozenset("0123456789+-., \t")
 BETWEEN = re.compile(r"[\s,;|]+")
 MOST_PROSE = 0.5
-"""Share of the lines that may be words: a logger's notes between the rows are fewer, a text's lines nearly all are."""
+"""Largest fraction of lines without numbers: notes of a logger between the rows are fewer, whereas nearly all lines of
+a prose text are such lines."""
 MOST_ODD = 0.05
-"""Share of rows that may have another number of cells: more are not a logger's hiccup but a wrong separator."""
+"""Largest fraction of rows with another number of cells; a larger fraction indicates a wrong separator instead of
+occasional errors of a logger."""
 
 
 def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str) -> RawTable:

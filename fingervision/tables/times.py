@@ -17,7 +17,7 @@ STAMP = re.compile(
     r"(?P<day>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T,;]?\s*(?P<clock>\d{1,2}:\d{2}\S*(?:\s*[AaPp]\.?[Mm]\.?)?)?"
 )
 USUAL = re.compile(r"(\d[\d./-]*)[T ](\d{1,2}):(\d\d):(\d\d)(?:[.,](\d+))?")
-"""A date and time as most programs write it."""
+"""Pattern of a date and time as most programs write them."""
 ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
 DAY_S = 86400.0
 HALF_DAY_S = 43200.0
@@ -154,7 +154,7 @@ def _clock(text: str) -> float | None:
 
 
 def _offset(zone: str) -> float:
-    """Seconds by which a time zone is ahead of UTC."""
+    """Number of seconds by which a time zone is ahead of UTC."""
     if zone == "Z":
         return 0.0
     sign = -1.0 if zone[0] == "-" else 1.0

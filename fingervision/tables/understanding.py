@@ -20,9 +20,10 @@ from fingervision.tables.times import is_epoch, looks_like_time, seconds_of
 from fingervision.tables.units import factor, known_unit, spelled
 
 DATE = "date"
-"""Stands for the unit of times that are written as dates or times of day."""
+"""Word used as the unit of times that are written as dates or times of day."""
 MOST_UNREAD = 0.05
-"""Share of a column's cells that may be no numbers (a logger's ERR): more are asked about."""
+"""Largest fraction of a column's cells that may not be numbers (such as ERR of a logger) without a question to the
+user."""
 
 
 @dataclass(frozen=True, slots=True)

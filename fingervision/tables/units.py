@@ -34,10 +34,10 @@ WRITTEN = {
     "kgf": "kgf",
     "lbf": "lbf",
 }
-"""Units by the words that stand for them, in lower case."""
+"""Units, each with the words and symbols that denote it, in lower case."""
 BY_WORD = {word: unit for unit, words in WRITTEN.items() for word in words.split()}
 CASE_TELLS = {"Mm": None, "MN": None}
-"""Spellings that mean something else than their lower case; they are asked about."""
+"""Spellings whose meaning differs from that of their lower case; the user is asked about their meaning."""
 NO_UNIT = frozenset({"", "-", "1", "[-]", "\u2013", "none", "n/a"})
 
 

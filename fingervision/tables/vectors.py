@@ -10,7 +10,7 @@ from fingervision.storage.number_columns import Numbers
 from fingervision.tables.raw_table import RawColumn
 
 WIDEST = 200
-"""A matrix with more columns is a picture."""
+"""Largest number of columns of a matrix; a wider matrix is considered as a picture."""
 
 
 def is_numeric(value: Any) -> bool:

@@ -37,7 +37,7 @@ BESIDE = (
     "2 3 4"
 )
 FILLERS = frozenset(BESIDE.split())
-"""Words beside one with a role that do not change it."""
+"""Filler words, which do not change the role of the other words in a name."""
 MEASUREMENT = (
     "experiment experimental experimentell exp measured measurement measurements messung gemessen mesure mesures "
     "medido medicion misura misurato test versuch essai"
@@ -49,7 +49,7 @@ SIMULATION = (
     "rechnung calculated berechnet solidworks"
 )
 OF_SIMULATION = frozenset(SIMULATION.split())
-"""What a column of gaps is called after, where several sources stand side by side."""
+"""Words that denote the source of a column of gaps in tables with several sources."""
 BY_TOKEN = {word: role for role, words in ROLES.items() for word in words.split()}
 
 

@@ -10,15 +10,15 @@ failure is reported by a sentence that states what the part must do and what it 
     class TestCreepingFoot(EffectContract):
         effect = EFFECT
 
-| part | class | what it is given |
+| part | class | attributes to define |
 |---|---|---|
 | effect | `EffectContract` | `effect`: a `DriveEffect` or `PointEffect` |
-| effect, by a whole diagnosis | `HiddenEffectContract` | `effect`, and `values` where you know better |
+| effect, by a whole diagnosis | `HiddenEffectContract` | `effect`; optionally `values` instead of the default ones |
 | model | `ModelContract` | `kind`: a module or object with `KIND` and `build(gripper, physics, theory)` |
-| frame source | `FrameSourceContract` | `kind`: with `accepts` and `open_frames`; `name`: what it opens |
-| actuator | `ActuatorContract` | `open_bed()`: a bed that has it |
-| force sensor | `ForceSensorContract` | `open_bed()`: a bed that has it |
-| camera | `CameraContract` | `open_bed()`: a bed that has it |
+| frame source | `FrameSourceContract` | `kind`, with `accepts` and `open_frames`; `name` of a recording that it opens |
+| actuator | `ActuatorContract` | `open_bed()`: a test bed with the actuator |
+| force sensor | `ForceSensorContract` | `open_bed()`: a test bed with the sensor |
+| camera | `CameraContract` | `open_bed()`: a test bed with the camera |
 
 The simplest way to open a test bed is from its file: `open_bed = lambda self: fingervision.testing.bed_at("bed.toml")`.
 This package does not import pytest. Without pytest, `run(EffectContract, effect=EFFECT)` runs all tests and returns a

@@ -15,13 +15,14 @@ from fingervision.testbed.reading import Reading
 from fingervision.testing.contract import NotApplicable, hold
 
 WAIT_S, PATIENCE_S = 0.01, 10.0
-"""Between two questions for a position; after so long a motion of a millimetre counts as endless."""
+"""Time between two requests for a position, and time after which a motion of a millimetre is considered as endless."""
 SPEED_MM_S, SLOW_MM_S, FAR_MM = 2.0, 0.5, 5.0
 STOPS_WITHIN_S = 0.5
-"""A motor that brakes from 0.5 mm/s stands in a tenth of it; an answer over a slow line takes the rest."""
+"""Longest time to stop; a motor brakes from 0.5 mm/s in a tenth of this time, and the rest is for a response over a
+slow line."""
 ROUNDING_MM = 1e-6
-"""A nanometre: what numbers lose on their way. What a real stage needs beyond, its limits declare: accuracy_mm,
-encoder_step_mm, repeatability_mm and settling_s."""
+"""Tolerance of one nanometre for rounding errors of transmitted numbers. The limits of a real stage declare all further
+tolerances: accuracy_mm, encoder_step_mm, repeatability_mm and settling_s."""
 
 
 def bed_at(path: str | Path) -> Bed:
@@ -83,7 +84,7 @@ class ActuatorContract(_BedContract):
                 )
 
     def test_a_motion_takes_the_time_that_its_speed_says(self) -> None:
-        """The duration of a motion agrees with its speed within the accuracy at either end, by the actuator's clock."""
+        """By the actuator's clock, a motion's duration agrees with its speed within the accuracy of its end points."""
         self._needs_motor()
         with self._bed() as bed:
             before = bed.actuator.readings()[-1:]

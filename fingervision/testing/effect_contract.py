@@ -13,9 +13,10 @@ from fingervision.plugins.faults import MisfitError
 from fingervision.testing.contract import NotApplicable, hold
 
 ROUNDING_MM = 1e-9
-"""A few operations on numbers of some millimetres."""
+"""Tolerance for rounding errors of a few operations on numbers of some millimetres."""
 SHOWS = 1e-3
-"""Change in mm or N, three tenths of the way through the range of each parameter: less than a good camera sees."""
+"""Smallest change (mm or N) by which an effect counts as visible at usual parameter values; it is smaller than a good
+camera can detect."""
 MIDLINE_MM = 0.3
 GAIN, REST_GAP_MM = 7.7, 4.0
 INPUT_MM = np.array([-0.6, 1.6])

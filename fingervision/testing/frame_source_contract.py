@@ -9,7 +9,7 @@ from fingervision.frames.source import Description, FrameSource, SourceKind, Wis
 from fingervision.testing.contract import NotApplicable, hold
 
 LOOKED_AT = 8
-"""Frames: a live source has no end."""
+"""Number of frames that are tested, because a live source has no end."""
 NOWHERE = ("nowhere/nothing.xyz", "no such recording")
 
 

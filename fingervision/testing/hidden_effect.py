@@ -17,10 +17,10 @@ from fingervision.models.table import TableModel
 from fingervision.testing.contract import NotApplicable, hold
 
 NOISE_MM = 5e-4
-"""Random noise of an ordinary bench (0.02 px at 34 px/mm)."""
+"""Random noise of an ordinary set-up (0.02 px at 34 px/mm)."""
 SHARE_OF_SIZE, SHARE_OF_SHAPE = 0.3, 0.382
-"""Where a parameter is hidden between its bounds. A size stands well away from its neutral value; a shape stands off
-the middle (at the golden section), where the only value that is tried by default lies."""
+"""Position of a hidden parameter between its bounds, as a fraction of the range. A size is well away from its neutral
+value; a shape is at the golden section, away from the middle, which is the only value tried by default."""
 
 
 def made_up_history() -> History:

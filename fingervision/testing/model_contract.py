@@ -9,7 +9,7 @@ from fingervision.testbed.simulation.sample_gripper import sample_gripper
 from fingervision.testing.contract import hold
 
 RELATIVE = 1e-6
-"""Of the figures beside the answer: both are of the same small displacements."""
+"""Relative tolerance between stated figures and the model's response; both are for the same small displacements."""
 
 
 class ModelContract:

@@ -10,9 +10,10 @@ from fingervision.live.frame_measurement import Seen
 from fingervision.live.view import View
 
 GREATEST = 10**12
-"""No number that the page may ask for is larger; comparing is safe where converting is not (nan is not below it)."""
+"""Largest number in a request; the comparison with this limit is safe for any value, including NaN, whereas a
+conversion is not."""
 MOST_LETTERS = 1000
-"""Of a text that the page may give: a path, a name."""
+"""Largest length of a text in a request, such as a path or a name."""
 
 
 @dataclass(frozen=True, slots=True)

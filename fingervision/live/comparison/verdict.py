@@ -57,9 +57,9 @@ class VerdictSeeker:
     Parameters
     ----------
     model : Path
-        Any model that `diagnose` takes.
+        File of any model that `diagnose` accepts.
     kind : str
-        Which model answers for a gripper.toml.
+        Kind of model to build from a gripper.toml.
     range_mm : (float, float)
         Smallest and largest input of the model.
     out : Path

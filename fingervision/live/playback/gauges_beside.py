@@ -8,7 +8,7 @@ from fingervision.live.playback.gauge_following import GaugeFollowing
 from fingervision.live.playback.playback import Playback
 
 GAUGES = "gauges"
-"""Name of the feature."""
+"""Name of this addition in the features of a view."""
 
 
 class Follows(Protocol):

@@ -16,7 +16,7 @@ from fingervision.tables.raw_table import RawTable
 
 PROGRAM = "import sys; sys.path[:] = {path!r}; from fingervision.tables.formats._apart import serve; serve()"
 SHOWN = 300
-"""Characters of what a failed process said."""
+"""Number of characters of the output of a failed process that the error message shows."""
 
 
 def read_apart(name: str, path: Path, given: Entry) -> RawTable:

@@ -19,7 +19,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_AT = (0, 512)
 MOST_BYTES = 2_000_000_000
 MOST_VALUES = 50_000_000
-"""In one variable; a bench's tables have a million rows."""
+"""Largest number of values in one variable; usual tables have up to a million rows."""
 DEEPEST = 4
 NOT_NUMBERS = frozenset({b"cell", b"function_handle", b"char", b"table", b"timetable", b"timeseries", b"string"})
 

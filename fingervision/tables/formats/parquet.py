@@ -17,7 +17,7 @@ IN_OWN_PROCESS = True
 MOST_ROWS = 20_000_000
 MOST_UNPACKED_BYTES = 4_000_000_000
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-"""Of Arrow's units of time."""
+"""Seconds per unit of time in Arrow."""
 
 
 def recognises(path: Path, head: bytes) -> bool:

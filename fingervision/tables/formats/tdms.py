@@ -20,7 +20,7 @@ from fingervision.tables.vectors import numbers
 ORDER = 50
 MOST_VALUES = 50_000_000
 WORDS = 200
-"""Characters of a warning that are told."""
+"""Number of characters of a warning that are reported."""
 UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 
 

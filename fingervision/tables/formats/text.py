@@ -18,7 +18,7 @@ OTHERS = {
     b"\x1a\x45\xdf\xa3": "a video: name the table",
     b"SQLite format": "a database: export the table as .csv",
 }
-"""First bytes of what is often named by mistake."""
+"""First bytes of other kinds of files that users often name by mistake."""
 
 
 def recognises(path: Path, head: bytes) -> bool:
