@@ -184,7 +184,7 @@ def test_results_and_recordings_may_move_together(run: Run, copy: Path, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "code", "sentence"),
     [
-        (("rec/nothing*.mkv", *ALONE), 1, "nothing matches rec/nothing*.mkv: check the path"),
+        (("rec/nothing*.mkv", *ALONE), 1, "No file matches rec/nothing*.mkv: check the path"),
         (("rec/a/good.mkv",), 2, "The scale must be given, but is not"),
         (("rec/a/good.mkv", *ALONE, "--roi", "1,2"), 2, "--roi must be four whole numbers"),
         (("rec/a/good.mkv", "--calibration", "nix.json"), 1, "There is no file nix.json"),

@@ -10,7 +10,7 @@ from fingervision.storage.csv_columns import read_columns
 
 def test_a_column_that_stands_twice_is_refused(tmp_path: Path) -> None:
     (tmp_path / "table.csv").write_text("input_mm,gap_mm,gap_mm\n0,1,2\n")
-    with pytest.raises(FingervisionError, match="gap_mm stands twice"):
+    with pytest.raises(FingervisionError, match="gap_mm occurs twice"):
         read_columns(tmp_path / "table.csv", ("input_mm", "gap_mm"), ())
 
 

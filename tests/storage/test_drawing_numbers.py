@@ -58,7 +58,7 @@ def test_a_leafs_thickness_counts_three_times(tmp_path: Path) -> None:
         ("{ value = 0.8, u = -0.1 }", "The uncertainty of lengths.t in .* must be a number that is not negative"),
         ("{ value = 0.8, u = nan }", "The uncertainty of lengths.t in"),
         ('{ value = 0.8, u = "1 %" }', "The uncertainty of lengths.t in"),
-        ("{ value = [0.8, 1.0], u = 0.1 }", "must belong to a single number"),
+        ("{ value = [0.8, 1.0], u = 0.1 }", "can be given for a single number only"),
     ],
 )
 def test_a_wrong_uncertainty_is_one_sentence(tmp_path: Path, value: str, sentence: str) -> None:

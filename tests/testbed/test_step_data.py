@@ -94,7 +94,7 @@ def test_sixteen_steps_are_refused(tmp_path: Path) -> None:
     step = "[[step]]\ntarget_mm = 1.0\nload_kg = 0.1\npositioning_time_s = 1.0\n"
     said = sentence_of(tmp_path / "steps.toml", "schema = 1\n" + 16 * step)
     assert said == (
-        f"{tmp_path / 'steps.toml'} must hold 1 to 15 tables [[step]], which is what the controller keeps, "
+        f"{tmp_path / 'steps.toml'} must hold 1 to 15 tables [[step]], which is how many the controller stores, "
         "but holds 16."
     )
 
