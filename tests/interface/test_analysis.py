@@ -72,6 +72,26 @@ def test_several_models_are_told_apart_by_name() -> None:
         fv.compare(MEASURED, [])
 
 
+def test_a_required_effect_that_is_hardly_there_is_measured_beside_two_that_are() -> None:
+    """A play of 0.05 mm and an offset of 0.05 mm; a scale of the input that is asked for is zero within its U."""
+    rng, play_mm, slope = np.random.default_rng(4), 0.05, 5.0
+    input_mm = 0.4 - 0.4 * np.cos(np.linspace(0.0, 4.0 * np.pi, 240))
+    passed_on, at_mm = [], input_mm[0] + 0.5 * play_mm
+    for place_mm in input_mm:
+        at_mm = min(max(at_mm, place_mm - 0.5 * play_mm), place_mm + 0.5 * play_mm)
+        passed_on.append(at_mm)
+    gap_mm = 2.05 + slope * np.array(passed_on) + rng.normal(0.0, 0.001, input_mm.size)
+    measured = {"input_mm": input_mm, "gap_mm": gap_mm, "time_s": 0.04 * np.arange(input_mm.size)}
+    model = {"input_mm": [-1.0, 0.0, 2.0], "gap_mm": [2.0 - slope, 2.0, 2.0 + 2.0 * slope]}
+    found = fv.diagnose(measured, model, with_effects=["input_scale"])
+    by_name = {effect.name: effect.parameters for effect in found.effects}
+    assert by_name.keys() >= {"input_scale", "backlash"}
+    (ratio,), (play,) = by_name["input_scale"].values(), by_name["backlash"].values()
+    assert abs(ratio.value) < 3.0 * ratio.u
+    assert play.value == pytest.approx(play_mm, abs=3.0 * play.u)
+    assert np.std(found.residual_after_mm["gap"]) < 0.002
+
+
 def test_the_corrected_model_answers_and_is_written(tmp_path: Path) -> None:
     found = fv.diagnose(table(0.02), SIMULATION, with_effects=["rest_gap_error"])
     assert {effect.name for effect in found.effects} == {"rest_gap_error"}

@@ -306,13 +306,17 @@ def _findings(state: _State, forced: frozenset[str]) -> Findings:
 
 
 def _insisted(state: _State, forced: frozenset[str]) -> _State:
-    """Choose the best explanation that contains every effect that the user requires."""
+    """Choose the best explanation that contains every effect that the user requires.
+
+    The required effects are also added to the best explanation that was found without them: one that is hardly there
+    beside two others is in none of the explanations with two effects that fit.
+    """
     problem = state.problem
     able = forced & set(problem.effects)
-    holding = [explanation for explanation in [*state.singles, *state.pairs] if able <= set(explanation.names)]
-    if holding or not able:
-        best = likeliest(holding, state.values) if able else problem.nothing()
-    else:
-        begin = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able}
-        best = fit(problem, tuple(begin), begin, iterations=20)
-    return replace(state, best=best, imitation=None)
+    if not able:
+        return replace(state, best=problem.nothing(), imitation=None)
+    found = [*state.singles, *state.pairs, *state.triples]
+    holding = [explanation for explanation in found if able <= set(explanation.names)]
+    begin = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able} | dict(state.best.values)
+    together = fit(problem, tuple(begin), begin, iterations=20)
+    return replace(state, best=likeliest([*holding, together], state.values), imitation=None)
