@@ -88,7 +88,9 @@ def motion_asked(
     if film and modes is None:
         raise UsageError("--film needs --modes: it shows the modes in motion.")
     if rate_hz is not None and drive is None:
-        raise UsageError("--rate-hz needs --drive: it is the rate of response.csv.")
+        raise UsageError(
+            "--rate-hz sets the rows a second of response.csv, which is written only with --drive: add --drive."
+        )
     return MotionAsked(
         None if drive is None else at_rate(read_drive(drive, columns), rate_hz),
         None if modes is None else parse_modes(modes),

@@ -96,5 +96,5 @@ def _password(file: Path) -> str:
     except (OSError, UnicodeDecodeError) as error:
         raise InputFileError(f"The password cannot be read from {file}: give a text file.") from error
     if len(words) < LEAST_LETTERS:
-        raise DataError(f"The password in {file} must have at least {LEAST_LETTERS} letters, but has {len(words)}.")
+        raise DataError(f"The password in {file} must have at least {LEAST_LETTERS} characters, but has {len(words)}.")
     return words

@@ -105,8 +105,8 @@ class PaperDamping:
         relative = rad_s / reference_rad_s
         if np.any(relative < 1.0 - 1e-9):
             raise ModelError(
-                f"Equation (4) damps negatively below its reference frequency, {reference_rad_s:g} rad/s, "
-                f"but the lowest mode is at {rad_s.min():g} rad/s; lower the reference to it."
+                f"The paper's damping, equation (4), is negative below its reference frequency, {reference_rad_s:g} "
+                f"rad/s, but the lowest mode is at {rad_s.min():g} rad/s; lower the reference to that frequency."
             )
         return checked(np.array([0.5 * self.gamma * paper_rate(w) / w for w in relative.tolist()]))
 

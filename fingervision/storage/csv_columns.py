@@ -129,8 +129,8 @@ def _cells(path: Path, text: str) -> Iterator[list[str]]:
         yield from reader
     except csv.Error as error:
         raise DataError(
-            f"{path} must be a CSV table, but its quotes cannot be read, by line {reader.line_num} ({error}): close or "
-            "remove the quote."
+            f"{path} must be a CSV table, but a quote at or before line {reader.line_num} cannot be read "
+            f"({error}): close or remove it."
         ) from error
 
 

@@ -161,7 +161,7 @@ def _number(raw: Any, name: str, origin: str) -> float:
     try:
         value = float(raw)
     except OverflowError:
-        raise DataError(f"{name} in {origin} must be a finite number, but has {len(str(raw))} digits.") from None
+        raise DataError(f"{name} in {origin} is too large a number: it has {len(str(raw))} digits.") from None
     unit = next((unit for unit in _LIMITS if name.endswith(unit)), "")
     lowest, highest = _LIMITS.get(unit, (0.0, math.inf))
     if abs(value) > highest or 0.0 < value < lowest:

@@ -151,7 +151,7 @@ def test_a_mechanism_moves_too(tmp_path: Path) -> None:
         (("--modes", "many"), r"--modes must be"),
         (("--modes", "1e9Hz"), r"--modes must end within"),
         (("--film",), r"--film needs --modes"),
-        (("--rate-hz", "100"), r"--rate-hz needs --drive"),
+        (("--rate-hz", "100"), r"--rate-hz sets the rows a second of response.csv"),
         (("--damping", "wood"), r"--damping must be modal"),
     ],
 )

@@ -56,7 +56,10 @@ def refused(*arguments: str | Path) -> FingervisionError:
             "--host must be an address of this machine",
         ),
         (("simulated", "--host", "0.0.0.0"), "--host 0.0.0.0 lets other machines connect, which needs a password"),
-        (("simulated", "--password-file", "short"), "The password in short must have at least 12 letters, but has 3."),
+        (
+            ("simulated", "--password-file", "short"),
+            "The password in short must have at least 12 characters, but has 3.",
+        ),
         (("simulated", "--password-file", "missing"), "The password cannot be read from missing"),
         (("simulated", "--tls-cert", "password"), "TLS needs both --tls-cert and --tls-key"),
         (("simulated", "--tls-cert", "missing", "--tls-key", "missing"), "There is no file missing"),

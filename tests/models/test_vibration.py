@@ -26,7 +26,7 @@ def test_equation_4_by_mode(w: float) -> None:
 
 def test_equation_4_damps_negatively_below_one() -> None:
     assert paper_rate(0.5) == pytest.approx(-19.5, rel=0.01)
-    with pytest.raises(FingervisionError, match="damps negatively below its reference frequency, 300 rad/s, but the"):
+    with pytest.raises(FingervisionError, match="is negative below its reference frequency, 300 rad/s, but the"):
         PaperDamping(300.0).ratios(np.array([280.0, 2000.0]))
 
 

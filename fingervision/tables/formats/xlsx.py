@@ -73,9 +73,9 @@ def _check_archive(path: Path) -> None:
         shared = sum(info.file_size for info in infos if "sharedStrings" in info.filename)
         if total > MOST_UNPACKED_BYTES or shared > MOST_SHARED_BYTES:
             raise DataError(
-                f"{path} must unpack to at most {MOST_UNPACKED_BYTES / 1e6:.0f} MB ({MOST_SHARED_BYTES / 1e6:.0f} MB "
-                f"of it texts), but would unpack to {total / 1e6:.0f} MB ({shared / 1e6:.0f} MB): save the table as "
-                "CSV or Parquet."
+                f"{path} must unpack to at most {MOST_UNPACKED_BYTES / 1e6:.0f} MB, at most "
+                f"{MOST_SHARED_BYTES / 1e6:.0f} MB of them texts, but would unpack to {total / 1e6:.0f} MB with "
+                f"{shared / 1e6:.0f} MB of texts: save the table as CSV or Parquet."
             )
         for info in infos:
             if info.filename.endswith((".xml", ".rels")):
