@@ -129,6 +129,10 @@ def test_turning_points_are_found_and_their_frames_shown(tmp_path: Path) -> None
     strip = strip_html(table)
     assert strip.count("<img") == len(turns)
     assert f"gap {turns[1].gap_mm:.3f} mm" in strip
+    # Moved away from the recording, the table still knows where it was measured.
+    elsewhere = tmp_path / "results" / "of" / "today"
+    shutil.copytree(table.parent, elsewhere)
+    assert strip_html(elsewhere / "gaps.csv") == strip
     recording.write_bytes(recording.read_bytes()[:-1])
     assert "<img" not in strip_html(table)  # another file of the same name is no witness
 

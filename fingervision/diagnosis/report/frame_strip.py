@@ -58,7 +58,8 @@ def strip_html(table: Path) -> str:
     if recording is None:
         return (
             "<p>No frames: they are shown where the measured table is a gaps.csv with its summary.json, and the "
-            "recording lies in the same folder, the one above, or the one in which the command runs.</p>"
+            "recording lies where summary.json says, in the same folder, the one above, or the one in which the "
+            "command runs.</p>"
         )
     turns = _decoded(recording, turning_rows(table))
     shown = "".join(
@@ -110,8 +111,9 @@ def _recording_of(table: Path) -> Path | None:
         return None
     if not isinstance(name, str) or not isinstance(sha256, str):
         return None
-    for folder in (table.parent, table.parent.parent, Path()):
-        path = folder / Path(name).name
+    beside = [folder / Path(name).name for folder in (table.parent, table.parent.parent, Path())]
+    # Also where the summary says, seen from here or from its folder; only a file with the stated hash is shown.
+    for path in (Path(name), table.parent / name, *beside):
         if path.is_file():
             with path.open("rb") as file:
                 if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
