@@ -151,3 +151,17 @@ def test_the_camera_response_comes_back(tmp_path: Path, is_standard: bool) -> No
     assert read.camera_response.light == pytest.approx(response.light)
     assert read.response_known
     assert read.response_shift_px == pytest.approx(0.41)
+
+
+def test_a_file_without_limits_is_said_to_have_none(tmp_path: Path) -> None:
+    plain = {"schema": 1, "px_per_mm": 28.3, "u_px_per_mm": 0.1, "edge_bias_px": 0.0, "u_edge_bias_px": 0.35}
+    plain |= {"covariance": [[0.01, 0.0], [0.0, 0.1225]], "frame_width": 640, "frame_height": 480}
+    (tmp_path / "bare.json").write_text(json.dumps(plain), encoding="utf-8")
+    read = read_calibration(tmp_path / "bare.json")
+    assert read.states_no_limits
+    assert read.how_stated("plane_mm", "mm") == "0 mm (not in the calibration file)"
+    plain["budget"] = {"limits": {"plane_mm": {"value": 0.5, "stated": True}}}
+    (tmp_path / "limited.json").write_text(json.dumps(plain), encoding="utf-8")
+    limited = read_calibration(tmp_path / "limited.json")
+    assert not limited.states_no_limits
+    assert limited.how_stated("plane_mm", "mm") == "+-0.5 mm (stated)"
