@@ -6,7 +6,7 @@ import click
 
 from fingervision.cli._live_choices import choices_of
 from fingervision.cli._where_to_measure import where_to_measure
-from fingervision.cli.live import USUAL_OUT, USUAL_PORT
+from fingervision.cli.live import USUAL_OUT, port_of_page
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -38,13 +38,7 @@ USUAL_GAUGES = Path("gauges.toml")
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Folder for what the browser page measures.  [default: live]"
 )
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=USUAL_PORT,
-    show_default=True,
-    help="Port of the page; 0: any free port.",
-)
+@port_of_page
 @click.option("--no-browser", is_flag=True, help="Print the page's address, but open no browser.")
 @where_to_measure
 def command(

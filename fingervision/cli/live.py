@@ -36,6 +36,13 @@ Settings requested from a camera are read back; a setting that the camera did no
 asked to keep exposure, focus and white balance constant.
 """
 USUAL_OUT, USUAL_PORT = Path("live"), 8025
+port_of_page = click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=USUAL_PORT,
+    show_default=True,
+    help="Port of the page; 0: any free port.",
+)
 
 
 @click.command(epilog=EXAMPLES)
@@ -46,13 +53,7 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.option("--no-page", is_flag=True, help="Open no browser page; print gap, status and rate in the terminal.")
 @click.option("--json", "as_json", is_flag=True, help="Print one line of JSON per frame, with the columns of gaps.csv.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Network address at which the page is served.")
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=USUAL_PORT,
-    show_default=True,
-    help="Port of the page; 0: any free port.",
-)
+@port_of_page
 @click.option(
     "--password-file",
     type=click.Path(path_type=Path),
