@@ -11,6 +11,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     LEAST_GAIN,
     Progress,
     added_share,
+    beyond_the_input,
     different,
     extended,
     likeliest,
@@ -220,13 +221,14 @@ def _two_effects(state: _State, progress: Progress) -> _State:
     pairs = [e for e in swapped(problem, state.atoms, pairs) if not within_a_step(problem, e)]
     state = replace(state, pairs=pairs)
     # Beside a simpler form a second effect would gain what the richest has gained already.
-    if not pairs:
+    shown = beyond_the_input(problem, singles[0], pairs)
+    if not shown:
         return state
-    large = added_share(problem, singles[0], pairs[0]) > SMALL_SHARE
-    if (large or any(_completes(state, singles[0], pair) for pair in pairs[:LIKELIEST])) and state.speaks_for(
-        pairs, singles[0]
+    large = added_share(problem, singles[0], shown[0]) > SMALL_SHARE
+    if (large or any(_completes(state, singles[0], pair) for pair in shown[:LIKELIEST])) and state.speaks_for(
+        shown, singles[0]
     ):
-        return replace(state, best=likeliest(pairs[:LIKELIEST], state.values), peers=pairs)
+        return replace(state, best=likeliest(shown[:LIKELIEST], state.values), peers=shown)
     return state
 
 
@@ -238,7 +240,7 @@ def _three_effects(state: _State, progress: Progress) -> _State:
     bases = different(problem, pairs, PAIRS_EXTENDED)
     asked = None if state.evidence is None else state.evidence.thresholds
     tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH, asked=asked)
-    triples = [e for e in tried if not within_a_step(problem, e)]
+    triples = beyond_the_input(problem, state.best, [e for e in tried if not within_a_step(problem, e)])
     state = replace(state, triples=triples)
     if not triples:
         return state
@@ -250,7 +252,8 @@ def _three_effects(state: _State, progress: Progress) -> _State:
         # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
         return replace(state, imitation=imitation) if large else state
     triples.sort(key=lambda e: e.bic(state.values))
-    triples = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
+    again = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
+    triples = beyond_the_input(problem, state.best, again) or triples
     return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST], state.values), peers=triples)
 
 
