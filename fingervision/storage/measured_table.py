@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
+from fingervision.storage.assumed_response import response_note_beside
 from fingervision.storage.channel_columns import channels_of, read_channels
 from fingervision.storage.csv_columns import read_block, read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
@@ -136,6 +137,7 @@ def measured_rows(
             )
     if len(runs) == 1:
         notes.append("there is one run only: it cannot tell a re-zeroing of the bench from an offset.")
+    notes += response_note_beside(path)
     return MeasuredTable(
         input_mm=column["input_mm"],
         gap_mm=gap,
