@@ -122,9 +122,8 @@ class Problem:
     def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
         """-2 log of the posterior up to a constant, marginalised over the spreads of the run offsets."""
         residual = self.measured - self.whitened(settings)
-        sigma, penalty = self.offsets.spread(residual)
-        metric = self.offsets.metric(sigma)
-        return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
+        sigma, penalty, doubt = self.offsets.spread_and_doubt(residual)
+        return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty + doubt
 
     def nothing(self) -> Explanation:
         """The model without any effect, with its score."""

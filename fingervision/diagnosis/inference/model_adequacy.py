@@ -213,8 +213,8 @@ def remaining_structure(
     own = harmonics(problem, best)
     gain, dot, norm = _gains(problem, _Basis.of(problem, shapes.columns), best, own.columns)
     usable = norm > 0.0
-    family = ("probe",) * int(usable.sum())
-    threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng).get("probe", np.inf)
+    family = ("probe",) * usable.size
+    threshold = linear_thresholds(problem, family, shapes.columns, best.sigma_mm, rng, usable).get("probe", np.inf)
     top = int(np.argmax(gain))
     if gain[top] > threshold and jumps_astray(problem, best.names):
         threshold = max(threshold, _of_jumps_astray(problem, shapes.columns, best, rng))

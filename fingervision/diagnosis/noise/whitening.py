@@ -200,28 +200,37 @@ class RunOffsets:
         """
         if self.runs == 1:
             return (0.0,) * self.channels, 0.0
+        return self._likeliest(self._tried(residual))
+
+    def spread_and_doubt(self, residual: Array) -> tuple[tuple[float, ...], float, float]:
+        """Estimate the spreads as `spread` does, with the doubt about them.
+
+        A few runs hardly determine the spread; by this doubt, parameters that act like an offset have Student's tails.
+
+        Returns
+        -------
+        sigma_mm, penalty
+            As `spread` returns them.
+        doubt : float
+            -2 log of the ratio of the residual's probability over all spreads to that at the best spread, to be added
+            to a score.
+        """
+        if self.runs == 1:
+            return (0.0,) * self.channels, 0.0, 0.0
+        tried, width, doubt = self._tried(residual), np.gradient(SPREADS), 0.0
+        for _, determinant, gain in tried:
+            cost = determinant - gain
+            doubt -= 2.0 * float(np.log(np.sum(width * np.exp(-0.5 * (cost - cost.min())))))
+        return *self._likeliest(tried), doubt
+
+    def _likeliest(self, tried: list[tuple[float, Array, Array]]) -> tuple[tuple[float, ...], float]:
+        """The likeliest spread of each channel, and the penalty."""
         out, total = [], 0.0
-        for scale, determinant, gain in self._tried(residual):
+        for scale, determinant, gain in tried:
             best = int(np.argmin(determinant - gain))
             out.append(min(scale * float(SPREADS[best]), self.most_mm))
             total += float(determinant[best])
         return tuple(out), total
-
-    def doubt(self, residual: Array) -> float:
-        """-2 log of the ratio of a residual's probability over all spreads to that at the best spread.
-
-        The value is added to a score.
-
-        A few runs hardly determine the spread; by this term, parameters that act like an offset have Student's tails.
-        """
-        if self.runs == 1:
-            return 0.0
-        width = np.gradient(SPREADS)
-        total = 0.0
-        for _, determinant, gain in self._tried(residual):
-            cost = determinant - gain
-            total -= 2.0 * float(np.log(np.sum(width * np.exp(-0.5 * (cost - cost.min())))))
-        return total
 
     def drawn_spread(self, residual: Array, rng: np.random.Generator) -> tuple[float, ...]:
         """Draw the spreads from their posterior given a residual; one per channel, in mm.
