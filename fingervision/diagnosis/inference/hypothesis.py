@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Effect
 from fingervision.domain.parameter import Parameter
 

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array, History, start_key
 
 START_MOVES = 1e-3

@@ -11,7 +11,7 @@ from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, r
 from fingervision.diagnosis.inference.hypothesis import Point
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import verdict
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
