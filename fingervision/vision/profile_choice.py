@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.beside_edge import without_additions
-from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
+from fingervision.vision.blur_uncertainty import Displacement, not_displaced
+from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage
@@ -29,7 +30,13 @@ from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
 from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 from fingervision.vision.symmetric_spread import symmetric_squares
-from fingervision.vision.wall_width import WIDER, wall_limits_px
+from fingervision.vision.wall_width import (
+    WIDER,
+    are_outer_flanks_in_view,
+    is_surely_broader,
+    squared_blurs,
+    wall_limits_px,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -72,7 +79,12 @@ U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 
 
 def with_profile(
-    upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
+    upright: GreyImage,
+    edges: EdgePoints,
+    light: Floats,
+    top_level: int,
+    is_outline: bool = False,
+    displaced_px: Displacement = not_displaced,
 ) -> EdgePoints:
     """Return the points moved to the finger's own edge, if a structure beside the edge has displaced the fitted step.
 
@@ -89,17 +101,20 @@ def with_profile(
     is_outline : bool
         Whether the edge of a thick part is that of its whole outline, side walls included, rather than that of its
         front face.
+    displaced_px : callable
+        Standard uncertainty of both flanks' positions by a codec (pixels), from the edges; called only where a width
+        is in question.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
-        return _unsure_of_width(edges)
+        return _unsure_of_width(edges, displaced_px)
     room = _room(edges)
     # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        return _unsure_of_width(edges)
+        return _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
@@ -132,7 +147,10 @@ def with_profile(
     if is_lopsided and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
         moved = _moved(edges, glare, U_GLARE, all_around, "glare")
         return without_additions(upright, moved, light, GLARE, glare)
-    outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
+    # Along the picture's border there are lines but no flank.
+    outer: list[MeanProfile | None] = [None, None]
+    if are_outer_flanks_in_view(edges):
+        outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
         is_strip = [
@@ -151,7 +169,12 @@ def with_profile(
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
         # A wall is there: the edge lies as far off as the fit says, give or take its own doubt.
         farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
-        return _unsure(edges, farthest, "wall") if is_wall else _unsure_of_width(edges)
+        unsure = _unsure_of_width(edges, displaced_px)
+        if not is_wall:
+            return unsure
+        # The shape of a wall that is narrower than the blur does not tell how dark it is: its width alone counts.
+        is_narrow = any(fit.breadth < RESOLVED_BLURS * fit.blur for fit in wall)
+        return _unsure(unsure if is_narrow else edges, farthest, "wall")
     if is_lopsided and left[SHADOW] < enough:
         # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
         beyond = np.array(
@@ -184,11 +207,12 @@ def with_profile(
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
             chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
             return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
-    resolved = np.maximum(edges.blur_px, LEAST_RESOLVED_BLUR_PX)
-    flanks, tips = (resolved[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
-    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
-    if any(widened):
-        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
+    flanks, tips = squared_blurs(edges)
+    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
+    if np.any(widened):
+        widened *= is_surely_broader(edges, displaced_px)
+    if np.any(widened):
+        return _unsure(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
     if not (is_step or is_lopsided) and left[GLARE] < enough and _are_of_size(glare, 1.0):
         if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of light hides in such optics, or none
             return _unsure(edges, [abs(fit.position) for fit in glare], "glare")
@@ -325,9 +349,9 @@ def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
-def _unsure_of_width(edges: EdgePoints) -> EdgePoints:
+def _unsure_of_width(edges: EdgePoints, displaced_px: Displacement) -> EdgePoints:
     """State how far a wall may have moved the edges where nothing but their width says that there is one."""
-    limits = wall_limits_px(edges)
+    limits = wall_limits_px(edges, displaced_px)
     return edges if limits is None else _unsure(edges, limits, "wall")
 
 
