@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import time
 from pathlib import Path
@@ -45,6 +46,15 @@ def test_what_was_understood_is_printed_and_written(tmp_path: Path) -> None:
     assert any("columns.toml" in note for note in again.notes)
     assert "Unchanged" in call("table", table)
     assert (tmp_path / "columns.toml").read_text(encoding="utf-8") == text
+
+
+def test_a_range_is_printed_with_its_own_unit_beside_that_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(
+        "Zeit [ms];Weg [µm];Abstand [mm]\n0;0;1,2\n100;10;1,3\n200;30;1,4\n", encoding="utf-8"
+    )
+    said = call("table", tmp_path / "log.csv")
+    assert re.search(r"Weg \[µm\] +µm +input_mm +0 to 0\.03 mm\n", said)
+    assert re.search(r"Zeit \[ms\] +ms +time_s +0 to 0\.2 s\n", said)
 
 
 def test_json_holds_what_is_printed(tmp_path: Path) -> None:
