@@ -18,6 +18,7 @@ from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
 from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
+from fingervision.frames.open_container import open_container
 from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
@@ -169,8 +170,7 @@ class VideoFile:
 
     def _opened(self) -> av.container.InputContainer:
         try:
-            # FFmpeg takes what stands before a colon for a protocol: 12:30:05.mp4 is a file.
-            return av.open(f"file:{self.name}")
+            return open_container(self.name)
         except (av.FFmpegError, OSError) as error:
             raise _not_a_video(self.name, error) from error
 
