@@ -18,7 +18,7 @@ from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.finite import is_number
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import text_of
 
 Floats = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ def read_calibration(path: Path) -> Calibration:
         The file does not exist, has a newer schema, or its values are inconsistent.
     """
     try:
-        content = json.loads(plain(path).read_text(encoding="utf-8-sig"), parse_constant=_no_constant)
+        content = json.loads(text_of(path), parse_constant=_no_constant)
     except FileNotFoundError:
         raise InputFileError(f"There is no calibration file {path}; make one with `fingervision calibrate`.") from None
     except OSError as error:
