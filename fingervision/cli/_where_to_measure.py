@@ -80,8 +80,9 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
             if options[given] is not None and sources[0] is not from_file and sources[1] is from_file:
                 # The scale of the command line comes before the file's, of whichever kind.
                 options[other] = None
-                if context.get_parameter_source("u_px_per_mm") is from_file:
-                    options["u_px_per_mm"] = None  # it belongs to the file's scale
+        is_of_file = context.get_parameter_source("u_px_per_mm") is from_file
+        if is_of_file and (options["px_per_mm"] is None or context.get_parameter_source("px_per_mm") is not from_file):
+            options["u_px_per_mm"] = None  # it belongs to the file's scale
         return command(**options)
 
     decorated: Callable[..., Any] = with_one_scale
