@@ -248,6 +248,7 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (measure("images", "--rate-hz", "-5"), 2, "-5"),
     (measure("folder"), 1, "folder"),
     (measure("["), 1, "["),
+    (measure("\x1b[31mred\x07.mkv"), 1, r"\x1b[31mred\x07.mkv"),
     (measure(LONG), 1, "too long"),
     (measure("c.mkv", "--out", LONG), 1, "cannot be written"),
     (measure("c.mkv", "--out", "c.mkv"), 1, "is a file"),
