@@ -41,7 +41,12 @@ OPTIONS = (
     click.option(
         "--px-per-mm",
         type=float,
-        help="The scale without its uncertainty; uncertainties then have only the random part.",
+        help="The scale as you state it; without --u-px-per-mm, uncertainties have only the random part.",
+    ),
+    click.option(
+        "--u-px-per-mm",
+        type=float,
+        help="Standard uncertainty of --px-per-mm, for instance of a ruler's reading; u_gap_mm then holds it.",
     ),
     click.option(
         "--below-tip-mm",
@@ -75,6 +80,9 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
             if options[given] is not None and sources[0] is not from_file and sources[1] is from_file:
                 # The scale of the command line comes before the file's, of whichever kind.
                 options[other] = None
+        is_of_file = context.get_parameter_source("u_px_per_mm") is from_file
+        if is_of_file and (options["px_per_mm"] is None or context.get_parameter_source("px_per_mm") is not from_file):
+            options["u_px_per_mm"] = None  # it belongs to the file's scale
         return command(**options)
 
     decorated: Callable[..., Any] = with_one_scale

@@ -8,6 +8,7 @@ import av
 
 from calib.camera_response import STUDIO
 from fingervision.frames.image_file import JPEG_START, PNG_SIGNATURE
+from fingervision.frames.open_container import open_container
 
 # Transfer characteristics of ITU-T H.273, table 3, by what `calib.camera_response` calls them.
 VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: "bt709", 16: "pq", 18: "hlg"}
@@ -43,7 +44,7 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
     if len(files) > 1:
         return None
     try:
-        with av.open(str(files[0])) as container:
+        with open_container(files[0]) as container:
             video = next(iter(container.streams.video), None)
             return None if video is None else _of_video(video.codec_context)
     except (av.FFmpegError, OSError, ValueError):

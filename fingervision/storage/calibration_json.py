@@ -18,7 +18,7 @@ from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.finite import is_number
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import text_of
 
 Floats = NDArray[np.float64]
 
@@ -86,8 +86,8 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
 
 def _response_content(calibration: Calibration) -> dict[str, Any] | None:
     response = calibration.camera_response
-    if response is None:
-        return None
+    if response is None:  # a stated scale has no pictures of its own, and no shift by their response either
+        return None if calibration.response_shift_px is None else {"shift_px": calibration.response_shift_px}
     is_standard = response.name in CURVES
     return {
         "name": response.name,
@@ -108,7 +108,7 @@ def read_calibration(path: Path) -> Calibration:
         The file does not exist, has a newer schema, or its values are inconsistent.
     """
     try:
-        content = json.loads(plain(path).read_text(encoding="utf-8-sig"), parse_constant=_no_constant)
+        content = json.loads(text_of(path), parse_constant=_no_constant)
     except FileNotFoundError:
         raise InputFileError(f"There is no calibration file {path}; make one with `fingervision calibrate`.") from None
     except OSError as error:

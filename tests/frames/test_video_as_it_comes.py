@@ -80,11 +80,13 @@ def test_a_high_speed_cameras_own_file_says_what_to_export(suffix: str, tmp_path
         open_frames(str(path), Wish())
 
 
-@pytest.mark.parametrize("stated", [1, 2], ids=["studio", "full"])
-@pytest.mark.parametrize(("number", "name"), [(16, "pq"), (18, "hlg"), (1, "bt709")])
-def test_high_dynamic_range_is_read_with_its_own_curve(number: int, name: str, stated: int, tmp_path: Path) -> None:
-    path = tmp_path / "hdr.mkv"
-    with av.open(str(path), "w") as container:
+@pytest.mark.parametrize(("number", "name"), [(16, "pq"), (18, "hlg")])
+def test_high_dynamic_range_is_read_with_its_own_curve(
+    number: int, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = Path("12:30:05.mkv")  # FFmpeg takes what precedes a colon for a protocol
+    with av.open(f"file:{path}", "w") as container:
         stream = container.add_stream("ffv1", rate=10)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "gray10le"
         stream.codec_context.color_trc, stream.codec_context.color_range = number, stated

@@ -10,7 +10,7 @@ import pytest
 
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.tables import needed_library, text_file
-from fingervision.tables.formats import xlsx
+from fingervision.tables.formats import read_raw, xlsx
 from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry
 from fingervision.tables.read import read_drive, read_measured_table, read_model
@@ -48,6 +48,13 @@ def test_a_long_line_below_a_good_header_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "line.csv"
     path.write_text("time [s],position [mm],gap [mm]\n0,1,2\n" + "1," * text_file.LONGEST_LINE)
     assert "a line of more than 1000000 characters" in refused(path)
+
+
+def test_a_table_of_a_hundred_thousand_columns_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "wide.csv"
+    path.write_text(",".join(f"c{k}" for k in range(100_000)) + "\n" + ",".join("1" * 100_000) + "\n")
+    with pytest.raises(FingervisionError, match="at most 4096 columns, but has 100000"):
+        read_raw(path, Entry())
 
 
 def test_a_text_of_more_than_a_gigabyte_is_refused(tmp_path: Path) -> None:
