@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calib.camera_response import standard_response
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.frames.source import Wish
 from fingervision.frames.transfer_tag import transfer_tag
 from fingervision.frames.video_file import open_frames
@@ -76,7 +76,7 @@ def test_a_file_under_a_camera_makers_name_is_read_by_what_it_holds(tmp_path: Pa
 def test_a_high_speed_cameras_own_file_says_what_to_export(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"run{suffix}"
     path.write_bytes(bytes(range(256)) * 40)
-    with pytest.raises(FingervisionError, match="export"):
+    with pytest.raises(DataError, match="export"):
         open_frames(str(path), Wish())
 
 
