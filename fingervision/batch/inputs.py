@@ -14,7 +14,7 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
 
     A folder is a single input (a sequence of images), and the files in this folder are then not inputs. Files inside
     `out` are not inputs, because videos written by an earlier call may match a pattern. A missing path is kept, so that
-    it is listed with its error; a pattern without a match is kept too if other names match.
+    it is listed with its error; if other names match, a pattern without a match is kept too.
 
     Raises
     ------

@@ -21,7 +21,7 @@ MUST = (
 
 
 def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.generic]:
-    """Interpret an array as a stack of pictures; its levels are not checked yet.
+    """Interpret an array as a stack of pictures, without checking its levels.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
     """Return the levels of one picture in 8 or 16 bits.
 
     An alpha channel is dropped where it is opaque. Floats must lie between 0 (black) and 1 (full scale); they are
-    converted to 16-bit levels, or to 8-bit levels if they were computed from such.
+    converted to 8-bit levels if all are multiples of 1/255, else to 16-bit levels.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def what_it_is(value: object) -> str:
-    """Type of a value in words, with its size if it has one: 'a list of 3'."""
+    """Type of a value in words, with its size if the value has one: 'a list of 3'."""
     kind = type(value)
     library = kind.__module__.partition(".")[0]
     name = kind.__name__ if library in ("builtins", "__main__") else f"{library} {kind.__name__}"

@@ -219,7 +219,7 @@ class NetworkStream:
         return OwnPacket(packet, shown_s, decode_s, packet.is_keyframe)
 
     def _time_s(self, tick: int | None, arrived_s: float, before_s: float | None) -> float:
-        """Convert a tick to the source's clock.
+        """Convert a tick of the stream to seconds of the source's clock.
 
         A frame without a tick is placed one tick after the previous frame, which keeps the order.
         """

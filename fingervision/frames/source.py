@@ -140,12 +140,12 @@ class Wish:
 
 
 class SourceKind(Protocol):
-    """A module, or another object, that opens sources by name."""
+    """Protocol of a kind of frame source: a module, or another object, that opens sources by name."""
 
     def accepts(self, name: str) -> bool:
         """Whether a name belongs to this kind of source.
 
-        This is called for every recording, so that it must be fast and must not open anything.
+        This function is called for every recording, so that it must be fast and must not open anything.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""The live measurement: every frame is measured on arrival, and the results are kept for browser pages."""
+"""The live measurement: every frame is measured on arrival, and the results are kept for the browser pages."""
 
 import secrets
 from collections import Counter, deque
@@ -126,7 +126,7 @@ class Session:
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row that is sent to a new page: the row of two minutes ago."""
+        """Number of the first row that is sent to a newly opened browser page: the row of two minutes ago."""
         return max(self.oldest_row, self.history.count - ROWS_SHOWN)
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
@@ -231,7 +231,7 @@ class Session:
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether measurement or disk lags behind, so that previews should not be rendered."""
+        """Whether measurement or disk is too slow, so that previews should not be rendered."""
         recorder = self._recorder
         lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
         return lags or (recorder is not None and recorder.in_a_hurry)

@@ -85,7 +85,7 @@ class Task:
 
     @property
     def settings(self) -> Settings:
-        """Settings for the image processing, as far as they do not depend on the recording."""
+        """Settings for the image processing that do not depend on the recording."""
         return self.settings_for(())[0]
 
     def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
@@ -106,7 +106,7 @@ class Task:
 
     @property
     def drive_columns(self) -> tuple[str, ...]:
-        """Columns that the drive adds to the table."""
+        """Names of the columns that the drive adds to the table."""
         if self.drive is None:
             return ()
         return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
@@ -156,7 +156,7 @@ def check_task(task: Task, description: Description) -> None:
 
 
 def in_words(task: Task, settings: Settings) -> dict[str, Any]:
-    """The settings in the form in which the summary lists them."""
+    """The settings in the form in which summary.json lists them."""
     region = task.region
     return {
         "below_tip_mm": task.below_tip_mm,

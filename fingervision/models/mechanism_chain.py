@@ -98,7 +98,7 @@ class MechanismChain:
     def _path_from(self, ground: set[int], driven: int) -> list[int]:
         """List the flexures on the path from the fixed body (ground) to the driven body, in order.
 
-        In a chain the number of flexures is one less than the number of bodies, the ground included.
+        In a chain, the number of flexures is one less than the number of bodies, including the fixed one.
         """
         name = self.mechanism.name
         merged = [tuple(-1 if body in ground else body for body in join) for join in self._joins]
@@ -198,7 +198,7 @@ class MechanismChain:
         return force + elastic.force_error, stress + elastic.stress_error
 
     def touch_input_mm(self) -> dict[str, float]:
-        """Return no contacts, because this model does not include contact."""
+        """Return no contact inputs, because this model does not include contact."""
         return {}
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:

@@ -23,7 +23,7 @@ _FIRST = 4
 
 @dataclass(frozen=True, slots=True)
 class ModesWanted:
-    """Number of modes of each family, or the frequency up to which they are wanted (Hz)."""
+    """Number of natural modes of each family, or the frequency (Hz) up to which they are computed."""
 
     count: int | None = None
     highest_hz: float = inf
@@ -58,7 +58,7 @@ class ModeShape:
 
 
 class MeshedMechanism(Protocol):
-    """A mechanism drawn by bodies."""
+    """Protocol of a meshed mechanism whose modes can be plotted."""
 
     plate: PlaneStressPlate
 
@@ -68,7 +68,7 @@ class MeshedMechanism(Protocol):
 
 
 def parse_modes(text: str) -> ModesWanted:
-    """Parse how many modes are wanted: `6`, or all up to a frequency, `500Hz`.
+    """Parse the number of modes, such as `6`, or the frequency up to which they are computed, such as `500Hz`.
 
     Raises
     ------
@@ -182,6 +182,6 @@ def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
 
 
 def _way_to_meeting(x: Array, across: Array) -> float:
-    """Largest scale at which no point of the half crosses the symmetry axis."""
+    """Largest scale factor of a mode shape at which no point of the half crosses the symmetry axis."""
     closing = (across < 0.0) & (x > 1e-9 * float(x.max()))
     return float(np.min(-x[closing] / across[closing], initial=np.inf))

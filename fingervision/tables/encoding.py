@@ -73,7 +73,7 @@ def _utf16_without_mark(sample: bytes) -> str | None:
 
 
 def _older(content: bytes) -> tuple[str, str]:
-    """Decode an 8-bit encoding: Western if this gives only usual characters, otherwise as charset-normalizer detects.
+    """Decode an 8-bit encoding: as Western European if only usual characters result, otherwise by charset-normalizer.
 
     A header has too few non-ASCII bytes for the statistics of charset-normalizer, so that the most frequent case is
     decided by a rule.

@@ -204,7 +204,7 @@ def stated_scale(section: Section, folder: Path) -> Scale | None:
 
 
 def gripper_model(section: Section, folder: Path) -> Model:
-    """Read the gripper model that simulated parts use, and by which gap and force are predicted for the limits."""
+    """Read the gripper model that simulated parts use, and that predicts gap and force for the limits."""
     section.only(("file", "columns", "kind", "large_rotation", "contact"))
     if "file" in section.values:
         path = folder / section.word("file")

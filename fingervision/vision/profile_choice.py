@@ -74,7 +74,7 @@ U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 def with_profile(
     upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
 ) -> EdgePoints:
-    """Return the points moved to the finger's own edge, if a structure beside the edge has displaced the fitted step.
+    """Return the edge points moved to the finger's own edge, if a structure beside it displaced the fitted step.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
 
 
 def _room(edges: EdgePoints) -> int:
-    """Largest length of a window that does not reach the other finger (pixels)."""
+    """Largest length (px) of a fit window that does not reach the other finger."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
     if not (real[0].size and real[1].size):
         return 0
@@ -293,7 +293,7 @@ def _best(
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement of the inner edge across the picture, for a side wall."""
+    """Movement along every line per pixel of movement of the inner edge across the picture, due to a side wall."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
@@ -320,18 +320,18 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
 
 
 def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Leave the edges in place, with an uncertainty up to the limit, because the cause is not decided."""
+    """Leave the edges in place, with an uncertainty for the possible displacement, because its cause is undecided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
 def _unsure_of_width(edges: EdgePoints) -> EdgePoints:
-    """State how far a wall may have moved the edges where nothing but their width says that there is one."""
+    """State how far a wall may have moved the edges if only the width of the edges indicates a wall."""
     limits = wall_limits_px(edges)
     return edges if limits is None else _unsure(edges, limits, "wall")
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Marks with the given uncertainties, one for each finger."""
+    """Edge marks with the given uncertainties, one for each finger."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right

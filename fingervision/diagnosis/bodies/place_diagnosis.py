@@ -103,7 +103,7 @@ def diagnose_with_bodies(
 
 
 def _place_alone(done: "Diagnosis") -> "Diagnosis":
-    """Return a diagnosis that contains the faulty place only."""
+    """Return a diagnosis that names the faulty place only, without effects of the gap."""
     d = done.report.disagreement
     report = replace(
         done.report,
@@ -119,7 +119,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
 
 
 def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: PlaceAnswers) -> MeasuredTable:
-    """Correct the gap for the difference between condensed bodies and bars joined at points, some 0.1 %."""
+    """Correct the gap for the difference (about 0.1 %) between condensed bodies and bars that are joined at points."""
     u = np.array([0.0, 1.0])
     bare = model.base.respond(u)
     drawn = answers.answer().by_input
@@ -133,7 +133,7 @@ def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: Plac
 
 
 def _driven_input(done: "Diagnosis") -> Array:
-    """Input that the mechanism receives: the recorded input after the drive effects that poses do not decide on."""
+    """Input that the mechanism receives: the recorded input after the drive effects that the poses do not determine."""
     chain = done.data.chain
     history = chain.history if chain.path is None else chain.path.history
     input_mm = history.input_mm
@@ -145,7 +145,7 @@ def _driven_input(done: "Diagnosis") -> Array:
 
 
 def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:
-    """Subtract the changes caused by an explanation from the channels of a table."""
+    """Subtract the changes that an explanation causes from the channels of a table."""
     changes: dict[str, object] = {"gap_mm": table.gap_mm - added[GAP]}
     if table.midline_mm is not None:
         first, last = answers.mechanism.pairs[GAP_PAIR]

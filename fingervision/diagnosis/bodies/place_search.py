@@ -83,7 +83,7 @@ class Fitted:
 
     @property
     def u_stated(self) -> float:
-        """Standard uncertainty of the size, including that of the explanation's form."""
+        """Standard uncertainty of the fitted size, including the inexactness of the explanation's formula."""
         return hypot(self.u, FORM_ERROR * self.size)
 
 
@@ -146,7 +146,7 @@ class PlaceSearch:
         self._left = self._beside(self.noise.whitened(self.residual))
 
     def _nuisances(self) -> None:
-        """Regressors of the nuisance parameters, with prior standard deviations; infinite if nothing is known."""
+        """Regressors of the nuisance parameters, with prior standard deviations (infinite without prior knowledge)."""
         prediction, columns, spread = self.prediction, [], []
         n, count = self.residual.shape
         slopes = prediction.linear().by_input[[prediction.answers.channels.index(c) for c in prediction.channels]]
@@ -206,11 +206,12 @@ class PlaceSearch:
         return np.asarray(padded - self._basis @ (self._basis.T @ padded))
 
     def _unknown_part(self, rows: Array) -> Array:
-        """Fit of the nuisance parameters to a residual; returns the part of constants, rotation and bend only.
+        """Fit the nuisance parameters to a residual, and return the fitted constants, rotation and bend only.
 
         The result has shape (n, channels).
 
-        Possible model errors are fitted too, but stay in the residual, because they may be the sought disagreement.
+        Possible model errors are fitted too but are not returned, because they may be the disagreement that is searched
+        for.
         """
         padded = np.concatenate([self.noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
         shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit
@@ -218,7 +219,7 @@ class PlaceSearch:
         return np.asarray(np.sum(free, axis=0))
 
     def signature(self, candidate: Candidate, size: float) -> Array:
-        """Change of the prediction by a candidate of a given size, whitened, orthogonal to the nuisance parameters."""
+        """Whitened change of the prediction by a candidate of a given size, orthogonal to the nuisance parameters."""
         return self._beside(self.noise.whitened(candidate.added(size)))
 
     def fit(self, candidate: Candidate) -> Fitted:
@@ -240,7 +241,7 @@ class PlaceSearch:
         return Fitted(candidate, size, norm**-0.5, max(gain, 0.0), signature)
 
     def _fit_play(self, candidate: Candidate) -> Fitted:
-        """Scan the size of a play, because the width of the play decides at which inputs it is crossed."""
+        """Fit the size of a play by a scan, because the width of the play decides at which inputs it is crossed."""
         left, found = self._left, []
         for play_mm in PLAYS_MM:
             unit = self.signature(candidate, float(play_mm)) / play_mm
@@ -262,7 +263,7 @@ class PlaceSearch:
         return Fitted(candidate, size, max(norm, 1e-300) ** -0.5, max(gain, 0.0), signature)
 
     def refined(self, fitted: Fitted) -> Fitted:
-        """Refit with the signature at the fitted size, until the size no longer changes."""
+        """Refit a candidate with its signature at the fitted size, until the size no longer changes."""
         if fitted.candidate.part is DrawnPart.PIVOT:
             return fitted
         for _ in range(STEPS):
@@ -289,7 +290,7 @@ class PlaceSearch:
         return float(quantile * degrees / max(degrees - count - 1, 1))
 
     def structure(self, left: Array) -> float:
-        """Chi-square of generic shapes (bends, kinks and directions of every channel) in the residual."""
+        """Gain in chi-square by generic shapes (bends, kinks and directions of every channel) in the residual."""
         u = self.prediction.input_mm
         reach = max(float(np.abs(u).max()), 1e-12)
         shapes = [u / reach, (u / reach) ** 2, np.abs(u) / reach, np.tanh(8.0 * u / reach)]
@@ -333,14 +334,14 @@ class PlaceSearch:
         )
 
     def _alike(self, best: Fitted, other: Fitted) -> bool:
-        """Whether these data cannot distinguish two explanations."""
+        """Whether these data cannot distinguish two given explanations."""
         if best.gain - other.gain < NOT_REFUTED:
             return True
         return other.gain > best.gain / 3.0 and min(apart(best, other), apart(other, best)) < ALIKE
 
 
 def apart(truth: Fitted, other: Fitted) -> float:
-    """Squared whitened distance of an explanation from another one, minimised over the other's size."""
+    """Squared whitened distance of an explanation from another one, minimised over the size of the other."""
     norm = float(other.signature @ other.signature)
     if norm <= 0.0:
         return float(truth.signature @ truth.signature)

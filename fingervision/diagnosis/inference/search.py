@@ -57,9 +57,10 @@ SHORT = 100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """Result of a search; explanations in descending order of their score.
+    """Result of a search: explanations in descending order of their score.
 
-    `nearest` is the likeliest of one or two effects, whether or not its second effect is large enough to be named.
+    `nearest` is the most probable explanation of one or two effects, whether or not its second effect is large enough
+    to be named.
     """
 
     best: Explanation
@@ -77,10 +78,11 @@ class Findings:
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
     """Whether the larger explanation removes nearly all of the smaller one's residual, as a true one does.
 
-    The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
-    added fits part of that inexactness, however large the residual is. Other effects in its place depend less on it;
-    where these leave noise alone, only what formulas are typically off by speaks for the smaller one: a creep that
-    left 70 times the noise, 3.6 % of what it explained, had stood for a ratio and an offset that leave none.
+    For this test, the residual of the smaller explanation must clearly exceed the noise and the inexactness of its
+    formula. An effect that is added fits part of that inexactness, however large the residual is. Other effects in its
+    place depend less on that inexactness; if these leave only noise, the smaller explanation is kept only within the
+    typical inexactness of formulas. In one case, a creep that left 70 times the noise (3.6 % of what it explained) had
+    been kept in place of a ratio and an offset that left none.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows
@@ -100,8 +102,8 @@ def search(
 ) -> Findings:
     """Find the best explanation, the indistinguishable ones, and the remaining structure.
 
-    The stages are the fits of one, two and three effects, the test for *unknown*, and the ambiguity set; each stage
-    returns a new state.
+    The search fits one, then two, then three effects, tests for the verdict *unknown*, and collects the ambiguity set;
+    each of these functions returns a new state.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ class _State:
         return max(2, int(self.problem.measured.size))
 
     def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
-        """Whether the best of some explanations gains more over `base` than noise alone would."""
+        """Whether the best of some explanations gains more in chi-square over `base` than noise alone would."""
         return self.evidence is not None and self.evidence.speaks_for(found, base)
 
 
@@ -231,7 +233,7 @@ def _two_effects(state: _State, progress: Progress) -> _State:
 
 
 def _three_effects(state: _State, progress: Progress) -> _State:
-    """Fit triples, unless one or two probes with fewer effects fit as well."""
+    """Fit triples of effects, unless one or two generic shapes together with fewer effects fit as well."""
     if len(state.best.names) != 2:
         return state
     problem, pairs = state.problem, state.pairs
@@ -274,7 +276,7 @@ def _gated(state: _State, rng: np.random.Generator) -> _State:
 
 
 def _findings(state: _State, forced: frozenset[str]) -> Findings:
-    """Collect explanations indistinguishable from the best; for *unknown*, keep an effect that explains much."""
+    """Collect the explanations indistinguishable from the best; for the verdict *unknown*, keep the largest effect."""
     problem, best, nothing = state.problem, state.best, state.nothing
     alternatives, distances = [best], dict[tuple[str, ...], float]()
     if best.names and not forced:

@@ -59,12 +59,12 @@ class PureError:
 
     @property
     def has_trend(self) -> bool:
-        """Whether the repeats show a drift or a run-in."""
+        """Whether the repeated readings show a drift or a run-in."""
         return self.trend_sigmas > TREND_SIGMAS
 
 
 def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Number the combinations of position and side of approach that were visited.
+    """Number the combinations of position and side of approach that the stage visited.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def pure_error(
     place_mm: Array | None = None,
     runs: tuple[slice, ...] = (),
 ) -> PureError | None:
-    """Estimate the scatter of repeats; None if there are too few repeats.
+    """Estimate the scatter of repeated readings; None if there are too few repeated readings.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def pure_error(
 
 
 def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
-    """Subtract each run's own zero if it causes most of the scatter; return also the number of zeros estimated."""
+    """Subtract each run's own zero if it causes most of the scatter; return also the number of subtracted zeros."""
     if len(runs) < 2 or not groups:
         return values, 0
     number = np.zeros(values.size, dtype=np.intp)
@@ -192,7 +192,7 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
 
 
 def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Subtract a polynomial in time common to all groups from the repeats' residuals, and one for each of `shares`."""
+    """Subtract a polynomial in time shared by all groups from the repeats' residuals, and one for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     own_rows = np.concatenate(groups)
@@ -206,7 +206,7 @@ def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *
 
 
 def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of the repeats' residuals in successive rows; 0 if independent readings could show as much."""
+    """Correlation of the repeats' residuals in successive rows; 0 if it is not significant."""
     share, sigmas = _follows_sigmas(rest, rows)
     return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
 

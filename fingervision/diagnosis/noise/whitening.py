@@ -73,7 +73,7 @@ class Whitener:
         object.__setattr__(self, "_filter", (gains, np.asarray(shares, dtype=np.float64), total))
 
     def _shares(self, channel: int) -> Array:
-        """What a lasting error of the input gives a channel (mm): the gap is the one that it reaches; shape (n,)."""
+        """Contribution (mm) of a lasting error of the input to each sample of a channel; shape (n,)."""
         return np.asarray(self.input_mm if channel == 0 else np.zeros(self.input_mm.size), dtype=np.float64)
 
     def columns(self, columns: Array) -> tuple[Array, float]:
@@ -89,12 +89,12 @@ class Whitener:
         return _filtered(columns, gains[part], shares[part])
 
     def one(self, column: Array) -> Array:
-        """Whiten one column of shape (channels * n,)."""
+        """Whiten a single column of shape (channels * n,)."""
         return self.columns(column[:, None])[0][:, 0]
 
 
 def _filtered(columns: Array, gains: Array, shares: Array) -> Array:
-    """Innovations of columns, shape (m, k)."""
+    """Innovations of a Kalman filter (whitened values) of columns, shape (m, k)."""
     whole = np.ascontiguousarray(columns, dtype=np.float64)
     out = np.empty_like(whole)
     _innovations(whole, gains, shares, out)
@@ -103,7 +103,7 @@ def _filtered(columns: Array, gains: Array, shares: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunOffsets:
-    """Nuisance parameters of every explanation: re-zeroing between runs, constant of the midline, the drawing.
+    """Nuisance parameters of every explanation: offsets of runs, constant of the midline, dimensions of the drawing.
 
     Re-zeroing is a zero-mean random effect per channel; the midline's constant is free; an uncertain dimension of the
     drawing is a random effect with its stated uncertainty.
@@ -138,9 +138,9 @@ class RunOffsets:
     _by_spread: list[tuple[Array, Array, Array]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Tabulate for each channel, over the spreads, what no residual changes.
+        """Tabulate for each channel, over the possible spreads of run offsets, what does not depend on the residual.
 
-        The runs' weights, how much of the squared mean of each run an offset takes, and the penalty.
+        These are the runs' weights, the share of each run's squared mean that an offset absorbs, and the penalty.
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
@@ -150,7 +150,7 @@ class RunOffsets:
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
-        """Build the columns for a whitener."""
+        """Build the columns of the nuisance parameters for a whitener."""
         history, channels = whitener.history, len(whitener.noises)
         n, runs = history.input_mm.size, len(history.runs)
         free = int(history.both_edges)
@@ -168,7 +168,7 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads fitted."""
+        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length of r with the run offsets fitted."""
         known = self._metrics.get(sigma_mm)
         if known is not None:
             return known
@@ -181,15 +181,15 @@ class RunOffsets:
         return found
 
     def squared(self, whitened: Array, metric: Array) -> float:
-        """Squared length of a whitened column, with the offsets of a metric fitted."""
+        """Squared length of a whitened column after the run offsets were fitted with a given metric."""
         shared = self.design.T @ whitened
         return float(whitened @ whitened - shared @ metric @ shared)
 
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
-        """Estimate the spreads from a whitened residual by marginal likelihood.
+        """Estimate the spreads of the run offsets from a whitened residual by marginal likelihood.
 
         A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) prevents that, for two runs, every common
-        offset is attributed to scatter. With one run the spread is zero.
+        offset is attributed to scatter. With one run, the spread of the run offsets is zero.
 
         Returns
         -------
@@ -212,7 +212,8 @@ class RunOffsets:
 
         The value is added to a score.
 
-        A few runs hardly determine the spread; by this term, parameters that act like an offset have Student's tails.
+        A few runs hardly determine the spread of their offsets; with this term, parameters that act like an offset have
+        Student's tails.
         """
         if self.runs == 1:
             return 0.0
@@ -224,9 +225,9 @@ class RunOffsets:
         return total
 
     def drawn_spread(self, residual: Array, rng: np.random.Generator) -> tuple[float, ...]:
-        """Draw the spreads from their posterior given a residual; one per channel, in mm.
+        """Draw the spread of the run offsets (mm) for each channel from its posterior given a residual.
 
-        A few runs leave the spread very uncertain.
+        A few runs leave the spread of their offsets very uncertain.
         """
         width = np.gradient(SPREADS)
         out = []
@@ -237,7 +238,7 @@ class RunOffsets:
         return tuple(out)
 
     def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
-        """Scale of each channel; for all spreads, the penalty and the reduction of chi-square due to offsets."""
+        """Scale of each channel, and for all tried spreads the penalty and the reduction of chi-square by offsets."""
         shares = self.design.T @ residual
         if self.drawn:
             # What the drawing's numbers explain is no scatter between runs.

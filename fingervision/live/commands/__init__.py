@@ -15,7 +15,7 @@ __all__ = ["Answer", "Request", "harmless", "modules", "obey", "section"]
 
 @cache
 def modules() -> tuple[ModuleType, ...]:
-    """List the modules of this package that define `COMMANDS`; a new module adds requests without other changes.
+    """List the modules of this package that define `COMMANDS`; a new module adds requests without any other change.
 
     A module may also define `HARMLESS`, the names of requests that change nothing and are allowed for viewers, and
     `section(view)`, which returns the topic's part of the state sent to every page.

@@ -12,7 +12,7 @@ from fingervision.measuring.other_camera import other_camera
 
 
 class CameraError(FingervisionError):
-    """A camera setting cannot be changed; the page shows the error's sentence beside the named setting.
+    """A camera setting cannot be changed; the browser page shows the error's sentence beside the named setting.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def _changed(view: View, name: str, value: float) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return the camera's controls that can be changed."""
+    """Return the camera's settings that can be changed, for the browser page."""
     controls = view.capture.adjustments.controls if isinstance(view, Session) else ()
     return {"camera_controls": [asdict(each) for each in controls]}
 

@@ -47,7 +47,7 @@ def _fingers(view: View, request: Request) -> Answer:
 
 
 def _height_at(view: View, request: Request) -> Answer:
-    """Set the measuring height to that of a point in the picture."""
+    """Set the measuring height to that of a point which the user clicked in the picture."""
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
         raise StateError(

@@ -31,7 +31,7 @@ def _input(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return prediction, residual and verdict."""
+    """Return prediction, residual and verdict for the browser page."""
     comparison = view.features.get(MODEL)
     return {"model": comparison.state() if isinstance(comparison, Comparison) else None}
 

@@ -52,7 +52,7 @@ def _measure(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return the state of the playback."""
+    """Return the state of the playback for the browser page."""
     if not isinstance(view, Playback):
         return {"playback": None}
     measuring = view.features.get(RANGE)

@@ -52,7 +52,7 @@ class _Entry:
 
 
 class GaugeBoard:
-    """Gauges of one recording, and the file in which they are stored.
+    """The gauges of one recording, and the file in which they are stored.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class GaugeBoard:
 
     @property
     def is_saved(self) -> bool:
-        """Whether the file contains exactly the present gauges."""
+        """Whether the gauge file contains exactly the present gauges."""
         return self.tables == self._kept
 
     def snapshot(self) -> tuple[int, tuple[Gauge, ...]]:
