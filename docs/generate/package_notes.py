@@ -21,7 +21,17 @@ def note(name: str) -> str:
     """Return the text of a README without its title, with its links to other READMEs turned to the site's pages."""
     path = ROOT / NOTES[name]
     _, _, text = path.read_text(encoding="utf-8").partition("\n")
-    return re.sub(r"\[([^\]]+)\]\(([^()\s:#]+)\)", lambda link: _on_the_site(path, link[1], link[2]), text)
+    text = re.sub(r"\[([^\]]+)\]\(([^()\s:#]+)\)", lambda link: _on_the_site(path, link[1], link[2]), text)
+    return _below_one_title(text)
+
+
+def _below_one_title(text: str) -> str:
+    """Lower all headings by a level if the text has further titles, because a page has one; code is left alone."""
+    parts = re.split(r"(```.*?```)", text, flags=re.DOTALL)
+    if not any(re.search(r"^# ", part, re.MULTILINE) for part in parts[::2]):
+        return text
+    parts[::2] = [re.sub(r"^(#+ )", r"#\1", part, flags=re.MULTILINE) for part in parts[::2]]
+    return "".join(parts)
 
 
 def _on_the_site(path: Path, words: str, target: str) -> str:

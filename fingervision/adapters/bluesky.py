@@ -274,7 +274,7 @@ class GapDevice:
         while any(one.clock.joined() is None for one in instruments):
             if self._clock.now_s() > until_s:
                 raise DeviceError(
-                    "The clocks of stage and force sensor must be joined to the test bed's within "
+                    "The clocks of stage and force sensor must be synchronised with the test bed's clock within "
                     f"{JOINED_WITHIN_S:g} s, "
                     "but are not: check that both devices respond."
                 )

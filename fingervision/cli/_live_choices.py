@@ -35,7 +35,7 @@ def choices_of(
     from fingervision.storage.calibration_json import read_calibration
 
     if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
     own = simulated.PX_PER_MM if source is not None and simulated.accepts(source) else None
     stated = own if px_per_mm is None else px_per_mm
     if stated is not None and not 0.0 < stated < float("inf"):

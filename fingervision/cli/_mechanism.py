@@ -62,7 +62,9 @@ def predict(
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     if kind not in (*_KINDS, "stiffness_matrix", "all"):
-        raise UsageError(f"A mechanism.toml is computed by the kinds {', '.join(_KINDS)}, but --kind asks for {kind}.")
+        raise UsageError(
+            f"A mechanism.toml can be computed by the kinds of model {', '.join(_KINDS)}, but --kind is {kind}."
+        )
     wanted = _KINDS if kind == "all" else (kind,)
     models: dict[str, MechanismModel] = {}
     refusals: dict[str, FingervisionError] = {}

@@ -43,8 +43,8 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
         raise UsageError(f"--object-n-mm must be a positive stiffness in N/mm, but is {stiffness_n_mm:g}.")
     if width_mm > 10.0 * abs(rest_gap_mm):
         raise UsageError(
-            f"--object-mm must be a part that fits between the fingers, but is {width_mm:g} mm at a rest gap of "
-            f"{rest_gap_mm:g} mm; is it in micrometres?"
+            f"--object-mm must be the width of a part that fits between the fingers, but is {width_mm:g} mm at a rest "
+            f"gap of {rest_gap_mm:g} mm; is it in micrometres?"
         )
     return Part(width_mm) if stiffness_n_mm is None else Part(width_mm, stiffness_n_mm)
 
@@ -102,7 +102,7 @@ def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism
     if not pairs or (name != "gap" and len(pairs) > 1):
         has = f"{', '.join(pairs)} and none of that name" if pairs else "no [[pair]]"
         raise UsageError(
-            f"--object-mm must have a pair of probes that grips the part, called gap where there are several, but "
+            f"--object-mm needs a pair of probes that grips the part (named gap if there are several), but "
             f"{mechanism.name} has {has}."
         )
     apart = [a - b for a, b in zip(*(mechanism.probes[end] for end in pairs[name]), strict=True)]

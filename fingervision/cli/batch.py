@@ -103,7 +103,9 @@ def _run(
     if scheduler is not None and jobs is not None:
         from fingervision.domain.errors import UsageError
 
-        raise UsageError("--jobs is for this machine and --scheduler for others, but both are there: leave one out.")
+        raise UsageError(
+            "--jobs is for this computer and --scheduler for a cluster, but both are given: leave one out."
+        )
     arguments = tuple(_arguments(given, absolute=scheduler is not None))
     plan = planned(Job(name, inputs, arguments, _options_key(name, given), out))
     with ExitStack() as stack:

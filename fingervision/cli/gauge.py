@@ -68,7 +68,7 @@ def command(
     if not is_recording(recording):
         raise UsageError(
             "Gauges are drawn on an existing recording (a video, images, a run's folder), but "
-            f"{recording} is none: name another, or draw them on a camera's picture with "
+            f"{recording} is not such a recording: name another, or draw them on a camera's picture with "
             "`fingervision live CAMERA --gauges FILE`."
         )
     choices = choices_of(None, calibration, px_per_mm, below_tip_mm, tips, roi)

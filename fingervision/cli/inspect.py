@@ -85,7 +85,7 @@ def command(
     if not 0.0 < seconds < float("inf"):
         raise UsageError(f"--seconds must be positive, but is {seconds:g}.")
     if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
     if px_per_mm is not None and not 0.0 < px_per_mm < float("inf"):
         raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.")
     stated = simulated.PX_PER_MM if px_per_mm is None and simulated.accepts(source) else px_per_mm

@@ -55,7 +55,10 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
         )
     if pictures.dtype.kind == "b":
         raise ArgumentTypeError(
-            argument, MUST, "holds true and false", "a binary picture has lost where its edges are; give the grey one"
+            argument,
+            MUST,
+            "holds true and false",
+            "a binary picture lacks the exact positions of edges; give the grey picture",
         )
     if not (pictures.dtype.kind == "f" or (pictures.dtype.kind == "u" and pictures.dtype.itemsize <= 2)):
         advice = (
@@ -132,7 +135,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
                 subject,
                 "be opaque where it has an alpha channel",
                 f"{see_through} of {native[:, :, 3].size} pixels are not",
-                "give the colours alone, source[..., :3], where what lies below is what the camera saw",
+                "give the colours alone, source[..., :3], if they are what the camera recorded",
             )
     return np.ascontiguousarray(native[:, :, :3])
 

@@ -85,7 +85,7 @@ class CameraFrames:
             )
         if not self._capture.isOpened():
             raise DeviceError(
-                f"The camera {name} cannot be opened: it is in use by another program, or no camera; close the other "
+                f"The camera {name} cannot be opened: another program uses it, or it is not a camera; close the other "
                 "program, or see `fingervision live --list`."
             )
         self._ask(wish)

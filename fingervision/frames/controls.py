@@ -139,7 +139,7 @@ def adjust(source: object, name: str, value: float) -> tuple[CameraControl, Came
         raise
     except Exception as error:  # a driver's fault must not end the live view
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". ")
-        raise DeviceError(f"The camera did not take {name} {before.words(value)} ({said}).") from error
+        raise DeviceError(f"The camera refused to set {name} {before.words(value)} ({said}).") from error
     after = next((each for each in controls_of(source) if each.name == name), None)
     if after is None:
         raise DeviceError(f"The camera was asked for {name} {before.words(value)} and no longer says what it has.")

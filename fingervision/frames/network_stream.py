@@ -64,8 +64,8 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
     """
     if wish.rate_hz is not None or wish.size_px is not None:
         raise UsageError(
-            "--size and --rate-hz are for cameras of this machine, but "
-            f"{without_password(name)} decides itself: set them there."
+            "--size and --rate-hz are for cameras of this computer, but "
+            f"{without_password(name)} determines its own: set them in that camera."
         )
     return NetworkStream(name)
 

@@ -46,7 +46,7 @@ def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
         The calibration cannot be read.
     """
     if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
     if calibration is not None:
         if isinstance(calibration, str | os.PathLike):
             return read_calibration(Path(calibration)), Path(calibration)

@@ -179,11 +179,11 @@ class Session:
         with self._lock:
             task = self.choices.task
             if self.ended.is_set():
-                raise StateError("The source has ended, so nothing can be recorded: start again.")
+                raise StateError("The source has ended, so nothing can be recorded: start the live view again.")
             if self._recorder is not None:
                 raise StateError(f"A run is being recorded already, in {self._recorder.run.path}.")
             if self._beginning:
-                raise StateError("A recording is being begun already.")
+                raise StateError("A recording is already being started.")
             if task is None:
                 raise StateError("The scale is not known: give the scale before recording, so that the run has gaps.")
             if not self.description.has_times:

@@ -77,7 +77,10 @@ class Task:
         if self.drive_offset_s is not None and not isfinite(self.drive_offset_s):
             raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
         if self.steps_frame is not None and self.steps_frame < 0:
-            raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
+            raise UsageError(
+                f"--steps (pictures of the processing steps) must be the number of a frame, from 0, but is "
+                f"{self.steps_frame}."
+            )
         if self.frames is not None and not 0 <= self.frames[0] <= self.frames[1]:
             raise UsageError(
                 f"--frames must be FIRST:LAST, from 0 and rising, but is {self.frames[0]}:{self.frames[1]}."

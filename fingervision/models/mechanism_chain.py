@@ -105,8 +105,8 @@ class MechanismChain:
         bodies = {body for join in merged for body in join}
         if len(merged) != len(bodies) - 1 or any(first == last for first, last in merged):
             raise ModelError(
-                f"The stiffness matrix is that of a chain, but the flexures of {name} form a loop; take --kind lumped "
-                "or finite_element."
+                f"The stiffness-matrix model needs bodies in a chain, but the flexures of {name} form a loop; take "
+                "--kind lumped or finite_element."
             )
         reached: dict[int, list[int]] = {-1: []}
         while driven not in reached:
@@ -117,8 +117,8 @@ class MechanismChain:
                         reached[other], grown = [*reached[known], place], True
             if not grown:
                 raise ModelError(
-                    f"The stiffness matrix is that of a chain from a fixed face to the drive, but {name} has none; "
-                    "take --kind lumped or finite_element."
+                    f"The stiffness-matrix model needs bodies in a chain from a fixed face to the drive, but {name} "
+                    "has none; take --kind lumped or finite_element."
                 )
         self._reached = reached
         return reached[driven]
@@ -132,8 +132,8 @@ class MechanismChain:
         for face, component in mechanism.slides:
             if self._touching(face) != {driven}:
                 raise ModelError(
-                    f"The stiffness matrix is that of a chain, but {mechanism.name} is held at {face.name} too; take "
-                    "--kind lumped or finite_element."
+                    f"The stiffness-matrix model needs bodies in a chain that is fixed at one end, but "
+                    f"{mechanism.name} is held at {face.name} too; take --kind lumped or finite_element."
                 )
             faces.append((face, component))
         for face, component in faces:

@@ -73,7 +73,7 @@ def open_bed(
     all_simulated = all(kind.SIMULATED for kind in parts.values())
     has_gripper = "gripper" in top.values
     if hidden.effects and not has_gripper:
-        raise UsageError(f"--hide must have a simulated gripper to act in, but {name} has no [gripper]: add one.")
+        raise UsageError(f"--hide adds an effect to a simulated gripper, but {name} has no [gripper]: add one.")
     clock: Clock = VirtualClock(pace, earlier_s[1] if earlier_s else 0.0) if all_simulated else HostClock()
     context = BuildContext(
         clock=clock,

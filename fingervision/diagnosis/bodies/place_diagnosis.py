@@ -51,8 +51,8 @@ def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[Measure
     added = None if answers is None else added_everywhere(answers, table.input_mm, placed)
     if answers is None or added is None:
         raise DataError(
-            f"The effects of the model must have places that {model.base_path} draws, but {' and '.join(placed)} "
-            "have not: diagnose again, or leave them out."
+            f"Every effect at a hinge or link must name a part that {model.base_path} contains, but "
+            f"{' and '.join(placed)} do not: diagnose again, or remove these effects from the model."
         )
     rest = {key: values for key, values in model.effects.items() if key not in placed}
     return _less(table, added, answers), replace(model, effects=rest)

@@ -47,7 +47,9 @@ def obey(view: View, request: Request) -> Answer:
     name = request.get("do")
     command = _table().get(name) if isinstance(name, str) else None
     if command is None:
-        raise UsageError(f"The page may ask for {', '.join(sorted(_table()))}, but asked for {shown(name)}.")
+        raise UsageError(
+            f"A request of the browser page must be one of {', '.join(sorted(_table()))}, but is {shown(name)}."
+        )
     return command(view, request)
 
 

@@ -37,11 +37,11 @@ def _set(view: View, request: Request) -> Answer:
 
 def _changed(view: View, name: str, value: float) -> Answer:
     if not isinstance(view, Session):
-        raise StateError("A recording's camera can no longer be set.")
+        raise StateError("The camera settings of a recording cannot be changed.")
     if view.ended.is_set():
-        raise StateError("The source has ended: its camera can no longer be set.")
+        raise StateError("The source has ended: its camera settings cannot be changed.")
     if view.recording is not None and name in MOVES_SCALE:
-        raise StateError(f"The {name} moves the scale, and a run has one: end the recording first.")
+        raise StateError(f"The {name} changes the scale, and a run has a single scale: end the recording first.")
     before, after = view.capture.adjustments.ask(name, value)
     if name == FRAME_RATE:
         view.cadence.restart()

@@ -13,7 +13,7 @@ RANGE = "measured_range"
 
 def _playback(view: View) -> Playback:
     if not isinstance(view, Playback):
-        raise StateError("One cannot go back and forth in a live source: record it, and open the recording.")
+        raise StateError("Seeking needs a recording, but this source is live: record it, and open the recording.")
     return view
 
 

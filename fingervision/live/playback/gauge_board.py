@@ -212,7 +212,7 @@ class GaugeBoard:
         for at, entry in enumerate(self._entries):
             if entry.gauge.name == name:
                 return at
-        raise StateError(f"There is no gauge {name!r} any more: load the page again.")
+        raise StateError(f"There is no gauge {name!r} any more: reload the browser page.")
 
     def _entry(self, table: Mapping[str, Any], place: int | None, others: tuple[_Entry, ...]) -> _Entry:
         section = _Typed(self.path, "", "The gauge", table)

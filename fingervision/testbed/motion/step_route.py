@@ -66,7 +66,7 @@ def route(
     )
     raise LimitError(
         f"A step must lead to {to_mm:g} mm, but none does: the controller goes to {targets or 'no position'} mm, and "
-        f"by its relative steps from there. Give it a step to {to_mm:g} mm, or change the move."
+        f"by its relative steps from there. Store a step to {to_mm:g} mm in the controller, or change the move."
     )
 
 
@@ -116,6 +116,6 @@ def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float
         sign = "positive" if speed_mm_s > 0.0 else "negative"
         raise LimitError(
             f"A jog at {speed_mm_s:g} mm/s must have a relative step with a {sign} target that is no faster, but the "
-            "controller has none: give it one."
+            "controller has none: store one in it."
         )
     return max(fine, key=lambda number: speeds[number])

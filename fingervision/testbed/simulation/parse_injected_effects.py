@@ -34,7 +34,7 @@ def hidden_from(words: tuple[str, ...]) -> Hidden:
         more = _sealed(Path(word)) if word.lower().endswith(".toml") else [_spoken(word)]
         for name, values in more:
             if name in effects:
-                raise UsageError(f"Each effect may be hidden only once, but {name} is hidden twice: leave one out.")
+                raise UsageError(f"--hide may name each effect only once, but {name} is named twice: leave one out.")
             effects[name] = usual_values(catalogue()[name]) | values
     return Hidden(effects)
 
