@@ -2,7 +2,8 @@
 
 A line is a stripe with two edges: c + A (step(t - x1) - step(t - x2)), each step blurred by the same Gaussian. Blooming
 and the camera's response move the two edges in opposite directions and leave the centre of the line in place, so that
-the pitch does not depend on the edge bias. The width of a line does; if its true width is known, the edge bias follows.
+the pitch does not depend on the edge bias. The width of a line does depend on the edge bias; if the true width is
+known, the edge bias follows from it.
 """
 
 from dataclasses import dataclass

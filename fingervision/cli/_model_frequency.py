@@ -100,9 +100,9 @@ def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -
         known = described(law, rad_s).size
         if known < rad_s.size and rad_s[known] / (2.0 * pi) < band.last_hz:
             raise UsageError(
-                f"--damping {damping} describes modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz alone (its ratio "
-                f"leaves 0 to 0.3 beyond), but --frequency goes to {band.last_hz:g} Hz past the mode at "
-                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end it before, or take modal:0.025."
+                f"--damping {damping} is valid for modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz only (beyond, "
+                f"the damping ratio is outside 0 to 0.3), but --frequency goes to {band.last_hz:g} Hz past the mode at "
+                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end the band before that mode, or take modal:0.025."
             )
     frequencies = resolved_frequencies_hz(reduced, free, law, band.first_hz, band.last_hz)
     return frequency_response(reduced, free, frequencies, law)

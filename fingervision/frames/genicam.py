@@ -1,8 +1,9 @@
 """GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) through the maker's GenTL producer (extra `genicam`).
 
 A camera's name is `genicam:PRODUCER.cti`, or `genicam:PRODUCER.cti#SERIAL` if there are several cameras. The producer
-is the driver file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` loads it. Tested
-with Viky, the simulated camera that comes with the GenICam reference implementation; not with hardware.
+is the driver file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` loads it. The
+adapter is tested with Viky, the simulated camera that comes with the GenICam reference implementation, and not with
+hardware.
 """
 
 from collections.abc import Iterator
@@ -139,7 +140,7 @@ class GenicamFrames:
             self._release()
 
     def close(self) -> None:
-        """End the iteration with the next frame."""
+        """End the iteration over the frames with the next frame."""
         self._closed.set()
 
     def controls(self) -> tuple[CameraControl, ...]:
@@ -147,7 +148,7 @@ class GenicamFrames:
         return control_list(self._camera.remote_device.node_map)
 
     def set_control(self, name: str, value: float) -> None:
-        """Ask the camera for another value of one of its controls.
+        """Request another value of one of the camera's settings.
 
         Parameters
         ----------
@@ -162,7 +163,7 @@ class GenicamFrames:
         self.description = replace(self.description, camera=read_settings(nodes))
 
     def _next(self) -> Any:
-        """Return the next buffer; None once the source is closed."""
+        """Return the next picture buffer; None once the source is closed."""
         silent_since_s = monotonic()
         while not self._closed.is_set():
             try:
@@ -236,7 +237,7 @@ def _connected(name: str) -> tuple[Any, Any]:
 
 
 def _own_time_s(buffer: Any) -> float | None:
-    """Time of the exposure by the camera's own clock (s); None if the camera states none."""
+    """Time of the exposure (s) by the camera's own clock; None if the camera does not state it."""
     try:
         return 1e-9 * float(buffer.timestamp_ns)
     except Exception:

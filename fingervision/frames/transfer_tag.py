@@ -23,7 +23,7 @@ HEAD_BYTES = 1 << 16
 
 
 def transfer_tag(files: tuple[Path, ...]) -> str | None:
-    """Name of the standard camera response stated in the first file; None if none is stated.
+    """Name of the standard camera response that the first file states; None if no response is stated.
 
     Parameters
     ----------

@@ -266,7 +266,7 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
 def _sha256(files: tuple[Path, ...]) -> str | None:
     """Hash of one file's bytes; for several files, the hash of their names and hashes in order.
 
-    None is returned for a live source.
+    The function returns None for a live source.
     """
     if not files:
         return None

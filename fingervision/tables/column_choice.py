@@ -36,7 +36,7 @@ class Findings:
 
 
 def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, about: Findings) -> dict[str, int]:
-    """Return the column of each role; open questions are added to `about`.
+    """Return the column for each role (time, input, gap, ...); open questions are added to `about`.
 
     Parameters
     ----------

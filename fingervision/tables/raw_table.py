@@ -99,5 +99,5 @@ class RawTable:
         return len(self.columns[0]) if self.columns else 0
 
     def place(self, row: int) -> str:
-        """Location of a row in the file."""
+        """Location of a row in the file, for messages."""
         return f"line {self.lines[row]}" if len(self.lines) else f"row {row + 1}"

@@ -69,7 +69,7 @@ def mean_profile(
     room: int,
     curves: tuple[int, ...] = STRAIGHT_ONLY,
 ) -> MeanProfile | None:
-    """Mean profile across the half of a flank that is farther from the tip; None if it is short or not smooth."""
+    """Mean profile across the half of a flank farther from the tip; None if that half is short or not smooth."""
     real = np.flatnonzero(edges.lines.weight[k, part] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS or room < REACH_PX // 2:

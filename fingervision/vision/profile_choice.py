@@ -80,7 +80,7 @@ def with_profile(
     is_outline: bool = False,
     displaced_px: Displacement = not_displaced,
 ) -> EdgePoints:
-    """Return the points moved to the finger's own edge, if a structure beside the edge has displaced the fitted step.
+    """Return the edge points moved to the finger's own edge, if a structure beside it displaced the fitted step.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
 
 
 def _room(edges: EdgePoints) -> int:
-    """Largest length of a window that does not reach the other finger (pixels)."""
+    """Largest length (px) of a fit window that does not reach the other finger."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
     if not (real[0].size and real[1].size):
         return 0
@@ -279,7 +279,7 @@ def _room(edges: EdgePoints) -> int:
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement of the inner edge across the picture, for a side wall."""
+    """Movement along every line per pixel of movement of the inner edge across the picture, due to a side wall."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
@@ -306,7 +306,7 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
 
 
 def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Leave the edges in place, with an uncertainty up to the limit, because the cause is not decided."""
+    """Leave the edges in place, with an uncertainty for the possible displacement, because its cause is undecided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
@@ -318,6 +318,6 @@ def _unsure_of_width(edges: EdgePoints, displaced_px: Displacement) -> EdgePoint
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Marks with the given uncertainties, one for each finger."""
+    """Edge marks with the given uncertainties, one for each finger."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right

@@ -151,7 +151,7 @@ REFUSED: tuple[tuple[str, object, str], ...] = (
     ("frame rate", 0, "must be a positive number, but is 0"),
     ("frame rate", 1e6, "must be 1 to 100 Hz"),
     ("gain", 3, "was asked for gain 3 and stays at 1"),
-    ("focus", 13, "did not take focus 13 (OSError: VIDIOC_S_CTRL"),
+    ("focus", 13, "refused to set focus 13 (OSError: VIDIOC_S_CTRL"),
     ("focus", 251, "must be 0 to 250, but is 251"),
     ("shutter", 1, "lets exposure, gain, focus, frame rate be set while it runs, but 'shutter' was asked"),
     ("", 1, "name must be a text"),

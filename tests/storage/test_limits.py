@@ -112,6 +112,14 @@ def test_a_recipes_name_may_hold_quotes(tmp_path: Path) -> None:
     assert read_recipe(tmp_path / "recipe.toml").name == 'two "speeds" \\ one'
 
 
+def test_a_recipe_holds_no_negative_zero(tmp_path: Path) -> None:
+    step = {"kind": "triangle", "from_mm": -0.0, "to_mm": 0.3, "speed_mm_s": 0.5, "cycles": 2}
+    write_recipe(tmp_path / "recipe.toml", "zero", [step])
+    text = (tmp_path / "recipe.toml").read_text(encoding="utf-8")
+    assert "from_mm = 0.0\n" in text
+    assert "cycles = 2\n" in text
+
+
 @pytest.mark.parametrize("name", ['it\'s "one".csv', "two\nlines.csv", "narrow\u202fspace.csv", "back\\slash.csv"])
 def test_a_corrected_model_names_a_base_of_any_name(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text(SIMULATION)

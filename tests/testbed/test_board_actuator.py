@@ -136,7 +136,7 @@ def test_a_move_that_no_step_makes_is_refused_before_anything_moves(bed: Bed, co
     stands(bed)
     for move, said in (
         ((1.23, 50.0), "A step must lead to 1.23 mm, but none does: the controller goes to 0, 5, 9 mm, and by its "
-         "relative steps from there. Give it a step to 1.23 mm, or change the move."),
+         "relative steps from there. Store a step to 1.23 mm in the controller, or change the move."),
         ((5.0, 10.0), "The move to 5 mm must not be faster than 10 mm/s, but the slowest step that leads there goes at "
          "20 mm/s: allow that, or give the controller a slower step."),
         ((11.0, 10.0), "The target must lie between 0 and 10 mm, but is 11 mm: nothing was moved."),
@@ -247,7 +247,9 @@ def test_a_jog_repeats_relative_steps_until_the_limit_of_the_bed(bed_toml: Path,
 
 def test_a_jog_from_an_unknown_position_is_refused(bed_toml: Path, controller: MotorController) -> None:
     done = CliRunner().invoke(cli, ["bed", "jog", "20", "--bed", str(bed_toml)])
-    assert str(done.exception).startswith("The position must be known before the relative step 3, but is not")
+    assert str(done.exception).startswith(
+        "The stage's position must be known before the relative step 3, but is unknown"
+    )
     assert controller.codes == []
 
 
@@ -309,7 +311,7 @@ def test_a_recipe_that_the_steps_cannot_do_is_refused_before_anything_moves(
     recipe.write_text('schema = 1\nbelow_force_n = 2.0\n[[step]]\nkind = "move"\nto_mm = 0.7\nspeed_mm_s = 50.0\n')
     done = CliRunner().invoke(cli, ["bed", "run", str(recipe), "--bed", str(bed_toml), "--out", str(tmp_path / "run")])
     assert str(done.exception).startswith(
-        f"to_mm in line 5 of {recipe} cannot be done: A step must lead to 0.7 mm, but "
+        f"to_mm in line 5 of {recipe} cannot be executed: A step must lead to 0.7 mm, but "
     )
     assert controller.codes == []
     assert not (tmp_path / "run").exists()

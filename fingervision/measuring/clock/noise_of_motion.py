@@ -131,7 +131,7 @@ scatter."""
 
 
 def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Array) -> tuple[Array, float]:
-    """Residuals minus the mean of each stretch that may have a common error, and the variance's correction factor."""
+    """Residuals minus the mean of each stretch that may have a shared error, and the variance's correction factor."""
     out = residual_mm.copy()
     means = 0
     spread_mm = 1.4826 * float(np.median(np.abs(residual_mm)))
