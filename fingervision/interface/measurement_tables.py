@@ -41,7 +41,7 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     task, clock = found.task, found.clock
     if task.drive is None:
         raise UsageError(
-            "The measurement must include a drive (the stage's record), but was made without: call "
+            "The measurement must include a drive (the stage's record), but was made without one: call "
             "fingervision.measure with drive=."
         )
     if found.refusal is not None:

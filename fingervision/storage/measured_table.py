@@ -178,7 +178,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
 
 
 def _by_run(names: Sequence[str], key: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
-    """Indices of the rows of each run, sorted by a key; runs are in order of their first appearance."""
+    """Row numbers of each run, sorted by a key; runs are in order of their first appearance."""
     number: dict[str, int] = {}
     codes = np.array([number.setdefault(name, len(number)) for name in names], dtype=np.intp)
     order = np.lexsort((key, codes))
@@ -193,7 +193,7 @@ def _path(
     names: Sequence[str],
     run_names: tuple[str, ...],
 ) -> RecordedPath:
-    """Sort all rows with an input in the same way as the rows with a gap; runs without any gap are omitted."""
+    """Sort all rows with an input in the same way as the rows with a gap; runs without a gap are omitted."""
     of_run = _by_run(names, values["time_s"].value[on_path])
     rows = np.concatenate([on_path[of_run[name]] for name in run_names])
     ends = np.cumsum([of_run[name].size for name in run_names])

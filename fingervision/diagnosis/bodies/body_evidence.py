@@ -52,7 +52,7 @@ class BodyEvidence:
 
 
 def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
-    """Return the predictions of a model's drawing; None if the model has no drawing."""
+    """Return the object that predicts from a model's drawing; None if the model has no drawing."""
     # isinstance would work the answers out to look for them.
     return cast(DrawnMechanism, model.base).places if hasattr(type(model.base), "places") else None
 
@@ -60,7 +60,7 @@ def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
 def body_evidence(
     table: MeasuredTable, answers: PlaceAnswers, input_mm: Array, rng: np.random.Generator
 ) -> tuple[BodyEvidence | None, tuple[str, ...]]:
-    """Search for the hinge, link or pivot that explains a table's channels.
+    """Search for the hinge, link or pivot whose change explains the measured channels of a table.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def _runs_among(runs: tuple[slice, ...], rows: NDArray[np.intp]) -> tuple[slice,
 def added_everywhere(answers: PlaceAnswers, input_mm: Array, sizes: Mapping[str, float]) -> dict[str, Array] | None:
     """Change of every channel caused by given explanations of the drawing, by the key of the explanation.
 
-    None is returned if the drawing does not contain the place of one of the explanations.
+    The function returns None if the drawing does not contain the place of one of the explanations.
 
     Parameters
     ----------

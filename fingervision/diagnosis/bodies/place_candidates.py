@@ -1,4 +1,4 @@
-"""Candidate explanations: a faulty hinge, link or pivot, and effects of stage or camera that look similar."""
+"""Candidate explanations: a faulty hinge, link or pivot, and effects of stage or camera with a similar signature."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -61,12 +61,12 @@ class Candidate:
 
     @property
     def key(self) -> str:
-        """Name and place in the form used in a report: `hinge_stiffness_error@right hinge 2`."""
+        """Name of the effect and its place, in the form used in a report: `hinge_stiffness_error@right hinge 2`."""
         return effect_key(self.name, self.place)
 
     @property
     def full_key(self) -> str:
-        """Key that includes the misplaced end of a link, in the form used in a `model.toml`."""
+        """Key as in a report, extended by the misplaced end of a link, in the form used in a `model.toml`."""
         return effect_key(self.name, self.place, self.detail)
 
 
@@ -78,7 +78,7 @@ def candidates_of(prediction: BodyPrediction) -> tuple[Candidate, ...]:
 
 
 def _forms(*parts: DrawnPart) -> list[tuple[str, DrawingForm]]:
-    """Names and forms of the effects that change one of these parts of a drawing, in the catalogue's order."""
+    """Names and forms of the effects that change a given kind of part of a drawing, in the catalogue's order."""
     forms = [(name, effect.in_drawing) for name, effect in catalogue().items()]
     return [(name, form) for name, form in forms if form is not None and form.part in parts]
 
@@ -176,7 +176,7 @@ def _slipping(prediction: BodyPrediction, flexure: int) -> Added:
 
 
 def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Candidate]:
-    """Candidates of a link together with its mirror image: equal changes alter the ratio, opposite the symmetry."""
+    """Candidates of a link and its mirror image together: equal changes alter the ratio, opposite ones the symmetry."""
     found = []
     mirrored = mirror_of(prediction)
     by_key = {(each.place, each.detail): each for each in singles if each.part is DrawnPart.LINK}
@@ -195,7 +195,7 @@ def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Can
 
 
 def _by_length(prediction: BodyPrediction, one: Candidate, other: Candidate, sign: float) -> float:
-    """Ratio of the openings, or share of the right finger, per relative change of both links' lengths."""
+    """Change of the motion ratio, or of the right finger's share, per relative change of the lengths of both links."""
     answers = prediction.answers
     if GAP not in answers.mechanism.pairs:
         return 0.0
@@ -215,7 +215,7 @@ def _together(one: Candidate, other: Candidate, sign: float, scale: float) -> Ad
 
 
 def _without_place(prediction: BodyPrediction) -> list[Candidate]:
-    """Errors of the recorded input and of the picture's scale."""
+    """Candidates without a place in the drawing: errors of the recorded input and of the picture's scale."""
     is_mm = np.array([name.endswith("_mm") for name in prediction.channels])
     added: dict[DrawnPart, Added] = {
         DrawnPart.INPUT: lambda ratio: ratio * prediction.drawn,

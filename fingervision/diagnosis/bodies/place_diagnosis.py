@@ -48,8 +48,8 @@ def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[Measure
     added = None if answers is None else added_everywhere(answers, table.input_mm, placed)
     if answers is None or added is None:
         raise DataError(
-            f"The effects of the model must have places that {model.base_path} draws, but {' and '.join(placed)} "
-            "have not: diagnose again, or leave them out."
+            f"Every effect at a hinge or link must name a part that {model.base_path} contains, but "
+            f"{' and '.join(placed)} do not: diagnose again, or remove these effects from the model."
         )
     rest = {key: values for key, values in model.effects.items() if key not in placed}
     return _less(table, added, answers), replace(model, effects=rest)
@@ -100,7 +100,7 @@ def diagnose_with_bodies(
 
 
 def _place_alone(done: "Diagnosis") -> "Diagnosis":
-    """Return a diagnosis that contains the faulty place only."""
+    """Return a diagnosis that names the faulty place only, without effects of the gap."""
     d = done.report.disagreement
     report = replace(
         done.report,
@@ -116,7 +116,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
 
 
 def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: PlaceAnswers) -> MeasuredTable:
-    """Correct the gap for the difference between condensed bodies and bars joined at points, some 0.1 %."""
+    """Correct the gap for the difference (about 0.1 %) between condensed bodies and bars that are joined at points."""
     u = np.array([0.0, 1.0])
     bare = model.base.respond(u)
     drawn = answers.answer().by_input
@@ -130,7 +130,7 @@ def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: Plac
 
 
 def _driven_input(done: "Diagnosis") -> Array:
-    """Input that the mechanism receives: the recorded input after the drive effects that poses do not decide on."""
+    """Input that the mechanism receives: the recorded input after the drive effects that the poses do not determine."""
     chain = done.data.chain
     history = chain.history if chain.path is None else chain.path.history
     input_mm = history.input_mm
@@ -142,7 +142,7 @@ def _driven_input(done: "Diagnosis") -> Array:
 
 
 def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:
-    """Subtract the changes caused by an explanation from the channels of a table."""
+    """Subtract the changes that an explanation causes from the channels of a table."""
     changes: dict[str, object] = {"gap_mm": table.gap_mm - added[GAP]}
     if table.midline_mm is not None:
         first, last = answers.mechanism.pairs[GAP_PAIR]

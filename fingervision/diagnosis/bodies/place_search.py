@@ -88,7 +88,7 @@ class PlaceSearch:
         return Fitted(candidate, size, norm**-0.5, max(gain, 0.0), signature)
 
     def _fit_play(self, candidate: Candidate) -> Fitted:
-        """Scan the size of a play, because the width of the play decides at which inputs it is crossed."""
+        """Fit the size of a play by a scan, because the width of the play decides at which inputs it is crossed."""
         left, found = self._left, []
         for play_mm in PLAYS_MM:
             unit = self.signature(candidate, float(play_mm)) / play_mm
@@ -110,7 +110,7 @@ class PlaceSearch:
         return Fitted(candidate, size, max(norm, 1e-300) ** -0.5, max(gain, 0.0), signature)
 
     def refined(self, fitted: Fitted) -> Fitted:
-        """Refit with the signature at the fitted size, until the size no longer changes."""
+        """Refit a candidate with its signature at the fitted size, until the size no longer changes."""
         if fitted.candidate.part is DrawnPart.PIVOT:
             return fitted
         for _ in range(STEPS):
@@ -137,7 +137,7 @@ class PlaceSearch:
         return float(quantile * degrees / max(degrees - count - 1, 1))
 
     def structure(self, left: Array) -> float:
-        """Chi-square of generic shapes (bends, kinks and directions of every channel) in the residual."""
+        """Gain in chi-square by generic shapes (bends, kinks and directions of every channel) in the residual."""
         u = self.prediction.input_mm
         reach = max(float(np.abs(u).max()), 1e-12)
         shapes = [u / reach, (u / reach) ** 2, np.abs(u) / reach, np.tanh(8.0 * u / reach)]
@@ -181,7 +181,7 @@ class PlaceSearch:
         )
 
     def _alike(self, best: Fitted, other: Fitted) -> bool:
-        """Whether these data cannot distinguish two explanations."""
+        """Whether these data cannot distinguish two given explanations."""
         if best.gain - other.gain < NOT_REFUTED:
             return True
         return other.gain > best.gain / 3.0 and min(apart(best, other), apart(other, best)) < ALIKE

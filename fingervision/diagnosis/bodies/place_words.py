@@ -23,7 +23,7 @@ MOST = 6
 
 
 def fitted_words(fitted: Fitted) -> str:
-    """Sentence on a fitted explanation: `right hinge 2: 14 +- 3 % too soft`."""
+    """Sentence on a fitted explanation, such as `right hinge 2: 14 +- 3 % too soft`."""
     candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
     if candidate.part is DrawnPart.PIVOT:

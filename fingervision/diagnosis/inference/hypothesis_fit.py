@@ -68,11 +68,11 @@ class _JointSquares:
         return self.latest[key]
 
     def squared(self, residual: Array) -> float:
-        """Chi-square with the best run offsets."""
+        """Chi-square of a residual with the best run offsets."""
         return self.problem.offsets.squared(residual, self.metric)
 
     def reweighted(self, residual: Array) -> "_JointSquares":
-        """Adapt the spread of the run offsets to the residual, unless it is fixed."""
+        """Adapt the standard deviation of the run offsets to the residual, unless it is fixed."""
         offsets = self.problem.offsets
         spread = self.sigma_mm if self.sigma_mm is not None else offsets.spread(residual)[0]
         return replace(self, metric=offsets.metric(spread))
@@ -177,7 +177,7 @@ def _bounds(listed: list[tuple[str, Parameter]]) -> tuple[Array, Array]:
 
 
 def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
-    """Group parameters that can be differentiated by one prediction: start states of runs affect separate rows."""
+    """Group parameters whose derivatives one prediction gives: start states of different runs affect separate rows."""
     groups: dict[object, list[int]] = {}
     for i, (name, parameter) in enumerate(listed):
         groups.setdefault(i if parameter.run is None else name, []).append(i)

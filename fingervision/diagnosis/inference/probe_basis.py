@@ -42,7 +42,7 @@ class Probes:
 
 
 def _speed(input_mm: Array, time_s: Array) -> Array:
-    """Speed as the slope over `SPAN` samples, because differences of neighbours contain the input's errors."""
+    """Speed (mm/s) as the slope over `SPAN` samples: differences of neighbours would contain the input's errors."""
     if input_mm.size <= SPAN:
         return np.full(input_mm.size, float(np.ptp(input_mm)) / max(float(np.ptp(time_s)), 1e-9))
     ahead = np.minimum(np.arange(input_mm.size) + SPAN // 2 + 1, input_mm.size - 1)
@@ -53,7 +53,7 @@ def _speed(input_mm: Array, time_s: Array) -> Array:
 
 
 def probes(history: History, whitener: Whitener, most: int) -> Probes:
-    """Make steps, bumps, waves and slopes over time, input, direction and run; in gap, midline, left and right.
+    """Make generic shapes (steps, bumps, waves, slopes) over time, input, direction and run, for each measured channel.
 
     Parameters
     ----------

@@ -53,8 +53,8 @@ def search(
 ) -> Findings:
     """Find the best explanation, the indistinguishable ones, and the remaining structure.
 
-    The stages are the fits of one, two and three effects, the test for *unknown*, and the ambiguity set; each stage
-    returns a new state.
+    The search fits one, then two, then three effects, tests for the verdict *unknown*, and collects the ambiguity set;
+    each of these functions returns a new state.
 
     Parameters
     ----------

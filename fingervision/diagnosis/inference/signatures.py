@@ -23,7 +23,7 @@ within the bounds."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signatures:
-    """Whitened columns with the parameters that produced them.
+    """Whitened signatures as columns, with the parameters that produced each of them.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Signatures:
     def gains(
         self, residual: Array, offsets: RunOffsets, metric: Array, along: Array | None = None
     ) -> tuple[Array, Array]:
-        """Reduction of chi-square that each column alone achieves in a residual, and its coefficient; shape (k,).
+        """Reduction of chi-square by each column alone in a residual, and the column's fitted coefficient; shape (k,).
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Signatures:
         return out
 
     def begin(self, index: int, coefficient: float) -> dict[str, float]:
-        """Parameters from which a search starts, with the amplitude scaled by the coefficient."""
+        """Parameters from which a search starts; the amplitude is scaled by the fitted coefficient of the signature."""
         start, grow = dict(self.starts[index]), self.grows[index]
         if grow is not None:
             name, neutral, step, lower, upper = grow
@@ -120,7 +120,7 @@ def signatures(problem: Problem) -> Signatures:
 
 
 def start_patterns(history: History) -> tuple[dict[str, float], ...]:
-    """Start states from which to search: in the middle, as left by the first motion, and at the other end."""
+    """Start states from which to search: the middle of the play, the end left by the first motion, the other end."""
     first = []
     for run in history.runs:
         moves = np.diff(history.input_mm[run])

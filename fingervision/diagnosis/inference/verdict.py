@@ -32,7 +32,7 @@ LACK_OF_FIT = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """Share of the disagreement that an explanation leaves unexplained.
+    """The residual that an explanation leaves, as a share of the disagreement.
 
     All values are RMS over left and right if both are measured, else over the gap; the midline's constant, the runs'
     deviations from their common mean, and outliers are removed.
@@ -73,10 +73,10 @@ class Standing:
 
     @property
     def is_little(self) -> bool:
-        """Whether the remaining residual is noise, or a small part of the disagreement.
+        """Whether the remaining residual is only noise, or a small part of the disagreement.
 
-        Where repeats tell the noise, structure beyond it is known for what it is, and may be no more than the forms of
-        effects leave over on real stages.
+        If repeated readings determine the noise, any residual beyond it is structure; a small structure may still be
+        the usual inexactness of the effects' formulas on real stages.
         """
         if self.after_mm <= STANDING_SHARE * self.before_mm:
             return True
@@ -98,7 +98,7 @@ class Standing:
 
 
 def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
-    """Compute the unexplained share; `before_mm` and `after_mm` have shape (channels * n,)."""
+    """Compute the share of the disagreement that remains; `before_mm` and `after_mm` have shape (channels * n,)."""
     if data.run_gains is not None:
         after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
@@ -139,7 +139,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
-    """Subtract each run's deviation from the mean of all runs; a significant common constant remains.
+    """Subtract each run's deviation from the mean of all runs; a significant offset shared by all runs remains.
 
     The mean is not significant if random zeroing of the runs, judged by their scatter, would cause as large a mean.
     """

@@ -60,12 +60,12 @@ class PureError:
 
     @property
     def has_trend(self) -> bool:
-        """Whether the repeats show a drift or a run-in."""
+        """Whether the repeated readings show a drift or a run-in."""
         return self.trend_sigmas > TREND_SIGMAS
 
 
 def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Number the combinations of position and side of approach that were visited.
+    """Number the combinations of position and side of approach that the stage visited.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def pure_error(
     place_mm: Array | None = None,
     runs: tuple[slice, ...] = (),
 ) -> PureError | None:
-    """Estimate the scatter of repeats; None if there are too few repeats.
+    """Estimate the scatter of repeated readings; None if there are too few repeated readings.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def pure_error(
 
 
 def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
-    """Subtract each run's own zero if it causes most of the scatter; return also the number of zeros estimated."""
+    """Subtract each run's own zero if it causes most of the scatter; return also the number of subtracted zeros."""
     if len(runs) < 2 or not groups:
         return values, 0
     number = np.zeros(values.size, dtype=np.intp)

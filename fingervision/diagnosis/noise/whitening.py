@@ -69,7 +69,7 @@ class Whitener:
         object.__setattr__(self, "_filter", (gains, np.asarray(shares, dtype=np.float64), total))
 
     def _shares(self, channel: int) -> Array:
-        """What a lasting error of the input gives a channel (mm): the gap is the one that it reaches; shape (n,)."""
+        """Contribution (mm) of a lasting error of the input to each sample of a channel; shape (n,)."""
         return np.asarray(self.input_mm if channel == 0 else np.zeros(self.input_mm.size), dtype=np.float64)
 
     def columns(self, columns: Array) -> tuple[Array, float]:
@@ -85,12 +85,12 @@ class Whitener:
         return _filtered(columns, gains[part], shares[part])
 
     def one(self, column: Array) -> Array:
-        """Whiten one column of shape (channels * n,)."""
+        """Whiten a single column of shape (channels * n,)."""
         return self.columns(column[:, None])[0][:, 0]
 
 
 def _filtered(columns: Array, gains: Array, shares: Array) -> Array:
-    """Innovations of columns, shape (m, k)."""
+    """Innovations of a Kalman filter (whitened values) of columns, shape (m, k)."""
     whole = np.ascontiguousarray(columns, dtype=np.float64)
     out = np.empty_like(whole)
     _innovations(whole, gains, shares, out)

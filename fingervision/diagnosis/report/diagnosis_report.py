@@ -130,7 +130,7 @@ def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:
 
 
 def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
-    """Sentence that successive repeats are more similar than their scatter, which indicates a drift or a run-in."""
+    """Sentence for repeated readings that change gradually, which indicates a drift or a run-in."""
     if errors is None or not errors[0].has_trend:
         return ()
     return (

@@ -13,10 +13,11 @@ TAIL = 0.05
 
 
 def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Parameter]]:
-    """Find time constants and widths that the data do not keep away from the upper end of their search range.
+    """Find time constants and widths that the data do not bound above within their search range.
 
-    Beyond that end the effect does the same: an exponential that is far from over is a straight line, whose slope alone
-    is known. The posterior within the range would state both time constant and amplitude too surely.
+    Beyond the upper end of the range the effect does not change: an exponential at its beginning is a straight line, of
+    which only the slope is known. The posterior within the range would state time constant and amplitude with too small
+    an uncertainty.
 
     Parameters
     ----------
