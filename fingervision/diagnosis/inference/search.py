@@ -106,7 +106,7 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     pairs = [e for e in swapped(problem, state.atoms, pairs) if not within_a_step(problem, e)]
     state = replace(state, pairs=pairs)
     # Beside a simpler form a second effect would gain what the richest has gained already.
-    shown = beyond_the_input(problem, singles[0], pairs)
+    shown = _beside_roundings(state, pairs)
     if not shown:
         return state
     large = added_share(problem, singles[0], shown[0]) > SMALL_SHARE
@@ -117,6 +117,24 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     return state
 
 
+def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:
+    """Pairs that change the prediction by more than the recorded input's error.
+
+    If the best pair does not, it follows the roundings of an encoder; another pair must then gain beside it, because
+    it may follow the same roundings in a larger form.
+    """
+    shown = beyond_the_input(state.problem, state.singles[0], pairs)
+    if not shown or shown[0] is pairs[0]:
+        return shown
+    base, kept = pairs[0], list[Explanation]()
+    for pair in shown[:LIKELIEST]:
+        more = {name: pair.values[name] for name in pair.names if name not in base.names}
+        together = fit(state.problem, (*base.names, *more), {**base.values, **more})
+        if more and state.speaks_for([together], base):
+            kept.append(pair)
+    return kept
+
+
 def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     """Fit triples, unless one or two probes with fewer effects fit as well."""
     if len(state.best.names) != 2:
@@ -125,7 +143,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     bases = different(problem, pairs, PAIRS_EXTENDED)
     asked = None if state.evidence is None else state.evidence.thresholds
     tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH, asked=asked)
-    triples = beyond_the_input(problem, state.best, [e for e in tried if not within_a_step(problem, e)])
+    triples = [e for e in tried if not within_a_step(problem, e)]
     state = replace(state, triples=triples)
     if not triples:
         return state
@@ -137,8 +155,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
         # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
         return replace(state, imitation=imitation) if large else state
     triples.sort(key=lambda e: e.bic(state.values))
-    again = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
-    triples = beyond_the_input(problem, state.best, again) or triples
+    triples = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
     return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST], state.values), peers=triples)
 
 
