@@ -1,10 +1,10 @@
 """Possible displacement of a whole edge by a video codec, estimated from the codec's quantiser step.
 
-In an edge parallel to the codec's blocks all rows have a common error, which the scatter of the rows about a line does
-not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture either.
-The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For an edge
-of contrast A the coefficients change by about A per pixel of displacement, so that the displacement is a fixed fraction
-of `step / A`.
+If an edge is parallel to the codec's blocks, all its rows share an error, which the scatter of the rows about a line
+does not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture
+either. The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For
+an edge of contrast A the coefficients change by about A per pixel of displacement, so that the displacement is a fixed
+fraction of `step / A`.
 """
 
 from dataclasses import replace
@@ -40,7 +40,7 @@ EIGHT_BITS = 255.0
 
 
 def displaced_px(step: float, contrast: float) -> float:
-    """Standard uncertainty of an edge's position from a codec error common to the whole edge (pixels).
+    """Standard uncertainty of an edge's position (px) from a codec error that the whole edge shares.
 
     Parameters
     ----------
@@ -125,8 +125,8 @@ def _stored_contrast(level: float, contrast: float, light: Floats, top_level: in
 def _by_slope(slope: float) -> float:
     """Displacement of the measuring point across the finger per displacement of an outline along its normal.
 
-    A leaning edge moves across by more than along its normal. The tip is displaced as well, by itself, and takes the
-    measuring height with it, along the edge.
+    A leaning edge moves farther across the finger than along its own normal. The tip is displaced by its own codec
+    error as well, and shifts the measuring height along the edge.
     """
     return hypot(hypot(1.0, slope), slope)
 

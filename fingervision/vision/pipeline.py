@@ -209,7 +209,7 @@ def _measured(
     coded: _Coded,
     scale: int,
 ) -> _Attempt:
-    """Measure a pair of fingers; if they are rough, also over longer flanks, and keep the more certain result."""
+    """Measure a pair of fingers; if they are rough, measure longer flanks too, and keep the more certain result."""
     upright = fingers.orientation.view(grey)
     how = (settings, scale, light_gap, coded)
     edges, outcome = _edges_and_gap(upright, fingers, *how)
@@ -291,7 +291,7 @@ def _with_two_tones(
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:
-    """Full scale of the light; a measured camera response has its own."""
+    """Full scale of the light, which is different for a measured camera response."""
     known = settings.response.top_level
     bits = settings.bits if known is None or grey.dtype == np.uint8 else known.bit_length()
     found = top_level(grey, bits)

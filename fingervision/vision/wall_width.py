@@ -1,9 +1,9 @@
 """Displacement of an edge that a side wall may have caused, by the width of the flanks alone.
 
 A wall of breadth w whose light is a share s of the step's adds s (1 - s) w^2 to the variance of the flank's spread, and
-puts a single fitted step (1 - s) w beyond the finger's own edge. Where the wall is narrower than the blur, or the flank
-too curved for a mean profile, only this added variance shows it. The outer flanks would tell a wall from motion; where
-they are out of view, the tips are all there is to compare with.
+puts a single fitted step (1 - s) w beyond the finger's own edge. If the wall is narrower than the blur, or the flank
+too curved for a mean profile, only this added variance indicates the wall. The outer flanks would distinguish a wall
+from motion; if they are out of view, the flanks can be compared only with the tips.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ EDGE_SHARE = 0.3
 def wall_limits_px(edges: EdgePoints, displaced_px: Displacement) -> list[float] | None:
     """Largest displacement of each inner edge by a side wall; None where the flanks are as sharp as the tips.
 
-    None as well where the outer flanks are in view, because these tell a wall from motion.
+    The result is also None if the outer flanks are in view, because these distinguish a wall from motion.
 
     Parameters
     ----------
