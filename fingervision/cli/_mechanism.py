@@ -62,7 +62,9 @@ def predict(
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     if kind not in (*_KINDS, "stiffness_matrix", "all"):
-        raise UsageError(f"A mechanism.toml is computed by the kinds {', '.join(_KINDS)}, but --kind asks for {kind}.")
+        raise UsageError(
+            f"A mechanism.toml can be computed by the kinds of model {', '.join(_KINDS)}, but --kind is {kind}."
+        )
     wanted = _KINDS if kind == "all" else (kind,)
     models: dict[str, MechanismModel] = {}
     refusals: dict[str, FingervisionError] = {}
@@ -136,7 +138,7 @@ def predict(
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Add the name of the drawing's file to the message of an error."""
+    """Add the name of the drawing's file to the message of an error that is raised in the `with` block."""
     try:
         yield
     except FingervisionError as error:
@@ -146,14 +148,14 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inputs of the static table (mm): the inputs of the drive table, or enough inputs for a smooth curve."""
+    """Inputs of the static table (mm): those of the drive table, or enough evenly spaced inputs for a smooth curve."""
     if inputs.size < 2:
         raise UsageError(f"--drive must hold at least two different inputs, but holds {inputs.size}.")
     return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
 
 
 def _curve(states: list[MechanismState]) -> PchipInterpolator:
-    """Lengths and force over the input, in the column order of a motion; contacts may cause kinks in these curves."""
+    """Lengths and force over the input, in the column order of the dynamic response; contacts may cause kinks."""
     rows = [
         [*state.pairs_mm.values(), *(part for probe in state.probes_mm.values() for part in probe), state.force_n]
         for state in states

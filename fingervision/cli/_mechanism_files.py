@@ -15,6 +15,8 @@ from fingervision.models.mechanism_state import MechanismState
 from fingervision.storage.simulation_csv import POSE
 
 _STYLES = ("-", "--", "-.")
+_STILL = 0.01
+"""Range of a distance, as a share of it, below which it is plotted without its mean, whose digits would hide it."""
 
 
 def write_figures(table: Mapping[str, Mapping[str, float]], path: Path) -> None:
@@ -80,7 +82,10 @@ def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[Mechanis
         inputs = [state.input_mm for state in rows]
         style = _STYLES[place % len(_STYLES)]
         for number, (name, lengths) in enumerate(_lengths(mechanism, rows).items()):
-            upper.plot(inputs, lengths, style, color=f"C{number}", label=f"{name} ({kind})")
+            still = np.ptp(lengths) < _STILL * max(np.abs(lengths))
+            rest = round(float(np.mean(lengths)), 6) if still else 0.0
+            shown = f"{name} minus {rest:g} mm" if rest else name
+            upper.plot(inputs, np.array(lengths) - rest, style, color=f"C{number}", label=f"{shown} ({kind})")
         middle.plot(inputs, [state.force_n for state in rows], style, color="0.2", label=kind)
         for number, name in enumerate(rows[0].drives_n if len(mechanism.drives) > 1 else ()):
             forces = [state.drives_n[name] for state in rows]

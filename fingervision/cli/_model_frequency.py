@@ -22,6 +22,8 @@ from fingervision.models.modal_model import GAP, FreeModes, ModalModel, describe
 from fingervision.models.motion_in_time import MODES
 
 _MOST_MODES = 60
+_LEAST_RANGE, _LEAST_DEG = 1.1, 1.0
+"""Least range of the axes, as a ratio and in degrees."""
 _STYLES = ("-", "--", "-.")
 
 
@@ -100,9 +102,9 @@ def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -
         known = described(law, rad_s).size
         if known < rad_s.size and rad_s[known] / (2.0 * pi) < band.last_hz:
             raise UsageError(
-                f"--damping {damping} describes modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz alone (its ratio "
-                f"leaves 0 to 0.3 beyond), but --frequency goes to {band.last_hz:g} Hz past the mode at "
-                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end it before, or take modal:0.025."
+                f"--damping {damping} is valid for modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz only (beyond, "
+                f"the damping ratio is outside 0 to 0.3), but --frequency goes to {band.last_hz:g} Hz past the mode at "
+                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end the band before that mode, or take modal:0.025."
             )
     frequencies = resolved_frequencies_hz(reduced, free, law, band.first_hz, band.last_hz)
     return frequency_response(reduced, free, frequencies, law)
@@ -159,6 +161,15 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     for axes in (lower, lower_force):
         axes.set_ylabel("phase / degrees")
         axes.set_xlabel("frequency / Hz")
+    for axes in (upper, upper_force):
+        low, high = axes.get_ylim()
+        if high < _LEAST_RANGE * low:
+            # A decade's ticks on a line next to constant would all read alike.
+            axes.set_yscale("linear")
+            axes.set_ylim(low / _LEAST_RANGE, high * _LEAST_RANGE)
+    for axes in (lower, lower_force):
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, -_LEAST_DEG), max(high, _LEAST_DEG))
     for axes in (upper, lower, upper_force, lower_force):
         axes.grid(alpha=0.3, which="both")
     upper.legend()

@@ -38,7 +38,7 @@ the rows per period: at the usual damping of 0.025 the vibration has then decaye
 
 
 def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
-    """Interpolate the drive linearly to a higher sampling rate, if requested."""
+    """Interpolate the drive table linearly to a higher sampling rate, if the user requests one."""
     if rate_hz is None:
         return drive
     if not (isfinite(rate_hz) and rate_hz > 0.0):
@@ -92,7 +92,7 @@ def for_picture(drive: DriveHistory, first_mode_hz: float) -> DriveHistory:
 
 @dataclass(frozen=True, slots=True)
 class MotionAsked:
-    """Options of `model` for responses over time and frequency, checked before any computation."""
+    """Options of `model` for responses over time and over frequency, checked before any computation."""
 
     drive: DriveHistory | None
     modes: ModesWanted | None
@@ -102,7 +102,7 @@ class MotionAsked:
 
     @property
     def moves(self) -> bool:
-        """Whether a response over time or over frequency was requested."""
+        """Whether the user requested a response over time or over frequency."""
         return self.drive is not None or self.modes is not None or self.band is not None
 
 

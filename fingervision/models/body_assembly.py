@@ -27,7 +27,7 @@ _OVER = 1.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyAssembly:
-    """The meshed and condensed bodies, and which motions of their frames are fixed or driven.
+    """The meshed and condensed bodies, and which motions of their coordinate frames are fixed or driven.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class BodyAssembly:
         return field, csr_matrix(slopes)
 
     def motion_mm(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
-        """Displacement of a point of the nearest body, from the frames' motions."""
+        """Displacement of a point of the nearest body, from the coordinate frames' motions (mm)."""
         plate = self.plate
         nodes, weights = element_weights(plate.nodes_mm, plate.nodes_of_triangles, point)
         number = int(self.piece[nodes[0]])
@@ -95,7 +95,7 @@ class BodyAssembly:
 
 
 class _Frames:
-    """Collect the coordinate frames of all bodies, the body of each frame, and the fixed and driven motions."""
+    """Collects the coordinate frames of all bodies, the body of each frame, and the fixed and driven motions."""
 
     def __init__(self, plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> None:
         self.plate, self.mechanism, self.size_mm = plate, mechanism, size_mm
@@ -107,7 +107,7 @@ class _Frames:
         self._taken: set[int] = set()
 
     def add(self, frame: Frame, body: int) -> int:
-        """Add a frame to those of a body; return the index of the first of the frame's three motions."""
+        """Add a coordinate frame to those of a body; return the index of the first of its three motions."""
         self.found.append(frame)
         self.owner.append(body)
         return 3 * len(self.found) - 3
@@ -115,7 +115,8 @@ class _Frames:
     def face(self, nodes: Indices, tied: tuple[str, ...]) -> list[tuple[int, bool]]:
         """Add the coordinate frames of a face, one for each body that the face touches.
 
-        Return, for each frame, the index of its first motion and whether the face's tied components prevent rotation.
+        Return, for each coordinate frame, the index of its first motion and whether the face's tied components prevent
+        rotation.
         """
         added = []
         for body in np.unique(self.piece[nodes]).tolist():

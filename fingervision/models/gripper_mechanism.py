@@ -14,7 +14,8 @@ _FAR = 3.0
 def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mechanism:
     """Describe the right half as a mechanism that slides along the symmetry axis; its tip may touch that axis.
 
-    The gap is twice the distance of the probe `tip` from the axis, and the force of both halves is twice the drive's.
+    The gap is twice the distance of the probe `tip` from the axis, and the force of the whole gripper is twice the
+    half's force at the drive.
     """
     x0, x1, low, high = _drive_box(gripper)
     top = gripper.links.drive_block_mm[3]

@@ -105,15 +105,15 @@ class MechanismChain:
     def _path_from(self, ground: set[int], driven: int) -> list[int]:
         """List the flexures on the path from the fixed body (ground) to the driven body, in order.
 
-        In a chain the number of flexures is one less than the number of bodies, the ground included.
+        In a chain, the number of flexures is one less than the number of bodies, including the fixed one.
         """
         name = self.mechanism.name
         merged = [tuple(-1 if body in ground else body for body in join) for join in self._joins]
         bodies = {body for join in merged for body in join}
         if len(merged) != len(bodies) - 1 or any(first == last for first, last in merged):
             raise ModelError(
-                f"The stiffness matrix is that of a chain, but the flexures of {name} form a loop; take --kind lumped "
-                "or finite_element."
+                f"The stiffness-matrix model needs bodies in a chain, but the flexures of {name} form a loop; take "
+                "--kind lumped or finite_element."
             )
         reached: dict[int, list[int]] = {-1: []}
         while driven not in reached:
@@ -124,8 +124,8 @@ class MechanismChain:
                         reached[other], grown = [*reached[known], place], True
             if not grown:
                 raise ModelError(
-                    f"The stiffness matrix is that of a chain from a fixed face to the drive, but {name} has none; "
-                    "take --kind lumped or finite_element."
+                    f"The stiffness-matrix model needs bodies in a chain from a fixed face to the drive, but {name} "
+                    "has none; take --kind lumped or finite_element."
                 )
         self._reached = reached
         return reached[driven]
@@ -139,8 +139,8 @@ class MechanismChain:
             touching = self._touching(face)
             if len(touching) != 1 or not touching <= set(bodies):
                 raise ModelError(
-                    f"The stiffness matrix is that of a chain, but {mechanism.name} is held at {face.name} too; take "
-                    "--kind lumped or finite_element."
+                    f"The stiffness-matrix model needs bodies in a chain that is fixed at one end, but "
+                    f"{mechanism.name} is held at {face.name} too; take --kind lumped or finite_element."
                 )
             held[bodies.index(touching.pop())] |= self._held_by(face, (component,))
         boxes = np.array([drive.face.box_mm for drive in drives])
@@ -214,7 +214,7 @@ class MechanismChain:
         return force + elastic.force_error, stress + elastic.stress_error
 
     def touch_input_mm(self) -> dict[str, float]:
-        """Return no contacts, because this model does not include contact."""
+        """Return no contact inputs, because this model does not include contact."""
         return {}
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:

@@ -38,7 +38,7 @@ rounding leaves 1e-11."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MechanismEquilibrium:
-    """State of a mechanism at one input.
+    """State of a driven mechanism at one input: displacements, forces and contact.
 
     Parameters
     ----------
@@ -164,9 +164,9 @@ class DrivenMechanism:
         return np.asarray(self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ load_n)))
 
     def touch_inputs_mm(self) -> list[float | None]:
-        """Input nearest to zero at which each contact pair first touches, for small displacements (mm).
+        """Input nearest to zero (mm) at which each contact pair first touches, for small displacements.
 
-        None is returned for a pair that never touches.
+        A pair that never touches has None.
         """
         found: list[float | None] = []
         for gaps in self.gaps:
@@ -227,7 +227,7 @@ class DrivenMechanism:
         return gap, slope, bend
 
     def _followed(self, input_mm: float, pairs: Pairs) -> MechanismEquilibrium:
-        """Follow the equilibria from rest, in steps that are enlarged after convergence and halved after a failure."""
+        """Follow the equilibria from rest, in steps that grow after convergence and are halved after a failure."""
         moved = np.zeros(self.by_input.size)
         path = [(0.0, moved)]
         touching = np.zeros(self._all_gaps(pairs, moved)[0].size, dtype=bool)
@@ -268,7 +268,7 @@ class DrivenMechanism:
     def _settled(
         self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
     ) -> tuple[Array, Flags, Array] | None:
-        """Hold nodes that would penetrate and release nodes under tension, repeatedly, until there are none."""
+        """Hold nodes that would penetrate and release nodes under tension, until no such nodes are left."""
         for _ in range(_SET_CHANGES):
             found = self._newton(moved, touching, pressed, input_mm, pairs)
             if found is None:

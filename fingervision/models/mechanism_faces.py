@@ -54,7 +54,7 @@ def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
 
 
 def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
-    """Whether a face is parallel to x or y (`component`), so that prescribing that component leaves it free to rotate.
+    """Whether a face is parallel to x or y (`component`), so that prescribing that component lets it rotate.
 
     A face at another angle is driven by its mean motion: with the component prescribed at every node it would have to
     stretch in order to rotate.

@@ -12,7 +12,7 @@ MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     """Compute response per 1 mm of input, input range up to yield, inputs of first contact, natural frequencies.
 
-    Finite elements also have the effects of weight, warmth and a part held, and the motions out of the plane.
+    Finite elements also give the effects of weight, temperature and a gripped part, and the motions out of the plane.
 
     Parameters
     ----------

@@ -161,7 +161,7 @@ class MechanismFrame:
         )  # fmt: skip
 
     def _gaps_of(self, contact: Contact) -> Callable[[Array], Gaps]:
-        """Function that gives the gaps of a contact at the two nodes of its face that are farthest apart."""
+        """Return a function that gives the gaps of a contact at the two nodes of its face that are farthest apart."""
         plate = self.plate
         pair = contact_pair(plate, contact, self.mechanism, self._size_mm)
         places = plate.nodes_mm[:, pair.nodes]
@@ -193,7 +193,7 @@ class MechanismFrame:
 
     @cached_property
     def _errors(self) -> tuple[float, float]:
-        """Relative errors of force and stress: those of bent flexures, larger where flexures are not bent."""
+        """Relative errors of force and stress: those of bent flexures, larger for other loads on the flexures."""
         loads, plate_mm = self._end_loads(self.driven.unit_displacement, large=False), self.mechanism.plate_mm
         misused, every, stress = 0.0, 0.0, 0.0
         for span, own in zip(self.spans, self.segments, strict=True):

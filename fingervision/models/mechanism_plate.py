@@ -75,7 +75,7 @@ class MechanismPlate:
             self._hold_back(width_effect=True)
 
     def _hold_back(self, *, width_effect: bool) -> tuple[ConstrainedZone, ...]:
-        """Make the plate, whose flexures its width holds back."""
+        """Make the plate with its flexures stiffened by the restraint of its width."""
         mechanism = self.mechanism
         zones = tuple(flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures)
         used = zones if width_effect else ()
@@ -138,7 +138,7 @@ class MechanismPlate:
         )  # fmt: skip
 
     def _wanders(self) -> bool:
-        """Whether the supports allow a rigid motion of the whole body."""
+        """Whether the supports allow a rigid motion of the whole mechanism."""
         x, y = self.plate.nodes_mm
         whole = np.zeros((3, self.plate.unknowns))
         whole[0, self.plate.x_dofs], whole[1, self.plate.y_dofs] = 1.0, 1.0
@@ -213,12 +213,12 @@ class MechanismPlate:
 
     @cached_property
     def probe_rows(self) -> dict[str, Array]:
-        """Displacements to the motion along x and y of every probe, shape (2, unknowns) each."""
+        """Matrices that convert displacements to the motion of every probe along x and y, shape (2, unknowns) each."""
         return {name: self.plate.rows_at(point) for name, point in self.mechanism.probes.items()}
 
     @cached_property
     def pair_rows(self) -> dict[str, Array]:
-        """Small displacements to the change of every pair's distance, shape (unknowns,) each."""
+        """Vectors that convert small displacements to the change of each pair's distance, shape (unknowns,) each."""
         found = {}
         for name, (a, b) in self.mechanism.pairs.items():
             apart = np.array(self.mechanism.probes[b]) - self.mechanism.probes[a]
@@ -269,7 +269,7 @@ class MechanismPlate:
         )
 
     def free_modes(self, count: int) -> FreeModes:
-        """Return the modes with the drive free along its direction."""
+        """Return the vibration modes with the drive free to move along its direction."""
         rad_s, shapes, drive = self._modes(drive_held=False, count=count)
         return FreeModes(rad_s, drive, changes(self.mechanism, self._probes_by(shapes)))
 

@@ -23,7 +23,7 @@ _FIRST = 4
 
 @dataclass(frozen=True, slots=True)
 class ModesWanted:
-    """Number of modes of each family, or the frequency up to which they are wanted (Hz)."""
+    """Number of natural modes of each family, or the frequency (Hz) up to which they are computed."""
 
     count: int | None = None
     highest_hz: float = inf
@@ -70,7 +70,7 @@ class MovingMechanism(Protocol):
 
 
 def parse_modes(text: str) -> ModesWanted:
-    """Parse how many modes are wanted: `6`, or all up to a frequency, `500Hz`.
+    """Parse the number of modes, such as `6`, or the frequency up to which they are computed, such as `500Hz`.
 
     Raises
     ------
@@ -179,6 +179,6 @@ def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
 
 
 def _way_to_meeting(x: Array, across: Array) -> float:
-    """Largest scale at which no point of the half crosses the symmetry axis."""
+    """Largest scale factor of a mode shape at which no point of the half crosses the symmetry axis."""
     closing = (across < 0.0) & (x > 1e-9 * float(x.max()))
     return float(np.min(-x[closing] / across[closing], initial=np.inf))

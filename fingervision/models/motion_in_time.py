@@ -74,7 +74,7 @@ def gripper_motion(
     """Compute the motion over a drive history; each run begins at rest at its first input.
 
     With small displacements the modes' equations are solved exactly. With large rotation or contact, a frame of bars is
-    integrated step by step if that takes at most 20 000 steps. Otherwise the gripper follows its equilibria, and the
+    integrated in time steps if at most 20 000 steps are needed. Otherwise the gripper follows its equilibria, and the
     modes at rest vibrate about them while the fingers do not touch, which is valid for small vibrations.
 
     Parameters

@@ -19,7 +19,7 @@ from fingervision.storage.drawing_numbers import bare_tables, changed_tables, nu
 from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import text_of
 
 _TOP = (
     "schema",
@@ -48,7 +48,7 @@ _FLEXURES = {
 def is_mechanism(path: Path) -> bool:
     """Whether a TOML file is a mechanism.toml (bodies or a template), not a gripper.toml."""
     try:
-        tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
+        tables = tomllib.loads(text_of(path))
     except (OSError, ValueError):
         return False
     return isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
@@ -108,7 +108,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
         The file cannot be read, or states an uncertainty that is none.
     """
     try:
-        tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
+        tables = tomllib.loads(text_of(path))
     except FileNotFoundError:
         raise InputFileError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError, RecursionError) as error:
