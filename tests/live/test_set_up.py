@@ -82,7 +82,7 @@ def test_height_polarity_and_settings(session: Session, tmp_path: Path) -> None:
             obey(session, {"do": "load_settings", "path": path})
     # A file that could well be read, were it not outside.
     outside = tmp_path.parent / f"{tmp_path.name}_settings.toml"
-    outside.write_text("px_per_mm = 10.0\n", encoding="utf-8")
+    outside.write_bytes((tmp_path / "out" / "settings.toml").read_bytes())
     for path in (str(outside), f"../{outside.name}"):
         with pytest.raises(UsageError, match="must lie inside"):
             obey(session, {"do": "load_settings", "path": path})
