@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _take_settings(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Take the values of options that are not given from a settings file."""
+    """Take the values of options that the user does not give from a settings file."""
     if path is None:
         return None
     from fingervision.storage.settings_toml import read_settings
@@ -41,7 +41,12 @@ OPTIONS = (
     click.option(
         "--px-per-mm",
         type=float,
-        help="The scale without its uncertainty; uncertainties then have only the random part.",
+        help="The scale as you state it; without --u-px-per-mm, uncertainties have only the random part.",
+    ),
+    click.option(
+        "--u-px-per-mm",
+        type=float,
+        help="Standard uncertainty of --px-per-mm, for instance of a ruler's reading; u_gap_mm then holds it.",
     ),
     click.option(
         "--below-tip-mm",
@@ -75,6 +80,9 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
             if options[given] is not None and sources[0] is not from_file and sources[1] is from_file:
                 # The scale of the command line comes before the file's, of whichever kind.
                 options[other] = None
+        is_of_file = context.get_parameter_source("u_px_per_mm") is from_file
+        if is_of_file and (options["px_per_mm"] is None or context.get_parameter_source("px_per_mm") is not from_file):
+            options["u_px_per_mm"] = None  # it belongs to the file's scale
         return command(**options)
 
     decorated: Callable[..., Any] = with_one_scale

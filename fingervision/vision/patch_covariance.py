@@ -50,7 +50,7 @@ def noise_covariance(
 
 
 def widened(covariance: Doubles, inverse: Doubles, scores: Doubles, aliasing: Doubles) -> Doubles:
-    """Widen covariances to the scatter of the patch's blocks, and to aliasing, where these are more than the noise's.
+    """Increase covariances to the scatter of the patch's blocks, and to aliasing, if these are larger than the noise's.
 
     Where residuals are no noise but texture that moves otherwise than the rest (aliased, or of a surface that deforms),
     the blocks tell the covariance (White, Econometrica 48, 1980, doi:10.2307/1912934). What an edge all along the patch

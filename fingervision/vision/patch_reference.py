@@ -72,13 +72,13 @@ class PatchReference:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Number of columns and rows."""
+        """Number of columns and rows of a patch."""
         return 2 * self.half_width_px + 1, 2 * self.half_height_px + 1
 
 
 @cache
 def grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
-    """Columns and rows counted from the patch's centre, and an orthonormal basis of planes of light, shape (3, n)."""
+    """Columns and rows counted from the patch's centre, and an orthonormal basis of linear levels, shape (3, n)."""
     y, x = np.mgrid[-half_height : half_height + 1, -half_width : half_width + 1]
     dx, dy = x.ravel().astype(np.float64), y.ravel().astype(np.float64)
     basis = np.stack((np.ones_like(dx), dx, dy))
