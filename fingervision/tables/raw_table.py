@@ -38,8 +38,7 @@ class RawColumn:
 
 
 MOST_COLUMNS = 4096
-"""Columns of a table: loggers write at most some hundreds; each costs about 0.2 ms to understand (`table` of 100 000 took
-minutes)."""
+"""Most columns of a table: loggers write some hundreds, and names are interpreted one by one (100 000 took minutes)."""
 
 
 def check_columns(path: Path, count: int) -> None:
