@@ -20,8 +20,8 @@ from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 class Commands(click.Group):
     """Command group in which every module of this package without a leading underscore is a command.
 
-    The module's name is that of the command, and its variable `command` is the command itself. It imports no large
-    libraries at module level, so that `--help` is fast.
+    The module's name is that of the command, and its variable `command` is the command itself. The module imports no
+    large libraries at module level, so that `--help` is fast.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -35,7 +35,7 @@ class Commands(click.Group):
         return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the commands, sorted."""
+        """Names of the subcommands, sorted."""
         return sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:

@@ -18,7 +18,7 @@ Examples:
 @click.option("--home-first", is_flag=True, help="First go to the reference: step data need a known start.")
 @bed_option
 def command(speed_mm_s: float, for_s: float | None, home_first: bool, bed_name: str) -> None:
-    """Move the stage at SPEED_MM_S until stopped.
+    """Move the stage at SPEED_MM_S (mm/s) until stopped.
 
     A positive speed opens the gripper. The motion ends with Ctrl-C, after --for-s, or at a limit of the test bed.
     """

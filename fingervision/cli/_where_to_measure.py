@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _take_settings(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Take the values of options that are not given from a settings file."""
+    """Take the values of options that the user does not give from a settings file."""
     if path is None:
         return None
     from fingervision.storage.settings_toml import read_settings

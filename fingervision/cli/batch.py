@@ -47,7 +47,7 @@ def command() -> None:
 
 
 def _batch_of(name: str) -> click.Command:
-    """Make a batch command with the options of the single command and those of a batch."""
+    """Make a batch command that has the options of the single command and those of a batch."""
     single = cli.get_command(click.Context(cli), name)
     assert single is not None  # noqa: S101 - named below
     options = [
@@ -103,7 +103,9 @@ def _run(
     if scheduler is not None and jobs is not None:
         from fingervision.domain.errors import UsageError
 
-        raise UsageError("--jobs is for this machine and --scheduler for others, but both are there: leave one out.")
+        raise UsageError(
+            "--jobs is for this computer and --scheduler for a cluster, but both are given: leave one out."
+        )
     arguments = tuple(_arguments(given, absolute=scheduler is not None))
     plan = planned(Job(name, inputs, arguments, _options_key(name, given), out))
     with ExitStack() as stack:
@@ -123,7 +125,7 @@ def _run(
 
 
 def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str]:
-    """Write options as on the command line; file names get absolute paths if other computers do the work."""
+    """Write options in the form of the command line; file names become absolute if other computers do the work."""
     words: list[str] = []
     for option, value in given.items():
         flag = option.opts[0]
@@ -174,7 +176,7 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
 def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> None:
     """Refuse invalid options once, before any input is processed.
 
-    The command is called with a nonexistent input; if the options are valid, the only error is that about the input.
+    The command is called with a nonexistent input; if the options are valid, the only error is that about this input.
     """
     from tempfile import TemporaryDirectory
 

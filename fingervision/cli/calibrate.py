@@ -115,9 +115,9 @@ def _size_options(command: Command) -> Command:
 def bar(**options: Any) -> None:
     """Calibrate on bars: objects with two parallel straight edges at a known distance.
 
-    Each picture shows one object, in any direction; the object may extend beyond the picture. Three sizes give scale
-    and edge bias. Fewer sizes give only the scale; the edge bias is then not corrected, and its limit enters the
-    budget. To add slots, prefix an item: slot:ref3.png=3.000.
+    Each picture shows one object, in any direction; the object may extend beyond the picture. Objects of three
+    different sizes determine scale and edge bias. Fewer sizes determine only the scale; the edge bias is then not
+    corrected, and its limit enters the budget. To add slots, prefix an item: slot:ref3.png=3.000.
     """
     calibrate_on_sizes("bar", **options)
 
@@ -129,7 +129,7 @@ def bar(**options: Any) -> None:
 def slot(**options: Any) -> None:
     """Calibrate on slots: openings between two parallel straight edges at a known distance.
 
-    Everything else is as for `bar`. To add bars, prefix an item: bar:ref5.png=5.000.
+    All other options are as for `bar`. To add bars, prefix an item: bar:ref5.png=5.000.
     """
     calibrate_on_sizes("slot", **options)
 
@@ -174,7 +174,7 @@ def chessboard(**options: Any) -> None:
 def charuco(**options: Any) -> None:
     """Calibrate on a ChArUco board, which may extend beyond the picture; its marker dictionary is recognised.
 
-    Everything else is as for `chessboard`, but --squares counts squares and not inner corners.
+    All other options are as for `chessboard`, but --squares counts squares and not inner corners.
     """
     calibrate_on_board("charuco", **options)
 
@@ -193,8 +193,8 @@ def scale(**options: Any) -> None:
     """Calibrate on a line scale (stage micrometer) over all its lines, in any direction.
 
     The scale comes from the middles of the lines: blooming and the camera's response move the two edges of a line in
-    opposite directions and do not move its middle. The edge bias of a gap is therefore not corrected; its limit enters
-    the budget.
+    opposite directions and therefore do not move its middle. The edge bias of a gap is therefore not corrected; its
+    limit enters the budget.
     """
     calibrate_on_lines(**options)
 
@@ -214,10 +214,10 @@ def response(**options: Any) -> None:
     """Measure the camera's response (light for each grey level), best from a still scene at several exposures.
 
     For an exposure series, the scene needs flat parts of many shades (paper with grey fields). Change only the exposure
-    time; leave aperture, light and focus. Only the ratios of the exposures matter, so their unit is free.
+    time; leave aperture, light and focus unchanged. Only the ratios of the exposures matter, so their unit is free.
 
-    For a grey wedge, one picture and the wedge's certificate suffice. Without series and wedge, --edges estimates a
-    power law to about 5 % from the shape of straight edges, if the camera does not sharpen.
+    For a grey wedge, one picture and the wedge's certified densities suffice. Without exposure series and grey wedge,
+    --edges estimates a power law to about 5 % from the shape of straight edges, if the camera does not sharpen.
     """
     from fingervision.cli._measuring_response import measure_response
 

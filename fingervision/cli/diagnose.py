@@ -53,7 +53,7 @@ def command(
     columns: Path | None,
     as_json: bool,
 ) -> None:
-    """Identify the physical effect that is missing in a model, from a measured table."""
+    """Identify the physical effect that a model lacks, by comparing the model with a measured table."""
     import json
     import sys
 

@@ -57,9 +57,9 @@ def command(
 ) -> None:
     """Draw gauges on RECORDING (a video, images, a run folder) in the browser page of `fingervision live`.
 
-    Gauges are edges, pairs of edges, lines, circles, marks, patches and gaps. You draw, drag, type and name them, and
-    save them to a file for `fingervision measure --gauges`. Gauges can be drawn before a scale is known; their values
-    appear once the scale is entered on the page.
+    Gauges are edges, pairs of edges, lines, circles, marks, patches and gaps. On the browser page you draw, drag, type
+    and name the gauges, and save them to a file for `fingervision measure --gauges`. Gauges can be drawn before a scale
+    is known; their values appear once the scale is entered on the browser page.
     """
     from fingervision.live.access import Access
     from fingervision.live.beside import Beside
@@ -69,7 +69,7 @@ def command(
     if not is_recording(recording):
         raise UsageError(
             "Gauges are drawn on an existing recording (a video, images, a run's folder), but "
-            f"{recording} is none: name another, or draw them on a camera's picture with "
+            f"{recording} is not such a recording: name another, or draw them on a camera's picture with "
             "`fingervision live CAMERA --gauges FILE`."
         )
     choices = choices_of(None, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)

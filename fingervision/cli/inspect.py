@@ -62,10 +62,11 @@ def command(
     no_picture: bool,
     as_json: bool,
 ) -> None:
-    """Look at SOURCE (camera or recording) for some seconds and list what limits the measurement, worst first.
+    """Watch SOURCE (camera or recording) for some seconds and list what limits the measurement, worst first.
 
     Each limit (focus, exposure, gamma, compression, motion, light, tilt, scale, vibration, surroundings, view) is
-    listed with its numbers, its cost in µm of uncertainty, and what to change. Without a scale, costs are in pixels.
+    listed with its numbers, its cost in µm of uncertainty, and what to change. Without a scale, the costs are given in
+    pixels.
     """
     import json
 

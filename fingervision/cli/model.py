@@ -87,10 +87,10 @@ def command(
 ) -> None:
     """Predict gap, force, stress and vibration from a drawing, with one kind of model or all kinds.
 
-    Writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the paper's Figure 9, with
-    differences) and deformed.png (with finite elements). With --drive, it also writes response.csv (gap and force over
-    the drive's time, a table that compare and diagnose accept as measured) and response.png. For a mechanism.toml, the
-    table over the input is mechanism.csv.
+    The command writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the gap over the
+    input, with differences between the models) and deformed.png (with finite elements). With --drive, it also writes
+    response.csv (gap and force over the drive's time, a table that compare and diagnose accept as measured) and
+    response.png. For a mechanism.toml, the results over the input are in mechanism.csv.
     """
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_inputs import inputs_mm, inputs_until_touch, with_rows_between

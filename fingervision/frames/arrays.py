@@ -97,7 +97,7 @@ class ArrayFrames:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptFrames:
-    """Frames of a camera that are kept in memory as a recording.
+    """Frames of a camera that were kept in memory, as a recording.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def is_shown(packet: "av.Packet[Any]", codec: str) -> bool:
 
 
 def coded_times(path: Path, stream: av.VideoStream) -> list[CodedTime]:
-    """Read the packets of a file as far as they can be read.
+    """Read the packets of a file as far as the file can be read.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
-    """A packet, with information on its position that only the next packet gives.
+    """A packet, with the information on its position that only the next packet gives.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Folders and glob patterns of images, in natural order, with times if these are given."""
+"""Folders and glob patterns of images, in natural order, with times if a table states these."""
 
 import glob
 import re
@@ -153,7 +153,7 @@ def _natural(file: Path) -> tuple[tuple[int, int, str], ...]:
 
 
 def _first_readable(name: str, files: tuple[Path, ...]) -> tuple[int, int]:
-    """Height and width of the first readable image, which are those of the recording."""
+    """Height and width of the first readable image, which all images of the recording must have."""
     first_words = ""
     for file in files:
         try:

@@ -57,7 +57,7 @@ TAKES_THE_REST = True
 
 
 def accepts(name: str) -> bool:
-    """Whether a name is a file that is not an image."""
+    """Whether a name is that of an existing file which is not an image."""
     path = Path(name)
     return path.is_file() and path.suffix.lower() not in IMAGE_SUFFIXES
 
@@ -179,7 +179,7 @@ class VideoFile:
 
 
 def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream:
-    """Find the first video stream, and its decoder."""
+    """Find the first video stream of a file, and its decoder."""
     tracks = _tracks(container)
     if not tracks:
         raise DataError(f"{name} must hold a video, but has no video stream: give another file.")

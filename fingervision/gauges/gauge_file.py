@@ -47,7 +47,7 @@ class Gauge:
 
     @property
     def kind(self) -> Kind:
-        """Module of the gauge's kind."""
+        """Module that defines the kind of a gauge."""
         return kind_named(self.kind_name)
 
     @property
@@ -100,7 +100,7 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
 
 
 def gauge_of(section: Section, others: Collection[str]) -> Gauge:
-    """Make one gauge from its table.
+    """Make one gauge from its table in the file.
 
     Parameters
     ----------

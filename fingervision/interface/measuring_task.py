@@ -19,7 +19,6 @@ from fingervision.measuring.scale import Scale, check_one_scale, stated_scale
 from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.response_csv import response_named
-from fingervision.tables.read import read_drive
 
 TIPS = ("auto", *(direction.value for direction in Direction))
 FINGERS = {"auto": None, "dark": True, "light": False}
@@ -163,6 +162,8 @@ def _drive(drive: Any, columns: Path | None) -> DriveHistory:
     if isinstance(drive, DriveHistory):
         return drive
     if isinstance(drive, str | os.PathLike):
+        from fingervision.tables.read import read_drive  # slow to import, needed with a drive only
+
         return read_drive(Path(drive), columns)
     from fingervision.interface.column_tables import drive_from_columns
 

@@ -18,7 +18,7 @@ ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region 
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """Scale, height, direction and region of the measurement; zero and tolerance of the display.
+    """Settings of a live view: scale, height, direction and region of the measurement, zero and tolerance shown.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ _NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What a page has received so far: identity of the view, and numbers of rows and messages.
+    """What a browser page has received so far: identity of the view, and numbers of rows and messages.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """A message, and the data that the page has after receiving this message."""
+    """A message to a browser page, and what the page has received after this message."""
 
     content: bytes
     known: Known
@@ -117,7 +117,7 @@ def _u_mm(row: GapRow) -> float | None:
 
 
 def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
-    """Measured values of the picture's row."""
+    """Measured values of the row that belongs to the displayed picture."""
     choices = view.choices
     if seen is None or seen.row is None:
         return None
@@ -150,7 +150,7 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
 
 
 def draw_beforehand(view: View) -> None:
-    """Render in advance the picture for the next messages, unless the measurement lags behind."""
+    """Render the picture for the next messages in advance, unless the measurement is too slow."""
     seen = view.seen
     if seen is not None and not view.in_a_hurry:
         _PICTURES.of(seen, view.choices.zero_mm)
@@ -171,7 +171,7 @@ def state_has_changed() -> None:
 
 
 class _Pictures:
-    """The newest picture, rendered only once for all pages."""
+    """The newest picture, encoded only once for all browser pages."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -186,7 +186,7 @@ class _Pictures:
 
 
 class _States:
-    """State of a view, composed once for all pages that need it at about the same time."""
+    """State of a view, composed once for all browser pages that need it at about the same time."""
 
     def __init__(self) -> None:
         self._lock = Lock()

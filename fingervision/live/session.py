@@ -1,4 +1,4 @@
-"""The live measurement: every frame is measured on arrival, and the results are kept for browser pages."""
+"""The live measurement: every frame is measured on arrival, and the results are kept for the browser pages."""
 
 import secrets
 from collections import Counter, deque
@@ -125,7 +125,7 @@ class Session:
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row that is sent to a new page: the row of two minutes ago."""
+        """Number of the first row that is sent to a newly opened browser page: the row of two minutes ago."""
         return max(self.oldest_row, self.history.count - ROWS_SHOWN)
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
@@ -177,11 +177,11 @@ class Session:
         with self._lock:
             task = self.choices.task
             if self.ended.is_set():
-                raise StateError("The source has ended, so nothing can be recorded: start again.")
+                raise StateError("The source has ended, so nothing can be recorded: start the live view again.")
             if self._recorder is not None:
                 raise StateError(f"A run is being recorded already, in {self._recorder.run.path}.")
             if self._beginning:
-                raise StateError("A recording is being begun already.")
+                raise StateError("A recording is already being started.")
             if task is None:
                 raise StateError("The scale is not known: give the scale before recording, so that the run has gaps.")
             if not self.description.has_times:
@@ -229,7 +229,7 @@ class Session:
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether measurement or disk lags behind, so that previews should not be rendered."""
+        """Whether measurement or disk is too slow, so that previews should not be rendered."""
         recorder = self._recorder
         lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
         return lags or (recorder is not None and recorder.in_a_hurry)

@@ -146,7 +146,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
 
 
 def refuse_camera(source: FrameSource) -> None:
-    """Refuse a source without an end.
+    """Refuse a source that has no end, such as a camera.
 
     Raises
     ------

@@ -48,7 +48,10 @@ def save_measured(
     description, task, series = found.source.description, found.task, found.series
     first, last = (found.rows[0].frame, found.rows[-1].frame) if found.rows else (0, -1)
     if steps_frame is not None and not first <= steps_frame <= last:
-        raise UsageError(f"--steps must be the number of a frame, {first} to {last}, but is {steps_frame}.")
+        raise UsageError(
+            f"--steps (pictures of the processing steps) must be the number of a frame, {first} to {last}, but "
+            f"is {steps_frame}."
+        )
     refuse_other_recording(out, description.name)
     with held(out):
         folder = claimed(out, description.files)

@@ -82,7 +82,7 @@ class Scale(Protocol):
 
     @property
     def edge_bias_px(self) -> float:
-        """Edge bias b of the calibration: loss of width of a light gap between straight dark edges (pixels)."""
+        """Edge bias b of the calibration (px): loss of width of a light gap between straight dark edges."""
         ...
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:

@@ -43,8 +43,9 @@ BESIDE = {
     "shorter exposure removes it.",
     "sharpening": "the camera sharpens its pictures; what that moves the edges by is taken off, and what is not sure "
     "of it is in u_shift_px. Switch sharpening off in the camera's settings.",
-    "roughness": "the edges stray from a mean line more than their noise (rough, printed, or with a texture): the mean "
-    "line is measured, with the scatter in the uncertainty. A contact is made by the crests, farther out.",
+    "roughness": "the edges stray from a mean line more than their noise (rough, printed, textured, or by a lossy "
+    "codec): the mean line is measured, with the scatter in the uncertainty. A rough finger's contact is made by its "
+    "crests, farther out.",
     "interlaced": "even and odd rows were seen at two times (interlaced): the gap is that of the middle. Record "
     "progressive pictures.",
 }
@@ -265,7 +266,7 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
 def _sha256(files: tuple[Path, ...]) -> str | None:
     """Hash of one file's bytes; for several files, the hash of their names and hashes in order.
 
-    None is returned for a live source.
+    The function returns None for a live source.
     """
     if not files:
         return None

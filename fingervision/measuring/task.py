@@ -77,7 +77,10 @@ class Task:
         if self.drive_offset_s is not None and not isfinite(self.drive_offset_s):
             raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
         if self.steps_frame is not None and self.steps_frame < 0:
-            raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
+            raise UsageError(
+                f"--steps (pictures of the processing steps) must be the number of a frame, from 0, but is "
+                f"{self.steps_frame}."
+            )
         if self.frames is not None and not 0 <= self.frames[0] <= self.frames[1]:
             raise UsageError(
                 f"--frames must be FIRST:LAST, from 0 and rising, but is {self.frames[0]}:{self.frames[1]}."
@@ -85,7 +88,7 @@ class Task:
 
     @property
     def settings(self) -> Settings:
-        """Settings for the image processing, as far as they do not depend on the recording."""
+        """Settings for the image processing that do not depend on the recording."""
         return self.settings_for(())[0]
 
     def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
@@ -106,7 +109,7 @@ class Task:
 
     @property
     def drive_columns(self) -> tuple[str, ...]:
-        """Columns that the drive adds to the table."""
+        """Names of the columns that the drive adds to the table."""
         if self.drive is None:
             return ()
         return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
@@ -165,7 +168,7 @@ def task_for_frames(task: Task, description: Description) -> Task:
 
 
 def in_words(task: Task, settings: Settings) -> dict[str, Any]:
-    """The settings in the form in which the summary lists them."""
+    """The settings in the form in which summary.json lists them."""
     region = task.region
     return {
         "below_tip_mm": task.below_tip_mm,

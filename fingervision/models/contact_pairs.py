@@ -52,7 +52,7 @@ class ContactPair:
 
     @property
     def _is_end(self) -> NDArray[np.bool_]:
-        """Whether the first and the second node of each segment are an end of the face, shape (2, s)."""
+        """Whether the first and the second node of each segment is an end of the face, shape (2, s)."""
         if self.wall_mm is not None:
             return np.zeros((2, 1), dtype=bool)
         nodes, place, count = np.unique(self.segments, return_inverse=True, return_counts=True)

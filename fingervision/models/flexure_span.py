@@ -122,7 +122,8 @@ def _segment(
 ) -> Array:
     """Compliance of a Timoshenko beam of varying height between two positions along the flexure's axis.
 
-    `bent` and `stretched` are its compliances over those of a strip that no width holds back.
+    `bent` and `stretched` are the ratios of the flexure's compliances to those of a strip that is not restrained by its
+    width.
     """
     nodes, weights = _GAUSS
     half = 0.5 * (span[1] - span[0])
@@ -157,7 +158,7 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
 
 
 def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:
-    """Whether, at each position, the material across the axis is that of the flexure only."""
+    """Whether, at each position along the axis, the material across the axis is that of the flexure only."""
     half = 0.5 * flexure.height_mm(stations)
     apart = _BESIDE * flexure.thickness_mm
     found = np.ones(stations.size, dtype=bool)

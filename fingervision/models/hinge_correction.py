@@ -1,13 +1,13 @@
 """Beam theory of the notch hinge corrected by finite elements: the default of the models.
 
 The compliance in each direction is multiplied by ratios that `tests/benchmarks/models_hinge_table.py` prints for nu =
-0.34. The first ratio is that of the compliance in plane stress between rigid end planes to beam theory. The second is
-the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third, for a hinge in a
-body, is the ratio of the compliance between elastic blocks to that between rigid planes, because the blocks yield where
-the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam theory in
-bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of the table,
-ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant, except in
-torsion, where the ratio continues to fall with (t / b)^2.
+0.34. The first ratio is that of the compliance in plane stress, between rigid end planes, to that by beam theory. The
+second ratio is the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third ratio,
+for a hinge in a body, is that of the compliance between elastic blocks to that between rigid planes, because the blocks
+yield where the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam
+theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of
+the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant,
+except in torsion, where the ratio continues to fall with (t / b)^2.
 """
 
 from enum import StrEnum

@@ -32,7 +32,7 @@ _CURVE = 3
 
 
 class _Tangent:
-    """The latest tangent matrix of a body, factorised, with the displacements for unit forces on each face point."""
+    """The latest tangent matrix of a body, factorised, with the displacements for a unit force on each face point."""
 
     def __init__(self, body: DrivenBody, *, contact: bool) -> None:
         self.body, self.contact = body, contact
@@ -55,7 +55,7 @@ class _Tangent:
         return solver
 
     def step(self, moved: Array, internal_n: Array) -> tuple[Array, Array]:
-        """Displacements of all unknowns, and contact forces, that balance the internal forces for this tangent."""
+        """Displacements of all unknowns, and contact forces, that balance the internal forces with this tangent."""
         body, step = self.body, np.zeros_like(moved)
         solver = self._solver or self.renew(moved)
         step[body.free] = solver.solve(-internal_n[body.free])

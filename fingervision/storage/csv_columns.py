@@ -144,6 +144,7 @@ def number(path: Path, name: str, row: int, cell: str) -> float | None:
         value = float("nan")
     if not isfinite(value):
         raise DataError(
-            f"{name} must be a finite number, but is {cell} in data row {row + 1} of {path}: leave it empty."
+            f"{name} must be a finite number, but is {cell} in data row {row + 1} of {path}: correct it, or "
+            "leave the cell empty."
         )
     return value

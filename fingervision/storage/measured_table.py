@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
+from fingervision.storage.assumed_response import response_note_beside
 from fingervision.storage.channel_columns import channels_of, read_channels
 from fingervision.storage.csv_columns import read_block, read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
@@ -137,6 +138,7 @@ def measured_rows(
             )
     if len(runs) == 1:
         notes.append("there is one run only: it cannot tell a re-zeroing of the bench from an offset.")
+    notes += response_note_beside(path)
     return MeasuredTable(
         input_mm=column["input_mm"],
         gap_mm=gap,
@@ -188,7 +190,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
 
 
 def _by_run(names: Sequence[str], key: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
-    """Indices of the rows of each run, sorted by a key; runs are in order of their first appearance."""
+    """Row numbers of each run, sorted by a key; runs are in order of their first appearance."""
     number: dict[str, int] = {}
     codes = np.array([number.setdefault(name, len(number)) for name in names], dtype=np.intp)
     order = np.lexsort((key, codes))
@@ -203,7 +205,7 @@ def _path(
     names: Sequence[str],
     run_names: tuple[str, ...],
 ) -> RecordedPath:
-    """Sort all rows with an input in the same way as the rows with a gap; runs without any gap are omitted."""
+    """Sort all rows with an input in the same way as the rows with a gap; runs without a gap are omitted."""
     of_run = _by_run(names, values["time_s"].value[on_path])
     rows = np.concatenate([on_path[of_run[name]] for name in run_names])
     ends = np.cumsum([of_run[name].size for name in run_names])

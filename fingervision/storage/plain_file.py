@@ -12,7 +12,7 @@ SAMPLE_BYTES = 1 << 16
 
 
 def plain(path: Path) -> Path:
-    """Return the path if it is a file that can be read to its end.
+    """Return a path if it is a file that can be read to its end; refuse pipes and devices.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def why(error: Exception) -> str:
 
 
 def in_utf8(path: Path, text: str) -> str:
-    """Return a text if it can be encoded in UTF-8; it may contain file names that cannot.
+    """Return a text unchanged if UTF-8 can encode it; file names may contain characters that UTF-8 cannot encode.
 
     Raises
     ------

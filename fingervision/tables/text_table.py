@@ -219,7 +219,7 @@ class _Rows:
 
 
 def _is_prose(text: str, decimal: str) -> bool:
-    """Whether most of what a line holds between blanks and separators is no number, date or empty cell."""
+    """Whether most of a line's text is no number, date or empty cell."""
     parts = BETWEEN.split(text.strip())
     return sum(is_value(part, decimal) for part in parts) < 0.5 * len(parts)
 

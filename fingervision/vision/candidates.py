@@ -104,7 +104,7 @@ def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
 
 
 def _border_is_light(binary: Binary) -> bool:
-    """Whether most of the picture's border is light background."""
+    """Whether most of the picture's border shows light background."""
     dark = binary.dark
     border = (dark[0], dark[-1], dark[:, 0], dark[:, -1])
     return sum(int(np.count_nonzero(side)) for side in border) < 0.5 * sum(side.size for side in border)

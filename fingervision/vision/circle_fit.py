@@ -134,7 +134,7 @@ def fit_circle(
 
 
 def _columns(x: Floats, y: Floats, p: Floats) -> tuple[Floats, Floats]:
-    """Columns of the model that are linear in its coefficients, and derivatives by x, y, radius and blur."""
+    """Columns of the linear part of the model, and derivatives by x, y, radius and blur."""
     dx, dy = x - p[0], y - p[1]
     r = np.maximum(np.hypot(dx, dy), 1e-9)
     cosine, sine = np.abs(dx) / r, np.abs(dy) / r

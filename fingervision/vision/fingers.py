@@ -1,8 +1,8 @@
 """Step 4, finding the fingers: which two objects in view are the fingers, and in which direction they point.
 
 A tip is a local maximum of an outline in the direction in which the tips point, with a sufficient topographic
-prominence. Two touching fingers are one object with two local maxima and a notch between them, and are found in the
-same way. If an outline's local maximum is at the picture's border, the tip is out of view. Only background may lie
+prominence. Two touching fingers are one object with two local maxima and a notch between them, and are found by the
+same criteria. If an outline's local maximum is at the picture's border, the tip is out of view. Only background may lie
 between the two fingers, and no third object beside them may look like a finger.
 """
 
@@ -212,7 +212,7 @@ def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFinge
 
 
 def _standing(tops: list[Top], below_tip_px: float) -> list[Top]:
-    """Objects that reach the picture's border like a finger."""
+    """Objects that extend to the picture's border, as a finger does."""
     return [
         top
         for top in tops
@@ -236,7 +236,7 @@ def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
 
 
 def _end_alike(first: Top, second: Top, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are at about the same height along the fingers."""
+    """Whether two tips are at about the same height along the fingers (also for a turned camera)."""
     left, right = (first, second) if first.across_px <= second.across_px else (second, first)
     step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
     return end_alike(step_px, apart_px, below_tip_px, builds)

@@ -37,7 +37,7 @@ _build = loop("likeness_build")
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """Width and tilt of an object.
+    """Width and tilt of an object that may be a finger.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def are_alike(first: Build, second: Build) -> bool:
 
 
 def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are at about the same height, as those of one gripper are, also for a turned camera.
+    """Whether two tips are at about the same height, as those of one gripper are; a turned camera is allowed for.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ class PatchReference:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Number of columns and rows."""
+        """Number of columns and rows of a patch."""
         return 2 * self.half_width_px + 1, 2 * self.half_height_px + 1
 
 
@@ -130,7 +130,7 @@ class Registered:
 
 
 def _taken_off(smoothed: Floats, sharp: Floats) -> float:
-    """Share of a gradient's power that the smoothing takes off."""
+    """Share of a gradient's power that the smoothing removes."""
     return 1.0 - float(np.sum(smoothed.astype(np.float64) ** 2)) / max(
         float(np.sum(sharp.astype(np.float64) ** 2)), 1e-30
     )
@@ -138,7 +138,7 @@ def _taken_off(smoothed: Floats, sharp: Floats) -> float:
 
 @cache
 def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
-    """Columns and rows counted from the patch's centre, and an orthonormal basis of planes of light, shape (3, n)."""
+    """Columns and rows counted from the patch's centre, and an orthonormal basis of linear levels, shape (3, n)."""
     y, x = np.mgrid[-half_height : half_height + 1, -half_width : half_width + 1]
     dx, dy = x.ravel().astype(np.float64), y.ravel().astype(np.float64)
     basis = np.stack((np.ones_like(dx), dx, dy))
@@ -277,7 +277,7 @@ def _covariance(
 
 
 def _as_blocks_scatter(covariance: Doubles, inverse: Doubles, scores: Doubles) -> Doubles:
-    """Widen covariances to the scatter of the patch's blocks where it is more than the noise's.
+    """Increase covariances to the scatter of the patch's blocks if this is larger than the noise explains.
 
     Parameters
     ----------

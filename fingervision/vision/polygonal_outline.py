@@ -138,7 +138,7 @@ def _chain(points: OutlinePoints, lowest: float) -> Ints:
 
 
 def _line(x: Floats, y: Floats, u: Floats) -> _Fitted:
-    """Weighted total least-squares line; `u` is positive for uncertainties along x, negative for those along y."""
+    """Line by weighted total least squares; `u` is positive for uncertainties along x, negative for those along y."""
     start = np.full(x.size, atan2(float(y[-1] - y[0]), float(x[-1] - x[0])))
     for _look in range(2):
         across = np.where(u > 0, np.abs(np.sin(start)), np.abs(np.cos(start)))

@@ -164,7 +164,7 @@ def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
 
 @dataclass(frozen=True, slots=True)
 class _Halved:
-    """The map to the undistorted plane, for a picture that was halved."""
+    """The map to the undistorted plane for a halved picture."""
 
     whole: FlatMap
     scale: float
@@ -180,7 +180,7 @@ class _Halved:
 def _rigid(
     chunks: Chunks, edges: ChunkEdges, about: Array, view: EdgeView
 ) -> tuple[Array, Array, Array, Array, tuple[float, float]] | None:
-    """Small rigid motion from the chunks' offsets, with its covariance, effects of common errors, and the size error.
+    """Small rigid motion from the chunks' offsets, with its covariance, effects of shared errors, and the size error.
 
     Return the motion; its covariance; the sensitivities of the three pose parameters to a common edge shift and to a
     relative size error, shape (3, 2); the covariance due to possible shadows at the edges, shape (3, 3); and the size

@@ -19,7 +19,7 @@ KERNEL_REACH, SPLINE_REACH = 8, 2
 
 @cache
 def gaussian(sigma_px: float) -> Doubles:
-    """Sampled Gaussian with sum 1 over five standard deviations on either side; for 0 px it is 1."""
+    """Sampled Gaussian with sum 1 over five standard deviations on either side; a single 1 for a width of 0."""
     reach = int(np.ceil(5.0 * sigma_px))
     k = np.arange(-reach, reach + 1)
     kernel = np.exp(-0.5 * (k / sigma_px) ** 2) if sigma_px > 0.0 else np.ones(1)

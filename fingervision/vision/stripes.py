@@ -30,7 +30,7 @@ CLOSING_SLOPE, NOTCH_SIGMAS = 0.1, 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StripeEdges:
-    """Left and right edge of a narrow gap (a stripe) in every row; arrays of shape (n,).
+    """Left and right edge of a narrow gap (a bright stripe) in every row; arrays of shape (n,).
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 The picture is compared with its reflection through a point, `I(c + x) - I(c - x)`; the centre is the point with the
 least sum of squares (Gauss-Newton). Only the symmetry is assumed, not the mark's size, blur or tone. The variance is
 that of a fit with known shape of the mark, `sigma^2 (sum g g')^-1`, the Cramer-Rao bound: the gradient of the
-difference is doubled, and the variance of its noise is doubled too. A plane of light is subtracted.
+difference is doubled, and the variance of its noise is doubled too. A linear gradient of light is subtracted.
 """
 
 from dataclasses import dataclass

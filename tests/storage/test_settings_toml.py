@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli._where_to_measure import where_to_measure
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.settings_toml import read_settings, write_settings
 
 WHOLE = """schema = 1
@@ -61,7 +61,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 def test_a_wrong_file_is_refused_with_what_is_wrong(text: str, fact: str, tmp_path: Path) -> None:
     path = tmp_path / "settings.toml"
     path.write_text(text)
-    with pytest.raises(FingervisionError, match=fact):
+    with pytest.raises(DataError, match=fact):
         read_settings(path)
 
 

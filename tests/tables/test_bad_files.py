@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, MissingLibraryError
 from fingervision.tables import needed_library, text_file
 from fingervision.tables.formats import read_raw, xlsx
 from fingervision.tables.formats._apart import read_apart
@@ -31,7 +31,7 @@ def rewritten(path: Path, **parts: bytes) -> Path:
 
 
 def refused(path: Path) -> str:
-    with pytest.raises(FingervisionError) as caught:
+    with pytest.raises(DataError) as caught:
         read_measured_table(path)
     return str(caught.value)
 
@@ -191,7 +191,7 @@ def test_a_missing_library_is_a_sentence(tmp_path: Path, monkeypatch: pytest.Mon
 
     path = binary.tdms_channels(tmp_path)
     monkeypatch.setattr(needed_library, "importlib", SimpleNamespace(import_module=missing))
-    with pytest.raises(FingervisionError, match=r"fingervision\[formats\]"):
+    with pytest.raises(MissingLibraryError, match=r"fingervision\[formats\]"):
         read_drive(path)
 
 
@@ -200,7 +200,7 @@ def test_a_reader_that_crashes_is_a_sentence(tmp_path: Path) -> None:
     module.write_text("import os, signal\ndef read(path, given):\n    os.kill(os.getpid(), signal.SIGSEGV)\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(tmp_path)
-        with pytest.raises(FingervisionError, match=r"crashed on it \(signal 11"):
+        with pytest.raises(DataError, match=r"crashed on it \(signal 11"):
             read_apart("crashing_reader", tmp_path / "table.mat", Entry())
 
 

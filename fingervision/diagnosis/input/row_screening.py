@@ -1,4 +1,4 @@
-"""Exclude rows without information: a zero that was set instead of measured, a simulated value off its line."""
+"""Exclude rows without information, such as a zero that was set instead of measured."""
 
 import numpy as np
 from numpy.typing import NDArray

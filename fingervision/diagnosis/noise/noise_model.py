@@ -23,7 +23,7 @@ BY_CHANCE = 2e-3
 class Noise:
     """Standard deviations of the white and the correlated part, and correlation of neighbouring samples.
 
-    `slow_doubt` is the standard uncertainty of the logarithm of the power at low frequency.
+    `slow_doubt` is the standard uncertainty of the logarithm of the noise power at low frequency.
     """
 
     white_mm: float
@@ -33,7 +33,7 @@ class Noise:
 
     @property
     def total_mm(self) -> float:
-        """Standard deviation of one sample (mm)."""
+        """Standard deviation of the total noise of one sample (mm)."""
         return float(np.hypot(self.white_mm, self.correlated_mm))
 
 
@@ -72,7 +72,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
 
 
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
-    """Parts in which more samples deviate than gross errors, which occur at any input and any time, would explain."""
+    """Mark parts of the range in which more samples deviate than gross errors, which occur anywhere, would explain."""
     there = np.zeros(out.size, dtype=bool)
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
@@ -81,14 +81,14 @@ def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
 
 
 def _places(input_mm: Array) -> list[NDArray[np.intp]]:
-    """Samples near the same input, and at the ends of its range, where a contact or a stop acts."""
+    """Group samples near the same input, and those at the ends of the range, where a contact or a stop acts."""
     order = np.argsort(input_mm, kind="stable")
     ends = [part for count in ENDS for part in (order[:count], order[-count:])]
     return [*np.array_split(order, min(PLACES, order.size)), *ends]
 
 
 def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.intp]]:
-    """Samples at equal times after steps of a held input, when the stage is still moving."""
+    """Group samples at equal times after a step of a held input, when the stage is still moving."""
     steps = np.concatenate([run.start + 1 + np.flatnonzero(np.diff(input_mm[run])) for run in runs])
     if not 0 < steps.size <= input_mm.size // (2 * AFTER_A_STEP):
         return []
@@ -97,7 +97,7 @@ def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.in
 
 
 def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) -> Noise:
-    """Treat the scatter about the median as white noise, because without times nothing else can be estimated.
+    """Treat the scatter of the values about their median as white noise: without times nothing else can be estimated.
 
     Parameters
     ----------

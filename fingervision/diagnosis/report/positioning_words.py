@@ -143,7 +143,7 @@ def _visits(visits: Visits | None) -> dict[str, float | None] | None:
 
 
 def _um(value_mm: float | None) -> str:
-    """Micrometres with two decimals, as in published reports."""
+    """Write a length in micrometres with two decimals, as in published reports."""
     # Adding zero takes the sign from what rounds to zero.
     return "-" if value_mm is None else f"{round(1e3 * value_mm, 2) + 0.0:.2f}"
 

@@ -124,7 +124,7 @@ class FollowedPatch:
         return Mark(tuple((x + cos(turn) * u - sin(turn) * v, y + sin(turn) * u + cos(turn) * v) for u, v in corners))
 
     def _never(self, status: GaugeStatus, words: str) -> Reading:
-        """Record that the first frame has no texture to register against, so that no frame can give a value."""
+        """Record that the first frame has no texture for the registration, so that no frame can give a value."""
         self._refused = Reading(status, zone=self._zone(), words=words)
         return self._refused
 
@@ -133,7 +133,7 @@ class FollowedPatch:
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
-        """Take the reference from the first readable frame; a later one would change the zero of displacement."""
+        """Take the template from the first readable frame; a later template would change the zero of displacement."""
         if self._refused is not None:
             return self._refused
         (a, b), (x, y) = self.half, self._spec.middle_px
@@ -164,7 +164,7 @@ class FollowedPatch:
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
-        """Locate the patch roughly: return the part of the picture to register it in, and an initial estimate."""
+        """Locate the patch roughly: return the part of the picture for the registration, and an initial estimate."""
         a, b = self.half
         x, y, turn = self._at
         reach = ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
@@ -189,7 +189,7 @@ class FollowedPatch:
         return part, corner, np.array([left + match.x_px, top + match.y_px, turn])
 
     def _turned(self, turn: float) -> Template:
-        """The template, rotated as the patch was in the previous frame."""
+        """The template of the patch, rotated as the patch was in the previous frame."""
         assert self._template is not None  # noqa: S101 - there is a reference
         assert self._around is not None  # noqa: S101 - likewise
         if abs(turn - self._template_turn) > TURN_AT:
@@ -208,7 +208,7 @@ class FollowedPatch:
     def taken(
         self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
     ) -> Reading:
-        """Accept or reject the result of the registration, and store an accepted one."""
+        """Accept or reject the result of a registration, and store an accepted result."""
         x, y, turn = place
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
@@ -232,10 +232,10 @@ class FollowedPatch:
 
 
 def _aliased_px(reference: PatchReference) -> tuple[float, float]:
-    """Standard uncertainties along x and y by texture that is too fine for the pixels.
+    """Standard uncertainties along x and y (px) because of texture that is too fine for the pixels.
 
-    What it leaves in the picture is as large as the stronger gradients, and displaces the patch more along the axis of
-    the weaker ones.
+    The artefact that such texture leaves in the picture is as large as the stronger gradients, and displaces the patch
+    more along the axis of the weaker ones.
     """
     own = [ALIASED_PX * min(max((fine - FROM_FINE) / (TO_FINE - FROM_FINE), 0.0), 1.0) for fine in reference.fine]
     power = [max(float(reference.hessian[k, k]), 1e-30) for k in range(2)]
@@ -244,7 +244,7 @@ def _aliased_px(reference: PatchReference) -> tuple[float, float]:
 
 
 def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:
-    """Light in a rectangle of the picture.
+    """Light in a rectangle of the picture, which may extend beyond the picture.
 
     Beyond the picture's border the light is mirrored, which affects only the tails of the interpolation.
     """

@@ -1,4 +1,4 @@
-"""Requests to the test bed: home, move, jog, run a recipe, stop; allowed only with the option `--allow-motion`."""
+"""Requests to the test bed (home, move, jog, run a recipe, stop), which need the option `--allow-motion`."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -66,7 +66,7 @@ def _run(view: View, request: Request) -> Answer:
 
 
 def _inside(view: View, name: str) -> Path:
-    """Path of a file that a page may name: below the folder in which the program was started, or the output folder."""
+    """Path of a file that a browser page may name: below the program's start folder or the output folder."""
     path = Path(name).resolve()
     if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
         raise UsageError(
@@ -77,7 +77,7 @@ def _inside(view: View, name: str) -> Path:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return the state of the test bed: position and present task."""
+    """Return the state of the test bed for the browser page: position and present task."""
     bench = view.features.get(BED)
     if not isinstance(bench, Bench):
         return {"bed": None}

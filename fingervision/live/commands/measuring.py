@@ -47,7 +47,7 @@ def _fingers(view: View, request: Request) -> Answer:
 
 
 def _height_at(view: View, request: Request) -> Answer:
-    """Set the measuring height to that of a point in the picture."""
+    """Set the measuring height to that of a point which the user clicked in the picture."""
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
         raise StateError(
@@ -96,7 +96,7 @@ def _scale(view: View, request: Request) -> Answer:
 def _calibrate(view: View, request: Request) -> Answer:
     kind = request.get("kind")
     if kind not in ("bar", "slot"):
-        raise UsageError(f"The reference must be a bar or a slot, but is {shown(kind)}.")
+        raise UsageError(f"The reference object must be a bar or a slot, but is {shown(kind)}.")
     found = calibrated(
         seen_of(view).frame, box(request), str(kind), number(request, "size_mm"), number(request, "u_size_mm")
     )

@@ -77,7 +77,7 @@ def _load(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return findings, indicators and uncertainty budget."""
+    """Return findings, indicators and uncertainty budget for the browser page."""
     looked = view.features.get(SET_UP)
     found = looked if isinstance(looked, SetUp) else None
     return {
@@ -109,7 +109,7 @@ def _meters(view: View) -> dict[str, float | None]:
 
 
 def _budget(view: View) -> list[list[Any]] | None:
-    """Contributions to the uncertainty of the displayed gap, largest first: source, micrometres (k = 1), assumption."""
+    """Contributions to the displayed gap's uncertainty, largest first: source, micrometres (k = 1), assumption."""
     seen, scale = view.seen, view.choices.scale
     if seen is None or not isinstance(scale, Calibration) or not isinstance(seen.outcome, GapMeasurement):
         return None

@@ -171,7 +171,7 @@ def _cell(value: float | str | None) -> str:
 
 
 def read_verdict(folder: Path, rows: int) -> Verdict:
-    """Read the result of `diagnose` from its folder."""
+    """Read the result of the command `diagnose` from its folder."""
     report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     proposal = report.get("next_run") or {}
     return Verdict(

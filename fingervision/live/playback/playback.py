@@ -181,7 +181,7 @@ class Playback:
     oldest_row = shown_from = 0
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows of the frames from `first` to `last` - 1."""
+        """Rows of the table for the frames from `first` to `last` - 1."""
         track = self._track
         return iter(() if track is None else track.rows[first:last])
 
@@ -292,7 +292,7 @@ class Playback:
             self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
-        """Time of a frame; None if the frame has no picture, or if a neighbouring frame has the same time."""
+        """Time of a frame (s); None if the frame has no picture, or if a neighbouring frame has the same time."""
         if row is None or row.time_s is None or row.status in (Status.DAMAGED, Status.DUPLICATE):
             return None
         neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]

@@ -63,7 +63,7 @@ class Track:
         self._command: BackgroundCommand | None = BackgroundCommand(*arguments, "--out", self._folder.name)
 
     def refresh(self) -> bool:
-        """Read new rows; return True if all rows must be read again because inputs of the drive were added."""
+        """Read new rows of the table; return True if inputs were added to all rows, so that all must be read again."""
         if self._command is None:
             return False
         ended = self._command.exit_code

@@ -113,7 +113,7 @@ def _known(grid_s: Array, log_s: Array, drive: DriveHistory) -> Array:
 
 
 def _overlap_correlation(gap: Array, seen: Array, inputs: Array, known: Array) -> Array:
-    """Pearson's correlation at every lag of the log against the recording; 0 where they have little common motion."""
+    """Pearson's correlation at every lag between log and recording; 0 where they have too little motion in common."""
     size = gap.size + inputs.size - 1
     length = next_fast_len(size, real=True)
     weight_gap, weight_input = float(seen.sum()), float(known.sum())

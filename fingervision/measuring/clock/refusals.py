@@ -1,12 +1,15 @@
 """Reasons to refuse a log: no motion, a gap that does not follow the log, or a motion that repeats."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.measuring.clock.clock_offset import NoClockOffset
 from fingervision.measuring.clock.joint_fit import Fit
-from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.motion_model import WHITE, Motion
+from fingervision.measuring.clock.play_posterior import most_likely
 from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
 
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
@@ -32,7 +35,7 @@ def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffs
 
 
 def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse an offset that explains the frames only without many of them, as at a wrong step of a staircase."""
+    """Refuse an offset that explains the frames only if many are left out, as at a wrong step of a staircase."""
     left_out = within_log - motion.time_s.size
     if left_out <= MOST_LEFT_OUT * within_log:
         return None
@@ -44,9 +47,18 @@ def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset 
 
 
 def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse a log of target positions instead of actual ones."""
+    """Refuse a log of target positions instead of actual ones.
+
+    A gap that follows later leaves residuals like a random walk, and a fit to their differences may explain nothing;
+    the fit to the gap itself shows how much of the jumps is made in their time.
+    """
     share = gap_arrives(motion, found)
-    if share is None or share >= ARRIVED:
+    if share is None:
+        return None
+    even = replace(motion, noise=WHITE)
+    by_gap = gap_arrives(even, most_likely(even, found.at))
+    share = share if by_gap is None else min(share, by_gap)
+    if share >= ARRIVED:
         return None
     return NoClockOffset(
         f"the drive's rows jump from one place to the next, and the gap makes a share of {max(share, 0.0):.2f} of "
@@ -86,7 +98,7 @@ def explained(motion: Motion, found: Fit) -> float:
 
 
 def ambiguous(offsets_s: list[float]) -> NoClockOffset:
-    """Refusal that lists the offsets between which a periodic motion does not decide."""
+    """Refuse a periodic motion, and list the offsets between which it does not decide."""
     nearest = np.unique(np.round(offsets_s, 4))
     said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
     apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""

@@ -1,4 +1,4 @@
-"""Other offsets that explain the frames which they have in common with the best offset equally well."""
+"""Find other offsets that explain the frames which both offsets cover as well as the best offset does."""
 
 from dataclasses import replace
 
@@ -52,12 +52,12 @@ def _between_runs(log_s: Array, drive: DriveHistory) -> NDArray[np.bool_]:
 
 
 def only(motion: Motion, kept: NDArray[np.bool_]) -> Motion:
-    """Keep the selected frames only; their noise is taken as white until it is estimated again."""
+    """Keep the selected frames only; their noise is assumed to be white until it is estimated again."""
     return replace(motion, time_s=motion.time_s[kept], gap_mm=motion.gap_mm[kept], noise=WHITE)
 
 
 def unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float) -> list[float]:
-    """Offsets that explain their frames in common with the best offset as well as the best offset does."""
+    """Offsets that explain the frames which they share with the best offset as well as the best offset does."""
     found = []
     by_chance = _by_chance(motion, drive, best)
     for candidate in others:

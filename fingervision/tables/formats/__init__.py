@@ -41,7 +41,7 @@ class Format:
 def formats() -> tuple[Format, ...]:
     """List all formats: every module of this package with `ORDER`, `recognises` and `read`.
 
-    A module with `IN_OWN_PROCESS` uses libraries that may crash, and is therefore run in a separate process.
+    A module with `IN_OWN_PROCESS` uses libraries that may crash, and therefore runs in a separate process.
     """
     found = []
     for module in pkgutil.iter_modules(__path__):
