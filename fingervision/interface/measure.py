@@ -74,9 +74,9 @@ def measure(
     calibration : path, Calibration or None
         The scale with its uncertainty; one of `calibration` and `px_per_mm` is required.
     px_per_mm : float or None
-        The scale without its uncertainty; uncertainties then have only the random part.
+        Scale in pixels per mm, without uncertainty; only the random part of the uncertainty is then given.
     below_tip_mm : float
-        How far below each finger's tip the gap is measured.
+        Distance (mm) below each finger's tip at which the gap is measured.
     tips : str
         Where the fingers point in the picture: auto, up, down, left or right.
     roi : (int, int, int, int) or None

@@ -112,7 +112,7 @@ def read_samples(path: Path) -> list[SampleRow]:
     Raises
     ------
     DataError
-        The file is not one of a run on the bed.
+        The file is not the table of a run on the test bed.
     """
     try:
         text = plain(path).read_bytes()

@@ -13,7 +13,7 @@ from fingervision.storage.recipe_toml import read_recipe
 BED, MOTION = "bed", "allow_motion"
 LONGEST_JOG_S = 10.0
 """Longest duration of a jog, after which it ends even if the user's button release was not received."""
-READ_ONLY = "This page may look at the bed and not move it: start the live view with --allow-motion to move it."
+READ_ONLY = "This page may only watch the test bed: to move its stage, start the live view with --allow-motion."
 
 
 def _bench(view: View) -> Bench:

@@ -99,7 +99,7 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
 
 
 SEEN_SHARED = 0.5
-"""Least common error, relative to the residual's spread: smaller ones cannot be detected, and subtracting means would
+"""Least shared error, relative to the residual's spread: smaller ones cannot be detected, and subtracting means would
 whiten the noise."""
 
 
