@@ -143,9 +143,7 @@ def _hlg(level: Floats) -> Floats:
     """Transfer curve of ITU-R BT.2100-2, table 5: from the hybrid log-gamma signal to the light of the scene."""
     a = 0.17883277
     b, c = 1.0 - 4.0 * a, 0.5 - a * np.log(4.0 * a)
-    light = np.where(level <= 0.5, level**2 / 3.0, (np.exp((np.maximum(level, 0.5) - c) / a) + b) / 12.0)
-    # The standard's constants are rounded: white would be 1 - 1e-8.
-    return np.asarray(light / light.max())
+    return np.where(level <= 0.5, level**2 / 3.0, (np.exp((np.maximum(level, 0.5) - c) / a) + b) / 12.0)
 
 
 def _pq(level: Floats) -> Floats:
@@ -154,8 +152,28 @@ def _pq(level: Floats) -> Floats:
     root = level ** (1.0 / m2)
     display_cd_m2 = 10_000.0 * (np.maximum(root - c1, 0.0) / (c2 - c3 * root)) ** (1.0 / m1)
     # The OOTF is the curve of BT.709, continued to 59.5208 times its white, and the display's exponent of 2.4.
-    light = _bt709((display_cd_m2 / 100.0) ** (1.0 / 2.4))
-    return np.asarray(light / light.max())
+    return _bt709((display_cd_m2 / 100.0) ** (1.0 / 2.4))
+
+
+STUDIO = {"srgb": (8, 16, 235), "bt709": (8, 16, 235), "hlg": (10, 64, 940), "pq": (10, 64, 940)}
+"""Bits, and the levels of black and white, of a studio-range ("limited") video with each curve (ITU-R BT.709-6, item
+4.6; BT.2100-2, table 9)."""
+
+
+def _studio(name: str) -> Callable[[Floats], Floats]:
+    """Transfer curve of a studio-range signal, whose black and white lie within the stored levels.
+
+    Below black the curve continues antisymmetrically, above white by its own formula: levels there occur as overshoot
+    of a filter, and as noise.
+    """
+    curve = CURVES[name]
+    bits, black, white = STUDIO[name]
+
+    def light(level: Floats) -> Floats:
+        signal = (level * (2**bits - 1) - black) / (white - black)
+        return np.asarray(np.sign(signal) * curve(np.abs(signal)))
+
+    return light
 
 
 CURVES: dict[str, Callable[[Floats], Floats]] = {
@@ -165,12 +183,18 @@ CURVES: dict[str, Callable[[Floats], Floats]] = {
     "hlg": _hlg,
     "pq": _pq,
 }
+CURVES |= {f"{name}_studio": _studio(name) for name in STUDIO}
 
 
 @cache
 def standard_response(name: str) -> CameraResponse:
-    """Return a standard response by its name: linear, srgb, bt709, or (high dynamic range) hlg or pq."""
+    """Return a standard response by its name: linear, srgb, bt709, or (high dynamic range) hlg or pq.
+
+    With `_studio` appended the levels are those of a studio-range video. Light is stated relative to the lowest and the
+    highest level: an edge does not depend on either.
+    """
     if name not in CURVES:
         raise CalibrationError(f"A standard camera response must be one of {', '.join(CURVES)}, but is {name}.")
     level = np.linspace(0.0, 1.0, 4097)
-    return CameraResponse(name, level, np.asarray(CURVES[name](level), dtype=np.float64))
+    light = np.asarray(CURVES[name](level), dtype=np.float64)
+    return CameraResponse(name, level, (light - light[0]) / (light[-1] - light[0]))

@@ -6,6 +6,7 @@ import os
 import pkgutil
 import signal
 import sys
+import unicodedata
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -73,7 +74,7 @@ def main() -> None:
     try:
         cli(standalone_mode=True)
     except FingervisionError as error:
-        click.echo(f"fingervision: {error}", err=True)
+        click.echo(f"fingervision: {_printable(str(error))}", err=True)
         sys.exit(error.exit_code)
     except RuntimeError as error:
         if "Symlink loop" not in str(error):
@@ -95,6 +96,14 @@ def main() -> None:
             sys.stdout.flush()
         except OSError as error:
             _give_up_output(error)
+
+
+def _printable(words: str) -> str:
+    """Escape control characters except line ends: a file's name may hold those that a terminal obeys."""
+    return "".join(
+        each if each == "\n" or unicodedata.category(each) != "Cc" else each.encode("unicode_escape").decode()
+        for each in words
+    )
 
 
 def _mend_streams() -> None:

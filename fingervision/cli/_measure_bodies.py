@@ -8,7 +8,7 @@ from fingervision.frames.source import FrameSource
 from fingervision.measuring.body_poses import measure_bodies
 from fingervision.measuring.drawing_placement import parse_point
 from fingervision.measuring.frame_loop import coded, prepared
-from fingervision.measuring.task import Task
+from fingervision.measuring.task import Task, task_for_frames
 from fingervision.models.gripper_mechanism import whole_mechanism
 from fingervision.models.mechanism import Mechanism
 from fingervision.storage.gripper_toml import read_gripper
@@ -20,6 +20,7 @@ def follow_bodies(
 ) -> None:
     """Measure the bodies, write bodies.csv, and print in how many frames each body was found."""
     given = [parse_point(text) for text in points]
+    task = task_for_frames(task, source.description)
     how = prepared(source.description, task)
     frames = coded(source, how.description.coding)
     done = measure_bodies(frames, mechanism_of(drawing), task.scale, given, folder, how.settings)

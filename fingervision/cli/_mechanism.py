@@ -121,12 +121,14 @@ def predict(
     if drawing.estimates:
         spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
-    if isinstance(plate, MechanismPlate):
-        bent = large_rotation or contact
-        curve = _curve(states["finite_element"]) if bent and asked.drive is not None else None
-        move_mechanism(plate, asked, curve, out, as_json=as_json)
+    moving = {name: model for name, model in models.items() if isinstance(model, MechanismPlate | MechanismFrame)}
+    if moving:
+        bent = (large_rotation or contact) and asked.drive is not None
+        curves = {name: _curve(states[name]) for name in moving if bent}
+        folders = {name: out if name == chief else out / name for name in moving}
+        move_mechanism(moving, asked, curves, folders, out, as_json=as_json)
     elif asked.moves:
-        click.echo("Motion is answered by the finite elements: add --kind finite_element.", err=True)
+        click.echo("The stiffness matrix has no masses: add --kind lumped or finite_element for motion.", err=True)
     if gripped is not None:
         write_pair_grip(models, gripped, None if drive is None else inputs, out, as_json=as_json)
     if not as_json:

@@ -30,6 +30,8 @@ def write_figures(table: Mapping[str, Mapping[str, float]], path: Path) -> None:
 def write_states(states: Sequence[MechanismState], out: Path) -> None:
     """Write mechanism.csv, and also simulation.csv if a pair of probes is named gap."""
     columns: dict[str, list[float]] = {"input_mm": [s.input_mm for s in states], "force_n": [s.force_n for s in states]}
+    if len(states[0].drives_n) > 1:
+        columns |= {f"{name}_force_n": [s.drives_n[name] for s in states] for name in states[0].drives_n}
     for name in states[0].probes_mm:
         for place, axis in enumerate("xy"):
             columns[f"{name}_{axis}_mm"] = [s.probes_mm[name][place] for s in states]
@@ -80,11 +82,14 @@ def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[Mechanis
         for number, (name, lengths) in enumerate(_lengths(mechanism, rows).items()):
             upper.plot(inputs, lengths, style, color=f"C{number}", label=f"{name} ({kind})")
         middle.plot(inputs, [state.force_n for state in rows], style, color="0.2", label=kind)
+        for number, name in enumerate(rows[0].drives_n if len(mechanism.drives) > 1 else ()):
+            forces = [state.drives_n[name] for state in rows]
+            middle.plot(inputs, forces, style, color=f"C{number}", label=f"{name} ({kind})")
         lower.plot(inputs, [state.stress_mpa for state in rows], style, color="0.2", label=kind)
     upper.set_ylabel("distance / mm" if mechanism.pairs else "displacement / mm")
     if upper.lines:
         upper.legend(fontsize="small")
-    middle.set_ylabel("force at the drive / N")
+    middle.set_ylabel("force of the input / N" if len(mechanism.drives) > 1 else "force at the drive / N")
     middle.legend(fontsize="small")
     lower.axhline(mechanism.material.yield_mpa, color="C3", linewidth=0.8, linestyle=":")
     lower.annotate("yield", (1.0, mechanism.material.yield_mpa), xycoords=("axes fraction", "data"), color="C3",

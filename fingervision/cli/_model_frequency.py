@@ -16,6 +16,7 @@ from fingervision.domain.errors import UsageError
 from fingervision.models.damping_text import parse_damping
 from fingervision.models.driven_body import DrivenBody
 from fingervision.models.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies_hz
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.modal_model import GAP, FreeModes, ModalModel, described, gripper_free_modes, gripper_modes
 from fingervision.models.motion_in_time import MODES
@@ -165,22 +166,28 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     figure.savefig(path, dpi=130)
 
 
-def mechanism_frequencies(model: MechanismPlate, band: Band, damping: str, out: Path, *, as_json: bool) -> None:
-    """Write frequency.csv and frequency.png of a mechanism whose drawing lists its bodies."""
-    name = model.mechanism.name
-    reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
-    if not reduced.observed:
-        raise UsageError(
-            f"{name} must have a [[probe]] or a [[pair]] as the output of the frequency response, but has "
-            "none: add one point ([[probe]]) or the distance of two ([[pair]])."
-        )
-    answer = respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
-    columns = tuple(answer.per_input)
-    main = main_column(reduced)
-    write_frequencies({"finite_element": answer}, columns, out / "frequency.csv")
-    draw_frequencies({"finite_element": answer}, main, f"{name}, damping {damping}", out / "frequency.png")
+def mechanism_frequencies(
+    models: Mapping[str, MechanismPlate | MechanismFrame], band: Band, damping: str, out: Path, *, as_json: bool
+) -> None:
+    """Write frequency.csv and frequency.png of the models of a mechanism whose drawing lists its bodies."""
+    found: dict[str, FrequencyResponse] = {}
+    main, name = "", ""
+    columns: tuple[str, ...] = ()
+    for kind, model in models.items():
+        name = model.mechanism.name
+        reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
+        if not reduced.observed:
+            raise UsageError(
+                f"{name} must have a [[probe]] or a [[pair]] as the output of the frequency response, but has "
+                "none: add one point ([[probe]]) or the distance of two ([[pair]])."
+            )
+        found[kind] = respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
+        main, columns = main or main_column(reduced), columns or tuple(found[kind].per_input)
+    write_frequencies(found, columns, out / "frequency.csv")
+    draw_frequencies(found, main, f"{name}, damping {damping}", out / "frequency.png")
     if not as_json:
-        click.echo(peaks_of(answer, main))
+        for kind, answer in found.items():
+            click.echo(f"{kind}: {peaks_of(answer, main)}")
 
 
 def main_column(reduced: ModalModel) -> str:

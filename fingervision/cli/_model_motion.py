@@ -16,10 +16,11 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import UsageError
 from fingervision.models.damping_text import parse_damping
 from fingervision.models.driven_body import DrivenBody
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.modal_response import Motion, modal_motion
 from fingervision.models.mode_shapes import ModesWanted, mechanism_mode_shapes, parse_modes
-from fingervision.models.motion_in_time import MODES, about_equilibria, gripper_motion
+from fingervision.models.motion_in_time import MODES, about_equilibria, check_small_vibration, gripper_motion
 from fingervision.storage.motion_csv import write_motion
 from fingervision.tables.read import read_drive
 
@@ -115,19 +116,29 @@ def move(
 
 
 def move_mechanism(
-    model: MechanismPlate, asked: MotionAsked, static: PchipInterpolator | None, out: Path, *, as_json: bool
+    models: Mapping[str, MechanismPlate | MechanismFrame],
+    asked: MotionAsked,
+    static: Mapping[str, PchipInterpolator],
+    folders: Mapping[str, Path],
+    out: Path,
+    *,
+    as_json: bool,
 ) -> None:
-    """Compute all requested dynamic responses of a mechanism whose drawing lists its bodies."""
-    name = model.mechanism.name
+    """Compute all requested dynamic responses of the models of a mechanism whose drawing lists its bodies.
+
+    With large rotation or contact, `static` gives the equilibria of every kind: the observed lengths in order, then the
+    force.
+    """
+    name = next(iter(models.values())).mechanism.name
     if asked.drive is not None:
-        mechanism_motion(model, asked.drive, asked.damping, static, out, as_json=as_json)
+        mechanism_motion(models, asked.drive, asked.damping, static, folders, out, as_json=as_json)
     if asked.band is not None:
-        mechanism_frequencies(model, asked.band, asked.damping, out, as_json=as_json)
+        mechanism_frequencies(models, asked.band, asked.damping, out, as_json=as_json)
     if asked.modes is not None:
         from fingervision.cli._model_modes import write_modes
 
-        shapes = mechanism_mode_shapes(model, asked.modes)
-        write_modes({"finite_element": shapes}, name, out, film=asked.film, as_json=as_json)
+        shapes = {kind: mechanism_mode_shapes(model, asked.modes) for kind, model in models.items()}
+        write_modes(shapes, name, out, film=asked.film, as_json=as_json)
 
 
 def follow_drive(
@@ -194,34 +205,38 @@ def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Pa
 
 
 def mechanism_motion(
-    model: MechanismPlate,
+    models: Mapping[str, MechanismPlate | MechanismFrame],
     drive: DriveHistory,
     damping: str,
-    static: PchipInterpolator | None,
+    static: Mapping[str, PchipInterpolator],
+    folders: Mapping[str, Path],
     out: Path,
     *,
     as_json: bool,
 ) -> None:
-    """Write response.csv and response.png of a mechanism whose drawing lists its bodies.
-
-    With large rotation or contact, `static` gives the equilibria: the observed lengths in order, then the force.
-    """
-    name = model.mechanism.name
-    reduced = model.modal_model(MODES)
-    if not reduced.observed:
-        raise UsageError(
-            f"{name} must have a [[probe]] or a [[pair]] as the output of the response in time, but has none: "
-            "add one point ([[probe]]) or the distance of two ([[pair]])."
-        )
-    motion = modal_motion(reduced, drive, parse_damping(damping))
-    if static is not None:
-        *lengths, force = static(drive.input_mm).T
-        touches = model.touch_input_mm().values()
-        apart = np.all([drive.input_mm / at < 1.0 for at in touches], axis=0) if touches else None
-        motion = about_equilibria(motion, dict(zip(motion.observed_mm, lengths, strict=True)), force, apart)
-    write_motion(out / "response.csv", drive, motion.observed_mm, motion.force_n)
-    column = main_column(reduced)
-    draw_motion({"finite_element": motion}, column, f"{name}, damping {damping}", out / "response.png")
-    if not as_json:
-        about = " about the equilibria, where nothing touches" if static is not None else ""
-        click.echo(f"In time by {motion.modes_hz.size} modes{about}; {words_of(motion, column)}")
+    """Write response.csv of every kind, and one response.png that compares them; see `move_mechanism`."""
+    motions: dict[str, Motion] = {}
+    column = ""
+    for kind, model in models.items():
+        reduced = model.modal_model(MODES)
+        if not reduced.observed:
+            raise UsageError(
+                f"{model.mechanism.name} must have a [[probe]] or a [[pair]] as the output of the response in time, "
+                "but has none: add one point ([[probe]]) or the distance of two ([[pair]])."
+            )
+        column = column or main_column(reduced)
+        motion = modal_motion(reduced, drive, parse_damping(damping))
+        if kind in static:
+            *lengths, force = static[kind](drive.input_mm).T
+            touches = model.touch_input_mm().values()
+            apart = np.all([drive.input_mm / at < 1.0 for at in touches], axis=0) if touches else None
+            travel_mm = float(np.ptp(lengths[list(motion.observed_mm).index(column)]))
+            check_small_vibration(motion, column, travel_mm)
+            motion = about_equilibria(motion, dict(zip(motion.observed_mm, lengths, strict=True)), force, apart)
+        motions[kind] = motion
+        write_motion(folders[kind] / "response.csv", drive, motion.observed_mm, motion.force_n)
+        if not as_json:
+            about = " about the equilibria, where nothing touches" if kind in static else ""
+            click.echo(f"{kind} in time by {motion.modes_hz.size} modes{about}; {words_of(motion, column)}")
+    title = f"{next(iter(models.values())).mechanism.name}, damping {damping}"
+    draw_motion(motions, column, title, out / "response.png")

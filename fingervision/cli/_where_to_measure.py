@@ -43,7 +43,12 @@ OPTIONS = (
     click.option(
         "--px-per-mm",
         type=float,
-        help="Scale in pixels per mm, without uncertainty; only the random part of the uncertainty is then given.",
+        help="Scale in pixels per mm; without --u-px-per-mm, only the random part of the uncertainty is given.",
+    ),
+    click.option(
+        "--u-px-per-mm",
+        type=float,
+        help="Standard uncertainty of --px-per-mm in pixels per mm, such as that of a ruler; u_gap_mm then includes it.",
     ),
     click.option(
         "--below-tip-mm",
@@ -77,6 +82,9 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
             if options[given] is not None and sources[0] is not from_file and sources[1] is from_file:
                 # The scale of the command line comes before the file's, of whichever kind.
                 options[other] = None
+        is_of_file = context.get_parameter_source("u_px_per_mm") is from_file
+        if is_of_file and (options["px_per_mm"] is None or context.get_parameter_source("px_per_mm") is not from_file):
+            options["u_px_per_mm"] = None  # it belongs to the file's scale
         return command(**options)
 
     decorated: Callable[..., Any] = with_one_scale

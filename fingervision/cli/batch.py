@@ -162,13 +162,11 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
     import tomllib
 
     from fingervision.batch.fingerprint import content_hash
-    from fingervision.storage.plain_file import plain, why
+    from fingervision.storage.plain_file import plain, text_of, why
 
     try:
         found = content_hash(plain(path))
-        base = (
-            tomllib.loads(path.read_text(encoding="utf-8-sig")).get("base") if path.suffix.lower() == ".toml" else None
-        )
+        base = tomllib.loads(text_of(path)).get("base") if path.suffix.lower() == ".toml" else None
     except FileNotFoundError:
         raise InputFileError(f"There is no file {path}: check the options.") from None
     except (OSError, ValueError) as error:

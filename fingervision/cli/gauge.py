@@ -52,6 +52,7 @@ def command(
     no_browser: bool,
     calibration: Path | None,
     px_per_mm: float | None,
+    u_px_per_mm: float | None,
     below_tip_mm: float,
     tips: str,
     roi: str | None,
@@ -73,6 +74,6 @@ def command(
             f"{recording} is not such a recording: name another, or draw them on a camera's picture with "
             "`fingervision live CAMERA --gauges FILE`."
         )
-    choices = choices_of(None, calibration, px_per_mm, below_tip_mm, tips, roi)
+    choices = choices_of(None, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)
     showing = Showing(page=True, json_lines=False, way=Access(port=port), record=False, browser=not no_browser)
     look_through(recorded(recording, rate_hz, choices, ()), out or USUAL_OUT, showing, Beside(), gauges)

@@ -59,6 +59,7 @@ def command(
     source: str,
     calibration: Path | None,
     px_per_mm: float | None,
+    u_px_per_mm: float | None,
     below_tip_mm: float,
     tips: str,
     roi: str | None,
@@ -88,18 +89,20 @@ def command(
     from fingervision.inspection.frames_to_look_at import frames_to_look_at
     from fingervision.inspection.picture import draw_inspection
     from fingervision.inspection.sample import take_sample
-    from fingervision.measuring.task import Task, check_task
+    from fingervision.measuring.scale import Scale, check_one_scale, stated_scale
+    from fingervision.measuring.task import Task, task_for_frames
     from fingervision.storage.calibration_json import read_calibration
     from fingervision.storage.response_csv import response_named
 
     if not 0.0 < seconds < float("inf"):
         raise UsageError(f"--seconds must be positive, but is {seconds:g}.")
-    if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
-    if px_per_mm is not None and not 0.0 < px_per_mm < float("inf"):
-        raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.")
+    check_one_scale(calibration, px_per_mm, u_px_per_mm)
     stated = simulated.PX_PER_MM if px_per_mm is None and simulated.accepts(source) else px_per_mm
-    scale = read_calibration(calibration) if calibration else None if stated is None else BareScale(stated)
+    scale: Scale | None = None
+    if calibration is not None:
+        scale = read_calibration(calibration)
+    elif stated is not None:
+        scale = stated_scale(stated, u_px_per_mm)
     task = Task(
         scale=scale or BareScale(WITHOUT_SCALE_PX / below_tip_mm if below_tip_mm > 0.0 else 1.0),
         scale_file=calibration,
@@ -112,7 +115,8 @@ def command(
     )
     opened = open_source(source, Wish(rate_hz=rate_hz))
     description = opened.description
-    check_task(task, description)
+    task = task_for_frames(task, description)
+    scale = None if scale is None else task.scale
     settings, warning = task.settings_for(description.files)
     try:
         sample = take_sample(frames_to_look_at(opened, seconds), description, settings, scale)

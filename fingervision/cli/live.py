@@ -154,6 +154,7 @@ def command(
     allow_motion: bool,
     calibration: Path | None,
     px_per_mm: float | None,
+    u_px_per_mm: float | None,
     below_tip_mm: float,
     tips: str,
     roi: str | None,
@@ -194,7 +195,7 @@ def command(
     from fingervision.live.running import Showing, look_through, run
 
     beside = Beside(model_path, kind, drive, drive_offset_s or 0.0, allow_motion, gauges)
-    choices = choices_of(source, calibration, px_per_mm, below_tip_mm, tips, roi)
+    choices = choices_of(source, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)
     if no_page and choices.scale is None:
         raise UsageError(
             "Without the browser page the scale must be given, but is not: add --calibration FILE (made by "

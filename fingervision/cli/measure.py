@@ -120,6 +120,7 @@ def command(
     recording: str,
     calibration: Path | None,
     px_per_mm: float | None,
+    u_px_per_mm: float | None,
     below_tip_mm: float,
     tips: str,
     roi: str | None,
@@ -155,7 +156,7 @@ def command(
             "--mechanism FILE, or leave --at out."
         )
     task = measuring_task(
-        scale=scale_of(calibration, px_per_mm),
+        scale=scale_of(calibration, px_per_mm, u_px_per_mm),
         below_tip_mm=below_tip_mm,
         tips=tips,
         roi=region_of(roi),

@@ -109,11 +109,13 @@ def _print(found: "Account") -> None:
     words = {"drive": "a drive"}.get(found.kind, f"a {found.kind} table")
     click.echo(f"read as {words}, {found.rows} rows{rate}")
     if document["columns"]:
-        rows = [("column", "read as", "unit", "range")]
+        rows = [("column", "unit in file", "read as", "range")]
         for each in document["columns"]:
-            values = "" if each["range"] is None else f"{each['range'][0]:.6g} to {each['range'][1]:.6g}"
+            values = ""
+            if each["range"] is not None:
+                values = f"{each['range'][0]:.6g} to {each['range'][1]:.6g} {each['range_unit']}".rstrip()
             missing = f" ({each['missing']} missing)" if each["missing"] else ""
-            rows.append((each["name"] or "(no name)", each["read_as"], each["unit"] or "?", values + missing))
+            rows.append((each["name"] or "(no name)", each["unit"] or "?", each["read_as"], values + missing))
         wide = [max(len(row[k]) for row in rows) for k in range(3)]
         for row in rows:
             click.echo("  " + "  ".join([*(f"{row[k]:<{wide[k]}}" for k in range(3)), row[3]]).rstrip())

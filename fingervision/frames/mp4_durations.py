@@ -25,6 +25,7 @@ from pathlib import Path
 import av
 
 from fingervision.frames.mp4_boxes import boxes, edits, numbers, rows
+from fingervision.frames.open_container import open_container
 from fingervision.frames.spoken_damage import listening
 
 GIVES_UP = "error reading header"
@@ -100,8 +101,8 @@ def states_another_duration(path: Path) -> bool:
 
 
 def _is_unread(path: Path) -> bool:
-    """Whether FFmpeg would stop reading within the table of contents, and continue with a part of it."""
-    with listening("") as heard, suppress(av.FFmpegError, IndexError), av.open(f"file:{path}"):
+    """Whether FFmpeg gives up within the table of contents, and goes on with the half of it."""
+    with listening("") as heard, suppress(av.FFmpegError, IndexError), open_container(path):
         return any(GIVES_UP in words for _, _, words in heard.log)
     return False
 
@@ -118,6 +119,10 @@ def _contradicts(track: _Track, film_scale: int) -> bool:
     total = sum(count * ticks for count, ticks in track.steps)
     # Programs state the sum of the durations, or from the first presentation to the last; some a picture more.
     more = {total + ticks for _, ticks in track.steps}
+    last_count, last_ticks = track.steps[-1]
+    if last_count == 1:
+        # How long the last picture lasts moves none, and programs that copy a film state it as they like.
+        more |= {one - last_ticks + ticks for one in (*more, total) for _, ticks in track.steps}
     departures = [abs(track.ticks - sound) for sound in (total, track.presented, *more)]
     if min(departures) and (_is_explained(track) or (min(departures) > longest and _is_another(track.ticks, total))):
         return True

@@ -90,7 +90,9 @@ class NetworkStream:
     def __init__(self, name: str) -> None:
         self.name = without_password(name)
         try:
-            self._container = av.open(name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S))
+            self._container = av.open(
+                name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S), metadata_errors="replace"
+            )
         except (av.FFmpegError, OSError, ValueError) as error:
             raise DeviceError(
                 f"The stream {self.name} must answer with a video, but does not ({_reason(error)}): check the address, "

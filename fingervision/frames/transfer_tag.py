@@ -6,10 +6,15 @@ from pathlib import Path
 
 import av
 
+from calib.camera_response import STUDIO
 from fingervision.frames.image_file import JPEG_START, PNG_SIGNATURE
+from fingervision.frames.open_container import open_container
 
 # Transfer characteristics of ITU-T H.273, table 3, by what `calib.camera_response` calls them.
 VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: "bt709", 16: "pq", 18: "hlg"}
+# Colour range of ITU-T H.273, 8.3: VideoFullRangeFlag is 0; as PyAV numbers it.
+STUDIO_RANGE = 1
+LUMA_FORMATS = ("yuv", "yuyv", "uyvy", "yvyu", "nv", "p0", "p2", "p4", "gray", "y2")
 # PNG stores 100000 / gamma of the file (PNG specification, 11.3.3.2).
 PNG_GAMMAS = {45455: "srgb", 100000: "linear"}
 EXIF_START, EXIF_IFD, COLOUR_SPACE = b"Exif\x00\x00", 0x8769, 0xA001
@@ -39,11 +44,21 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
     if len(files) > 1:
         return None
     try:
-        with av.open(str(files[0])) as container:
+        with open_container(files[0]) as container:
             video = next(iter(container.streams.video), None)
-            return None if video is None else VIDEO_TAGS.get(int(video.codec_context.color_trc))
+            return None if video is None else _of_video(video.codec_context)
     except (av.FFmpegError, OSError, ValueError):
         return None
+
+
+def _of_video(codec: av.VideoCodecContext) -> str | None:
+    """Curve that a video states, with `_studio` where it states that black and white lie within the stored levels.
+
+    A range is stored with luma only; a video that states none is taken as full range.
+    """
+    name = VIDEO_TAGS.get(int(codec.color_trc))
+    is_luma = (codec.pix_fmt or "").startswith(LUMA_FORMATS)
+    return f"{name}_studio" if name in STUDIO and is_luma and int(codec.color_range) == STUDIO_RANGE else name
 
 
 def _of_png(head: bytes) -> str | None:

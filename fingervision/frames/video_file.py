@@ -18,10 +18,12 @@ from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
 from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
+from fingervision.frames.open_container import open_container
 from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
 from fingervision.frames.told_times import believable
+from fingervision.frames.unseen_damage import unseen_damage
 
 # FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy, because
 # the stream does not say.
@@ -150,11 +152,13 @@ class VideoFile:
                 # (libavcodec/h264_slice.c, enable_er): parts of older pictures would stand there, unsaid.
                 stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
+            untrusted = unseen_damage(Path(self.name), stream, container.metadata.get("comment"))
             for tick, found in believable(pictures(container, stream, Path(self.name))):
                 index = next(numbers)
                 time_s = None if tick is None or stream.time_base is None else float(tick * stream.time_base)
-                if isinstance(found, str):
-                    yield LostFrame(index, time_s, Status.DAMAGED, found)
+                if untrusted or isinstance(found, str):
+                    words = found if isinstance(found, str) else untrusted
+                    yield LostFrame(index, time_s, Status.DAMAGED, words)
                     last_tick = tick
                     continue
                 pixels = upright(luma(found), found.rotation)
@@ -169,8 +173,7 @@ class VideoFile:
 
     def _opened(self) -> av.container.InputContainer:
         try:
-            # FFmpeg takes what stands before a colon for a protocol: 12:30:05.mp4 is a file.
-            return av.open(f"file:{self.name}")
+            return open_container(self.name)
         except (av.FFmpegError, OSError) as error:
             raise _not_a_video(self.name, error) from error
 

@@ -59,8 +59,7 @@ class Session:
     def __init__(self, capture: Capture, choices: Choices, out: Path) -> None:
         self.capture, self.out = capture, out
         self.description = capture.source.description
-        choices.check(self.description)
-        self.choices = choices
+        self.choices = choices.for_frames(self.description)
         self.identity = secrets.token_hex(4)
         self.features: dict[str, Any] = {}
         self.history = History()
@@ -161,8 +160,7 @@ class Session:
                     "The settings of the measurement cannot be changed while a run is recorded: stop recording first."
                 )
             chosen, unzeroed = self.choices.changed(**changes)
-            chosen.check(self.description)
-            self.choices = chosen
+            self.choices = chosen.for_frames(self.description)
         if unzeroed:
             self.say("zero", ZERO_IS_OFF)
 

@@ -1,6 +1,6 @@
 """Settings of a measurement of a recording or of a live view."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -8,12 +8,12 @@ from typing import Any
 from calib.camera_response import CameraResponse
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import DataError, UsageError
+from fingervision.domain.errors import UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
 from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.measuring.response_budget import choose_response
-from fingervision.measuring.scale import Scale
+from fingervision.measuring.scale import Scale, scale_for_frames
 from fingervision.vision.pipeline import Settings
 
 
@@ -115,8 +115,8 @@ class Task:
         return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
 
 
-def check_task(task: Task, description: Description) -> None:
-    """Refuse settings that are impossible for the given frames.
+def task_for_frames(task: Task, description: Description) -> Task:
+    """Refuse settings that are impossible for the given frames; complete the scale by the frames' size.
 
     Parameters
     ----------
@@ -124,6 +124,11 @@ def check_task(task: Task, description: Description) -> None:
         Settings of the measurement.
     description : Description
         Known properties of the frames.
+
+    Returns
+    -------
+    Task
+        The settings for these frames.
 
     Raises
     ------
@@ -152,10 +157,7 @@ def check_task(task: Task, description: Description) -> None:
             "give --rate-hz, or a times.csv beside the images."
         )
     check_gauges(task.gauges, width_px, height_px)
-    try:
-        task.scale.check_frame_size(width_px, height_px)
-    except ValueError as error:
-        raise DataError(str(error)) from error
+    return replace(task, scale=scale_for_frames(task.scale, (width_px, height_px)))
 
 
 def in_words(task: Task, settings: Settings) -> dict[str, Any]:

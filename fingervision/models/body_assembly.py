@@ -43,8 +43,8 @@ class BodyAssembly:
         Indices of the two frames that each flexure joins.
     held : tuple of int
         Indices of the frame motions that supports fix; frame i has the motions 3 i to 3 i + 2.
-    by_input : dict of int to float
-        Frame motions that the drive prescribes, per 1 mm of input.
+    by_drive : tuple of dict of int to float
+        Frame motions that every drive prescribes, per 1 mm of its own motion.
     """
 
     plate: PlaneStressPlate
@@ -54,7 +54,7 @@ class BodyAssembly:
     turning: tuple[CorotationalBody, ...]
     ends: tuple[tuple[int, int], ...]
     held: tuple[int, ...]
-    by_input: dict[int, float]
+    by_drive: tuple[dict[int, float], ...]
 
     def field(self, moved: Array) -> tuple[Array, csr_matrix]:
         """Displacement of every node of the bodies in the deformed shape; its derivative by the frames' motions."""
@@ -103,7 +103,7 @@ class _Frames:
         self.found: list[Frame] = []
         self.owner: list[int] = []
         self.held: list[int] = []
-        self.by_input: dict[int, float] = {}
+        self.by_drive: list[dict[int, float]] = []
         self._taken: set[int] = set()
 
     def add(self, frame: Frame, body: int) -> int:
@@ -131,11 +131,14 @@ class _Frames:
         for nodes in supports.fixed:
             for at, turns in self.face(nodes, ("x", "y")):
                 self.held += [at, at + 1] + [at + 2] * turns
-        kept = driven_components(mechanism)
-        in_the_mean = len(kept) == 1 and turns_with(self.plate, supports.driven, kept[0])
-        for at, turns in self.face(supports.driven, () if in_the_mean else kept):
-            self.by_input |= {at + "xy".index(c): mechanism.drive.direction["xy".index(c)] for c in kept}
-            self.by_input |= {at + 2: 0.0} if turns else {}
+        for drive, nodes in zip(mechanism.drives, supports.driven, strict=True):
+            kept = driven_components(drive)
+            own: dict[int, float] = {}
+            in_the_mean = len(kept) == 1 and turns_with(self.plate, nodes, kept[0])
+            for at, turns in self.face(nodes, () if in_the_mean else kept):
+                own |= {at + "xy".index(c): drive.direction["xy".index(c)] for c in kept}
+                own |= {at + 2: 0.0} if turns else {}
+            self.by_drive.append(own)
         for nodes, component in supports.slides:
             for at, turns in self.face(nodes, (component,)):
                 self.held += [at + "xy".index(component)] + [at + 2] * turns
@@ -186,4 +189,4 @@ def assemble_bodies(
     turning = [CorotationalBody(np.array([frames.found[i].at_mm for i in body.frames]), body.stiffness_n_mm)
                for body in bodies]  # fmt: skip
     return BodyAssembly(plate, piece, tuple(frames.found), tuple(bodies), tuple(turning), ends, tuple(frames.held),
-                        frames.by_input)  # fmt: skip
+                        tuple(frames.by_drive))  # fmt: skip

@@ -66,10 +66,13 @@ class OwnModes:
         Angular frequencies squared, in 1/s^2.
     coupling_t : ndarray of float, shape (3 m, k)
         Mass that couples the modes with the motions of the frames.
+    shapes_mm : ndarray of float, shape (unknowns of the plate, k)
+        Displacements of the body in each mode.
     """
 
     squared: Array
     coupling_t: Array
+    shapes_mm: Array
 
 
 def condensed(
@@ -120,11 +123,12 @@ def condensed(
 
 
 def own_modes(plate: PlaneStressPlate, body: CondensedBody, count: int) -> OwnModes:
-    """Compute the first modes of a body with fixed coordinate frames, by subspace iteration.
+    """Compute the first modes of a body with fixed frames, at most a quarter of its unknowns, by subspace iteration.
 
     Source: Bathe, Finite Element Procedures, section 11.6.
     """
     K, M = plate.stiffness_n_mm, plate.mass_t
+    count = min(count, int(np.count_nonzero(np.any(body.shapes_mm, axis=1))) // 4)
     moved = np.random.default_rng(0).standard_normal((plate.unknowns, 2 * count + 2))
     squared = np.ones(1)
     for _ in range(_ITERATIONS):
@@ -132,4 +136,4 @@ def own_modes(plate: PlaneStressPlate, body: CondensedBody, count: int) -> OwnMo
         squared, turned = eigh(moved.T @ (K @ moved), moved.T @ (M @ moved))
         moved = moved @ turned
     kept = moved[:, :count]
-    return OwnModes(squared[:count], body.shapes_mm.T @ (M @ kept))
+    return OwnModes(squared[:count], body.shapes_mm.T @ (M @ kept), kept)

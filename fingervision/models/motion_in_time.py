@@ -127,6 +127,31 @@ def gripper_motion(
     )
 
 
+def check_small_vibration(small: Motion, column: str, travel_mm: float) -> None:
+    """Refuse a drive that shakes a length too much for the modes at rest to vibrate about the equilibria.
+
+    Parameters
+    ----------
+    small : Motion
+        Motion for small displacements.
+    column : str
+        Name of the length.
+    travel_mm : float
+        Range of the length's equilibria over the drive.
+
+    Raises
+    ------
+    ModelError
+        If the vibration exceeds a twentieth of the travel.
+    """
+    if (shaken_mm := small.vibration_mm(column)) > _FAST * travel_mm:
+        raise ModelError(
+            f"With large rotation or contact this drive must shake {column.removesuffix('_mm')} by at most {_FAST:g} "
+            f"of its travel of {travel_mm:.3g} mm, but shakes it by {shaken_mm:.3g} mm; slow it down, or leave "
+            "--large-rotation and --contact off."
+        )
+
+
 def about_equilibria(
     small: Motion, static_mm: Mapping[str, Array], force_n: Array, apart: NDArray[np.bool_] | None = None
 ) -> Motion:

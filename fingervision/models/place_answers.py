@@ -308,7 +308,11 @@ def attachments(answers: PlaceAnswers) -> Sequence[Mapping[str, PointMm]]:
         for body in answers.ends(number):
             found[body][flexure.name] = flexure.at_mm
     mechanism = answers.mechanism
-    for face in (*mechanism.fixed, *(face for face, _ in mechanism.slides), mechanism.drive.face):
+    for face in (
+        *mechanism.fixed,
+        *(face for face, _ in mechanism.slides),
+        *(drive.face for drive in mechanism.drives),
+    ):
         x0, x1, y0, y1 = face.box_mm
         middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         nodes = model.plate.nodes_mm

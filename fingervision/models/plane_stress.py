@@ -92,6 +92,12 @@ class PlaneStressPlate:
         left = (b - a)[0] * (inner - a)[1] - (b - a)[1] * (inner - a)[0] > 0.0
         return np.vstack([np.where(left, ends[::-1], ends), corners + facets])
 
+    def outline_lines(self) -> tuple[Array, Indices]:
+        """Straight pieces of the outline, shape (n, 2, 2), and the unknowns along x and y of their ends, same shape."""
+        a, b, middle = self.outline_edges
+        ends = np.concatenate([np.stack([a, middle], axis=1), np.stack([middle, b], axis=1)])
+        return self.nodes_mm.T[ends], np.stack([self.x_dofs[ends], self.y_dofs[ends]], axis=-1)
+
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
         """Derivatives of the six shape functions at quadrature points, shape (m, q, 2, 6); weights, shape (m, q)."""

@@ -48,6 +48,10 @@ MOST_LINES = 400
 MOST_EQUAL = 0.8
 """Share of the changes that advance by the same number of lines, above which steady motion is mistaken for lines. If it
 is an encoder after all, moving by nearly a whole number of lines per row, only its jitter stays in the record."""
+PAUSING = 0.02
+"""Ratio of the number of pauses of a single row, within a motion by single steps, to the number of moving samples,
+above which the values were rounded: a motion at 0.98 steps per row pauses once in 50. Set points in equal steps pause
+at their ends only."""
 FEWEST_SINGLE = 3
 """Least number of single steps that distinguish an encoder from set points in round numbers."""
 
@@ -196,16 +200,24 @@ def _grid(input_mm: Array) -> float:
 def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
     """Whether a motion was rounded to a grid: it pauses on grid values, or its increments differ by single grid steps.
 
-    Set-points in round numbers lie on a grid as well, but advance in equal steps.
+    At a little less than one step per row, nearly all rows advance by one step, and only the pauses tell.
+
+    Set points in round numbers lie on a grid as well, but advance in equal steps.
     """
     if step_mm == 0.0:
         return False
-    fast, halting, moved = 0, 0, 0
+    fast, halting, paused, moved = 0, 0, 0, 0
     for run in runs:
         moves = np.abs(np.diff(input_mm[run])) / step_mm
         single = np.abs(np.abs(np.diff(input_mm[run], 2)) / step_mm - 1.0) < 0.1
         several = moves[1:] > 1.5
         fast += int(np.sum(single & several))
         halting += int(np.sum(single & ~several))
+        way = np.sign(np.diff(input_mm[run])) * (np.abs(moves - 1.0) < 0.1)
+        paused += int(np.sum((way[:-2] * way[2:] > 0.0) & (moves[1:-1] < 0.5)))
         moved += int(np.sum(moves > 0.5))
-    return fast >= FEWEST_SINGLE or halting >= max(FEWEST_SINGLE, HALTING * moved)
+    return (
+        fast >= FEWEST_SINGLE
+        or halting >= max(FEWEST_SINGLE, HALTING * moved)
+        or paused >= max(FEWEST_SINGLE, PAUSING * moved)
+    )

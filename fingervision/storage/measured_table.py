@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
+from fingervision.storage.assumed_response import response_note_beside
 from fingervision.storage.channel_columns import channels_of, read_channels
 from fingervision.storage.csv_columns import read_block, read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
@@ -138,6 +139,7 @@ def measured_rows(
         notes.append(
             "there is only one run, in which a re-zeroing of the stage cannot be distinguished from an offset."
         )
+    notes += response_note_beside(path)
     return MeasuredTable(
         input_mm=column["input_mm"],
         gap_mm=gap,

@@ -1,9 +1,14 @@
-"""Refuse pipes and devices as input files, because reading them could wait for ever or never end."""
+"""Read input files: no pipes and devices, which could wait for ever or never end, and text in UTF-8 only."""
 
+import codecs
 import errno
 from pathlib import Path
 
 from fingervision.domain.errors import OutputError
+
+SAVE_AS_UTF8 = "open it in a text editor and save it with the encoding UTF-8"
+SAMPLE_BYTES = 1 << 16
+"""Part of a file that is searched for zero bytes."""
 
 
 def plain(path: Path) -> Path:
@@ -27,6 +32,33 @@ def plain(path: Path) -> Path:
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise OSError(errno.ESPIPE, "it is a pipe or a device: save it as a file first", str(path))
     return path
+
+
+class NotUtf8Error(ValueError):
+    """A text file has another encoding than UTF-8; the message is a clause that says which, and what to do."""
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a file in UTF-8, with or without a byte-order mark.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read, or is a pipe, a socket or a device.
+    NotUtf8Error
+        The file is UTF-16, or is not UTF-8 for another reason.
+    """
+    content = plain(path).read_bytes()
+    # Documents have no zero bytes. In UTF-16 every second byte of ASCII text is zero.
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in content[:SAMPLE_BYTES]:
+        what = "it holds zero bytes, as text in UTF-16 does (Windows calls it Unicode)"
+        raise NotUtf8Error(f"{what}: {SAVE_AS_UTF8}")
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        found = f"byte 0x{content[error.start]:02x} in line {line} belongs to another encoding"
+        raise NotUtf8Error(f"{found}: {SAVE_AS_UTF8}") from error
 
 
 def why(error: Exception) -> str:

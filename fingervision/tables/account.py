@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels
-from fingervision.tables.column_choice import CANONICAL, NEEDED
+from fingervision.tables.column_choice import CANONICAL, DIMENSION, NEEDED
 from fingervision.tables.column_names import column_name
 from fingervision.tables.formats import read_raw
 from fingervision.tables.iso230 import iso230_rows_of
@@ -21,6 +21,10 @@ from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawTable
 from fingervision.tables.read import drive_of, read_drive, read_measured_table, read_simulation_table
 from fingervision.tables.understanding import Taken, Understood, understand
+from fingervision.tables.units import CANONICAL as CANONICAL_UNIT
+
+RANGE_UNIT = {role: CANONICAL_UNIT[dimension] for role, dimension in DIMENSION.items()}
+"""Unit in which a column's range is stated: that in which it was read, whatever the file's unit is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +109,7 @@ class Account:
                     "unit": each.unit,
                     "read_as": CANONICAL.get(each.role, each.role),
                     "range": ranges.get(each.role),
+                    "range_unit": RANGE_UNIT.get(each.role, ""),
                     "missing": int(np.sum(~self.columns[each.role].present)) if each.role in self.columns else None,
                 }
                 for each in self.taken

@@ -10,6 +10,7 @@ from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import Question
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
+from fingervision.tables.units import factor, spelled
 
 NEEDED = {"measured": ("input", "gap"), "drive": ("time", "input"), "simulation": ("input", "gap")}
 """Roles that a table of each kind must have; left and right together can replace the gap."""
@@ -62,6 +63,8 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     sources = [k for k, name in enumerate(names) if name.source == kind and k not in fixed]
     if "gap" not in roles and sources:
         roles["gap"] = sources
+    if kind == "simulation" and not {"input", "time", "u_gap"} & {*roles, *chosen}:
+        _lone_u(raw, names, roles, fixed, about)
     if "gap" not in chosen and "time" in roles and kind == "simulation":
         roles.pop("time")
     sides = all(side in chosen or len(roles.get(side, ())) == 1 for side in ("left", "right"))
@@ -94,6 +97,29 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
                 )
             )
     return chosen
+
+
+def _lone_u(
+    raw: RawTable, names: Sequence[ColumnName], roles: dict[str, list[int]], fixed: set[int], about: Findings
+) -> None:
+    """Take a simulation's column `u` with a unit of length for the input, as a prescribed displacement is called.
+
+    Only where no other column is an input, and neither a time nor an uncertainty shows that this is a measurement: in
+    one, u is a standard uncertainty.
+    """
+    found = [
+        place
+        for place, name in enumerate(names)
+        if place not in fixed
+        and name.base == "u"
+        and factor(spelled(raw.columns[place].unit) or name.unit or "-", "length") is not None
+    ]
+    if len(found) == 1:
+        roles["input"] = found
+        about.notes.append(
+            f"'{raw.columns[found[0]].name}' is taken for the input, a prescribed displacement: columns.input in "
+            "columns.toml would name another."
+        )
 
 
 def _one_clock(

@@ -61,6 +61,6 @@ def column_name(text: str) -> ColumnName:
         return ColumnName(text, f"{match['base']} {unit}", "")
     if (match := BESIDE.match(text)) is not None and known_unit(match["unit"]) is not None:
         base = match["base"].strip(" _-/,.:")
-        if role_of(base) is not None or source_of(base) is not None:
+        if role_of(base) is not None or source_of(base) is not None or base == "u":
             return ColumnName(text, base, spelled(match["unit"]))
     return ColumnName(text, text, "")

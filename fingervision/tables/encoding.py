@@ -1,8 +1,10 @@
 """Text encoding of a table: byte-order marks, UTF-8, UTF-16 without a byte-order mark, and older encodings."""
 
 import codecs
+import re
 
 from fingervision.domain.errors import DataError
+from fingervision.tables.legacy_encoding import most_likely_encodings
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -11,12 +13,9 @@ MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-WESTERN = frozenset(
-    "äöüÄÖÜßàâçéèêëîïôùûüÿæœÀÂÇÉÈÊËÎÏÔÙÛÜŸñÑáíóúÁÍÓÚ¿¡ìòÌÒãõÃÕåÅøØ°µ²³±·„…€§«»\xa0"
-    "\u00d7\u2013\u2014\u2018\u2019\u201c\u201d"
-)
-"""Non-ASCII characters that are usual in Western languages; any other character indicates another encoding."""
 SAMPLE_BYTES = 65536
+BEYOND_ASCII = re.compile(rb"[\x80-\xff]")
+WIDE = ["utf_16", "utf_16_be", "utf_16_le", "utf_32", "utf_32_be", "utf_32_le", "utf_7"]
 
 
 def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
@@ -73,24 +72,33 @@ def _utf16_without_mark(sample: bytes) -> str | None:
 
 
 def _older(content: bytes) -> tuple[str, str]:
-    """Decode an 8-bit encoding: as Western European if only usual characters result, otherwise by charset-normalizer.
-
-    A header has too few non-ASCII bytes for the statistics of charset-normalizer, so that the most frequent case is
-    decided by a rule.
-    """
-    try:
-        text = content.decode("cp1252")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-    if {letter for letter in set(text) if ord(letter) > 127} <= WESTERN:
-        return text, "cp1252"
+    """Decode an older encoding: by the letters of known languages, otherwise as charset-normalizer detects."""
+    sample = _lines_beyond_ascii(content)
+    for encoding in most_likely_encodings(sample):
+        try:
+            return content.decode(encoding), encoding
+        except UnicodeDecodeError:
+            continue
     from charset_normalizer import from_bytes
 
-    odd = b"\n".join(line for line in content.splitlines() if not line.isascii())[:SAMPLE_BYTES]
-    best = from_bytes(odd).best()
-    if best is None:
-        return text, "latin-1"
-    try:
-        return content.decode(best.encoding), best.encoding
-    except UnicodeDecodeError:
-        return text, "latin-1"
+    # Without UTF-16 and UTF-32, which have marks or zero bytes: in these any text of an even length is some text.
+    best = from_bytes(sample, cp_exclusion=WIDE).best()
+    if best is not None:
+        try:
+            return content.decode(best.encoding), best.encoding
+        except UnicodeDecodeError:
+            pass
+    return content.decode("latin-1"), "latin-1"
+
+
+def _lines_beyond_ascii(content: bytes) -> bytes:
+    """Join the first lines that are not ASCII, up to a sample's size."""
+    lines: list[bytes] = []
+    at = size = 0
+    while size < SAMPLE_BYTES and (found := BEYOND_ASCII.search(content, at)) is not None:
+        begin = max(content.rfind(b"\n", 0, found.start()), content.rfind(b"\r", at, found.start())) + 1
+        ends = [end for end in (content.find(b"\n", found.end()), content.find(b"\r", found.end())) if end >= 0]
+        at = min(ends, default=len(content))
+        lines.append(content[begin : min(at, begin + SAMPLE_BYTES)])
+        size += len(lines[-1])
+    return b"\n".join(lines)

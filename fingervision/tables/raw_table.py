@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 
 
@@ -34,6 +35,26 @@ class RawColumn:
 
     def __len__(self) -> int:
         return self.content.value.size if isinstance(self.content, Numbers) else len(self.content)
+
+
+MOST_COLUMNS = 4096
+"""Columns of a table: loggers write at most some hundreds; each costs about 0.2 ms to understand (`table` of 100 000 took
+minutes)."""
+
+
+def check_columns(path: Path, count: int) -> None:
+    """Refuse a table of too many columns before their names are interpreted.
+
+    Raises
+    ------
+    DataError
+        The table has more than `MOST_COLUMNS` columns.
+    """
+    if count > MOST_COLUMNS:
+        raise DataError(
+            f"{path} must have at most {MOST_COLUMNS} columns, but has {count}: export the columns that are needed, or "
+            "exchange rows and columns."
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

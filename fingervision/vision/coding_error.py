@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.median import middle
+from fingervision.vision.orientation import Orientation
+from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +52,40 @@ def displaced_px(step: float, contrast: float) -> float:
     return DISPLACED * step / max(abs(contrast), 1.0)
 
 
+def flanks_displaced_px(
+    edges: EdgePoints, orientation: Orientation, quantiser: Quantiser, light: Floats, top_level: int
+) -> tuple[float, float]:
+    """Standard uncertainty of the position of both inner flanks from codec errors common to all of their rows (pixels).
+
+    Parameters
+    ----------
+    edges : EdgePoints
+        Steps that were fitted to every line, in the fingers' axes.
+    orientation : Orientation
+        Transformation from the fingers' axes to the picture.
+    quantiser : Quantiser
+        Quantiser of the picture.
+    light : ndarray of float, shape (levels,)
+        Light for every stored level (look-up table).
+    top_level : int
+        Highest level of the scale.
+    """
+    displaced = []
+    for k, level in enumerate(edges.inside):
+        is_seen = edges.lines.weight[k, :INNER] > 0
+        if not np.any(is_seen):
+            displaced.append(0.0)
+            continue
+        across, contrast = (middle(a[k, :INNER][is_seen]) for a in (edges.position, edges.contrast))
+        rows = edges.lines.fixed[k, :INNER][is_seen]
+        x, y = orientation.to_pixels(across, 0.5 * float(rows.min() + rows.max()))
+        half_px = ACROSS_SIGMAS * float(edges.blur_px[k, 0]) + ACROSS_PX, 0.5 * float(np.ptp(rows))
+        beside, along = half_px if orientation.direction.is_vertical else half_px[::-1]
+        step = quantiser.near(x, y, beside, along)
+        displaced.append(displaced_px(step, _stored_contrast(level, contrast, light, top_level)))
+    return displaced[0], displaced[1]
+
+
 def with_coding_error(
     found: GapMeasurement, quantiser: Quantiser, inside: tuple[float, float], light: Floats, top_level: int
 ) -> GapMeasurement:
@@ -68,13 +106,20 @@ def with_coding_error(
     """
     displaced = []
     for edge, level in zip((found.left, found.right), inside, strict=True):
-        stored = np.interp([level, level + edge.contrast], light[: top_level + 1], np.arange(top_level + 1.0))
         across, along = ACROSS_SIGMAS * edge.blur_px + ACROSS_PX, ALONG_PX
         if not found.direction.is_vertical:
             across, along = along, across
         step = quantiser.near(edge.x_px, edge.y_px, across, along)
-        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level) * _by_slope(edge.slope))
+        displaced.append(
+            displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level)) * _by_slope(edge.slope)
+        )
     return _less_sure(found, displaced[0], displaced[1])
+
+
+def _stored_contrast(level: float, contrast: float, light: Floats, top_level: int) -> float:
+    """Contrast of an edge in stored levels of an 8-bit scale, from the light inside and the change of light."""
+    stored = np.interp([level, level + contrast], light[: top_level + 1], np.arange(top_level + 1.0))
+    return float(np.ptp(stored)) * EIGHT_BITS / top_level
 
 
 def _by_slope(slope: float) -> float:

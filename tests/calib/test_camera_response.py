@@ -21,6 +21,27 @@ def test_half_of_the_light(name: str) -> None:
     assert table[255] == pytest.approx(255.0)
 
 
+# Half of the light between black and white, in levels of a studio-range video: 16 to 235 of 255, 64 to 940 of 1023.
+# BT.709: 0.70525 of the range. HLG: (c + a ln(6 - b)) = 0.87164 of it (BT.2100-2, table 5, by hand).
+STUDIO_HALVES = {"bt709": (16 + 219 * 0.70525, 16, 235, 255), "hlg": (64 + 876 * 0.87164, 64, 940, 1023)}
+
+
+@pytest.mark.parametrize("name", STUDIO_HALVES)
+def test_half_of_the_light_in_studio_range(name: str) -> None:
+    response = standard_response(f"{name}_studio")
+    half, black, white, top = STUDIO_HALVES[name]
+    dark, bright = np.interp([black / top, white / top], response.level, response.light)
+    assert top * np.interp(0.5 * (dark + bright), response.light, response.level) == pytest.approx(half, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["srgb_studio", "bt709_studio", "hlg_studio", "pq_studio"])
+def test_studio_range_covers_every_stored_level(name: str) -> None:
+    table = standard_response(name).table(1023, 1024)
+    assert table[0] == 0.0
+    assert table[1023] == pytest.approx(1023.0)
+    assert (np.diff(table) > 0.0).all()
+
+
 @pytest.mark.parametrize(
     ("level", "light", "words"),
     [

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from fingervision.cli.compare import command as compare
 from fingervision.cli.model import command
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, ModelError, UsageError
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
@@ -159,7 +159,7 @@ def test_a_mechanism_moves_too(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_motion_is_refused(tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(UsageError, match=sentence):
         run(GRIPPER, "--kind", "lumped", "--out", tmp_path, *options)
     assert not list(tmp_path.glob("frequency.*"))
     assert not list(tmp_path.glob("modes.*"))
@@ -229,13 +229,13 @@ def test_uncertain_numbers_give_every_figure_its_own(tmp_path: Path) -> None:
 def test_an_uncertain_list_is_refused(tmp_path: Path) -> None:
     stated = GRIPPER.read_text().replace("hinge1_mm = [35.5, 30.0]", "hinge1_mm = { value = [35.5, 30.0], u = 0.1 }")
     (tmp_path / "g.toml").write_text(stated)
-    with pytest.raises(FingervisionError, match=r"lever.hinge1_mm in .* must belong to a single number"):
+    with pytest.raises(DataError, match=r"lever.hinge1_mm in .* must belong to a single number"):
         run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
 
 
 def test_an_uncertainty_beyond_sense_leaves_no_results(tmp_path: Path) -> None:
     stated = GRIPPER.read_text().replace("\nthickness_mm = 1.0", "\nthickness_mm = { value = 1.0, u = 2.0 }")
     (tmp_path / "g.toml").write_text(stated)
-    with pytest.raises(FingervisionError, match=r"The uncertainty of hinge.thickness_mm must leave .* positive"):
+    with pytest.raises(ModelError, match=r"The uncertainty of hinge.thickness_mm must leave .* positive"):
         run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
     assert not (tmp_path / "o").exists()

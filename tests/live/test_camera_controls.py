@@ -23,6 +23,7 @@ from fingervision.live.adjustments import Adjustments
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section
+from fingervision.live.commands.camera import CameraError
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
@@ -176,7 +177,7 @@ def test_a_change_during_a_recording_stands_in_its_events_and_focus_waits(sessio
     run = session.record()
     until(lambda: session.recording is not None and session.recording.run.frames > 3)
     put(session, "exposure", 6.0)
-    with pytest.raises(FingervisionError, match="end the recording first"):
+    with pytest.raises(CameraError, match="end the recording first"):
         put(session, "focus", 60.0)
     session.stop_recording()
     events = [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
@@ -203,7 +204,7 @@ def test_a_camera_that_is_silent_says_so_and_is_not_changed_later(
     monkeypatch.setattr("fingervision.live.adjustments.ANSWERED_WITHIN_S", 0.2)
     cameras[0].is_stuck = True
     time.sleep(0.05)
-    with pytest.raises(FingervisionError, match="does not answer, so its exposure stays"):
+    with pytest.raises(CameraError, match="does not answer, so its exposure stays"):
         put(session, "exposure", 5.0)
     cameras[0].is_stuck = False
     measured = session.history.count

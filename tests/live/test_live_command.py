@@ -35,6 +35,7 @@ def refused(*arguments: str | Path) -> FingervisionError:
         ),
         (("http://127.0.0.1:9/feed", "--size", "640x480"), "--size and --rate-hz are for cameras of this computer"),
         (("simulated", "--size", "wide"), "--size must be WxH in pixels, such as 640x480, but is 'wide'."),
+        (("simulated", "--rate-hz", "0"), "--rate-hz must be between 1 and 1000, but is 0."),
         (("simulated", "--size", "10x10"), "--size of the simulated camera must be 320x240 to 4096x4096"),
         (
             ("simulated", "--exposure-ms", "8"),

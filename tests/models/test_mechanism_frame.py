@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.corotational_body import CorotationalBody, turned_axes
 from fingervision.models.finite_element import FiniteElementGripper
@@ -81,7 +81,7 @@ def test_the_chain_is_the_paper_s_matrix(gripper: Gripper) -> None:
 
 
 def test_a_loop_is_no_chain(gripper: Gripper) -> None:
-    with pytest.raises(FingervisionError, match="form a loop"):
+    with pytest.raises(ModelError, match="form a loop"):
         MechanismChain(whole_mechanism(gripper, gripper, "both"))
 
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from fingervision.cli import cli
 from fingervision.domain.board_settings import Role
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.testbed.actuators.board import BoardActuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
@@ -142,16 +142,14 @@ def test_a_move_that_no_step_makes_is_refused_before_anything_moves(bed: Bed, co
         ((11.0, 10.0), "The target must lie between 0 and 10 mm, but is 11 mm: nothing was moved."),
         ((5.0, 500.0), "The speed must be at most 400 mm/s, but is 500 mm/s: nothing was moved."),
     ):  # fmt: skip
-        with pytest.raises(FingervisionError) as raised:
+        with pytest.raises(LimitError) as raised:
             bed.actuator.move(*move)
         assert str(raised.value) == said
     assert controller.codes == [0]
 
 
 def test_before_homing_only_absolute_steps_lead_anywhere(bed: Bed, controller: MotorController) -> None:
-    with pytest.raises(
-        FingervisionError, match=r"^The stage's position must be known before the relative step 3, but is unknown"
-    ):
+    with pytest.raises(StateError, match=r"^The position must be known before the relative step 3, but is not"):
         bed.actuator.run_step(3)
     bed.actuator.move(5.0, 50.0)
     assert stands(bed) == 5.0
@@ -172,7 +170,7 @@ def test_a_stop_drops_the_drive_line_and_the_position_is_unknown_until_an_absolu
     emulated.wait_for(lambda edge: edge.level(6) == 0, since=since)
     assert 0.0 <= stands(bed) < 9.0
     assert bed.actuator.alarm is None
-    with pytest.raises(FingervisionError, match=r"^The stage's position must be known before the relative step 3"):
+    with pytest.raises(StateError, match=r"^The position must be known before the relative step 3"):
         bed.actuator.run_step(3)
     bed.actuator.run_step(2)
     assert stands(bed) == 5.0
@@ -201,9 +199,9 @@ def test_an_alarm_stops_the_motion_and_is_cleared_by_homing(
     emulated.outside(Role.ALARM, True)
     wait_until(bed, lambda: bed.actuator.alarm is not None)
     stands(bed)
-    with pytest.raises(FingervisionError, match=r"^The actuator must have no alarm, but has alarm"):
+    with pytest.raises(DeviceError, match=r"^The actuator must have no alarm, but has alarm"):
         bed.actuator.move(5.0, 50.0)
-    with pytest.raises(FingervisionError, match=r"^The motor controller must have no alarm, but its alarm line is act"):
+    with pytest.raises(DeviceError, match=r"^The motor controller must have no alarm, but its alarm line is act"):
         bed.actuator.home()
     emulated.outside(Role.ALARM, False)
     wait_until(bed, lambda: bed.actuator.alarm is not None and bed.actuator.alarm.code == "dropped")

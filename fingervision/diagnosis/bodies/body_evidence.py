@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction, known_channels
 from fingervision.diagnosis.bodies.place_candidates import Candidate, candidates_of
-from fingervision.diagnosis.bodies.place_search import PlaceFindings, PlaceSearch
+from fingervision.diagnosis.bodies.place_findings import PlaceFindings
+from fingervision.diagnosis.bodies.place_search import PlaceSearch
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel

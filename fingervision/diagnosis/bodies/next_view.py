@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.bodies.body_evidence import GAP, BodyEvidence
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction
 from fingervision.diagnosis.bodies.place_candidates import candidates_of
-from fingervision.diagnosis.bodies.place_search import ALIKE, Fitted
+from fingervision.diagnosis.bodies.place_findings import Fitted
+from fingervision.diagnosis.bodies.place_search import ALIKE
 from fingervision.models.place_answers import PlaceAnswers
 
 Array = NDArray[np.float64]

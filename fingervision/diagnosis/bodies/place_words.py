@@ -6,7 +6,7 @@ import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_candidates import PAIRS
-from fingervision.diagnosis.bodies.place_search import Fitted
+from fingervision.diagnosis.bodies.place_findings import Fitted
 from fingervision.domain.drawing_form import DrawnPart
 from fingervision.domain.report import Place
 from fingervision.models.place_answers import PlaceAnswers

@@ -9,7 +9,8 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Prob
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.uncertain_dimensions import tangent
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.model import PhysicalModel
 

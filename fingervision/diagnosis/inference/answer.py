@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from fingervision.diagnosis.inference.cross_validation import rms_mm
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.position_map import NAME
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import Standing, standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution

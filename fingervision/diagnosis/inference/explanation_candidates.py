@@ -196,6 +196,20 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
     return False
 
 
+def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explanation]) -> list[Explanation]:
+    """Keep the explanations that change the prediction by more than the recorded input's own error does.
+
+    The others follow the roundings of an encoder. A delay within one step of it gained 225 in chi-square so, and hid
+    the offset that a play had beside it, which changed the prediction by twenty times as much. If even the best
+    explanation only follows the roundings, so may others beyond it that replace the smaller one: then only additions to
+    the smaller one are kept.
+    """
+    beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
+    if beyond[:1] == larger[:1]:
+        return beyond
+    return [explanation for explanation in beyond if set(smaller.names) <= set(explanation.names)]
+
+
 def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
     """Choose the explanation with the smallest BIC (Schwarz 1978)."""
     return min(candidates, key=lambda explanation: explanation.bic(samples))

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Effect
 from fingervision.domain.parameter import Parameter
 
@@ -122,9 +123,8 @@ class Problem:
     def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
         """-2 log of the posterior up to a constant, marginalised over the spreads of the run offsets."""
         residual = self.measured - self.whitened(settings)
-        sigma, penalty = self.offsets.spread(residual)
-        metric = self.offsets.metric(sigma)
-        return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
+        sigma, penalty, doubt = self.offsets.spread_and_doubt(residual)
+        return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty + doubt
 
     def nothing(self) -> Explanation:
         """The model without any effect, with its score: the explanation from which gains are counted."""

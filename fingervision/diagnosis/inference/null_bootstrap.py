@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, Flags
 
 QUANTILE = 0.98
 """Quantile of the largest excess over all families: one table of noise in fifty leads to a claim (one in forty would
@@ -51,7 +51,12 @@ def noise_doubt(problem: Problem) -> float:
 
 
 def linear_thresholds(
-    problem: Problem, names: tuple[str, ...], columns: Array, sigma: tuple[float, ...], rng: np.random.Generator
+    problem: Problem,
+    names: tuple[str, ...],
+    columns: Array,
+    sigma: tuple[float, ...],
+    rng: np.random.Generator,
+    among: Flags | None = None,
 ) -> dict[str, float]:
     """Significance thresholds: gains that the best column of a family of shapes seldom exceeds in noise alone.
 
@@ -67,6 +72,8 @@ def linear_thresholds(
         Whitened signatures or probes.
     sigma : tuple of float
         Spread of the run offsets for each channel.
+    among : ndarray of bool, shape (k,), or None
+        Columns that count; None for all.
     """
     offsets, metric = problem.offsets, problem.offsets.metric(sigma)
     kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
@@ -79,7 +86,7 @@ def linear_thresholds(
         norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
     else:
         norm = np.einsum("ij,ij->j", kept, kept)
-    usable = norm > 1e-9
+    usable = norm > 1e-9 if among is None else among & (norm > 1e-9)
     owner = np.array(names)
     # The noise itself is estimated, from as many samples as there are.
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))

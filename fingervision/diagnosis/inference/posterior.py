@@ -7,7 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 

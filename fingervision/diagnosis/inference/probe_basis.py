@@ -13,11 +13,32 @@ SPAN = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probes:
-    """Whitened generic shapes of unit length: columns of shape (m, k), their descriptions, and RMS before whitening."""
+    """Whitened unit shapes with descriptions.
+
+    Parameters
+    ----------
+    words : tuple of str, length k
+        Descriptions.
+    columns : ndarray of float, shape (m, k)
+        Whitened shapes.
+    rms : ndarray of float, shape (k,)
+        RMS of each shape before whitening.
+    bare : ndarray of float, shape (n, b)
+        The different shapes before whitening; column i of `columns` has shape i modulo b.
+    shares : ndarray of float, shape (k / b, channels)
+        Size of a shape in each channel; column i of `columns` has row i // b.
+    """
 
     words: tuple[str, ...]
     columns: Array
     rms: Array
+    bare: Array
+    shares: Array
+
+    def before_whitening(self, index: int) -> Array:
+        """One shape before whitening, with channels stacked; shape (m,)."""
+        kind, shape = divmod(index, self.bare.shape[1])
+        return np.outer(self.shares[kind], self.bare[:, shape]).ravel()
 
 
 def _speed(input_mm: Array, time_s: Array) -> Array:
@@ -115,4 +136,4 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         for k, share in enumerate(shares[:, channel]):
             np.multiply(whitened, share, out=rows[:, k * count : (k + 1) * count])
     power = np.outer(np.sum(shares**2, axis=1) / shares.shape[1], np.mean(bare**2, axis=0))
-    return Probes(words, columns, np.sqrt(power.ravel()))
+    return Probes(words, columns, np.sqrt(power.ravel()), bare, shares)

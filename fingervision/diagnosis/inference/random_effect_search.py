@@ -14,11 +14,11 @@ from fingervision.diagnosis.inference.map_repeatability import foretells_other_p
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, likeliest_gains
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
 BESIDE = 3
 """Number of the most probable single effects with which run gains and maps are tried; each costs a hundredth of a

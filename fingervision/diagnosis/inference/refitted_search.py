@@ -8,15 +8,16 @@ from scipy.stats import t as student
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.needed_effects import with_simpler_parts, without_unneeded_effects
 from fingervision.diagnosis.inference.position_map import (
     NAME,
 )
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched, problem_of
-from fingervision.diagnosis.inference.verdict import standing_of, with_simpler_parts, without_unneeded_effects
+from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 

@@ -8,7 +8,8 @@ import numpy as np
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
-from fingervision.diagnosis.inference.search import Findings, search
+from fingervision.diagnosis.inference.search import search
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 
 QUIET = 3.0 * 2.0**0.5

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array, History, start_key
 
 START_MOVES = 1e-3
@@ -122,8 +122,8 @@ def start_patterns(history: History) -> tuple[dict[str, float], ...]:
     return tuple({start_key(run): end * way for run, way in enumerate(first)} for end in (0.0, -1.0, 1.0))
 
 
-def tangents(problem: Problem, explanation: Explanation) -> Array:
-    """Derivatives of the whitened prediction by the parameters of an explanation, of unit length; shape (m, p)."""
+def derivatives(problem: Problem, explanation: Explanation) -> Array:
+    """Derivatives of the prediction by an explanation's parameters, before whitening; shape (m, p)."""
     base = problem.chain.stacked(explanation.values)
     columns = []
     for name, parameter in problem.parameters(explanation.names):
@@ -132,5 +132,10 @@ def tangents(problem: Problem, explanation: Explanation) -> Array:
         step = step if value + step <= parameter.upper else -step
         moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
         columns.append((problem.chain.stacked(moved) - base) / step)
-    whitened = problem.whitener.columns(np.stack(columns, axis=1))[0]
+    return np.stack(columns, axis=1)
+
+
+def tangents(problem: Problem, explanation: Explanation) -> Array:
+    """Derivatives of the whitened prediction by an explanation's parameters, scaled to unit length; shape (m, p)."""
+    whitened = problem.whitener.columns(derivatives(problem, explanation))[0]
     return np.asarray(whitened / np.maximum(np.linalg.norm(whitened, axis=0), 1e-300))

@@ -17,7 +17,8 @@ from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
-from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Effect, Flags
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel

@@ -11,7 +11,7 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.channel_noises import SHORT_RUN
 from fingervision.diagnosis.noise.noise_model import Noise, without_input
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
 
 def problems_of_drawn_noise(

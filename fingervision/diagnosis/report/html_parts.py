@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from fingervision.diagnosis.report.chart_data import Chart, charts_json
-from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
+from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR, limit_words
 from fingervision.domain.parameter import Estimate
 from fingervision.storage.provenance import Provenance
 
@@ -41,7 +41,10 @@ def named(name: str) -> str:
 
 
 def with_uncertainty(e: Estimate) -> list[str]:
-    """HTML of a value and its expanded uncertainty, rounded to a tenth of the standard uncertainty."""
+    """Value and expanded uncertainty, rounded to a tenth of the standard uncertainty."""
+    limit = limit_words(e)
+    if limit:
+        return [escape(limit), "limited on one side only"]
     if e.u is None:
         return [number(e.value, e.unit, 5), "at a bound"]
     places = max(0, 1 - math.floor(math.log10(e.u))) if e.u > 0.0 else 6

@@ -7,6 +7,7 @@ from fingervision.diagnosis.inference.verdict import Standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.report.open_parameters import open_parameters
 from fingervision.domain.effect import Array
+from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import Disagreement, NamedEffect, Verdict
 
 COVERAGE_FACTOR = 2.0
@@ -25,9 +26,18 @@ def phrase(effect: NamedEffect) -> str:
     for key, e in effect.parameters.items():
         unit = f" {e.unit}" if e.unit else ""
         u = "" if e.u is None else f", U = {COVERAGE_FACTOR * e.u:.2g}{unit}"
-        parts.append(f"{effect.display_name(key)} {e.value:.4g}{unit}{u}")
+        size = limit_words(e) or f"{e.value:.4g}{unit}{u}"
+        parts.append(f"{effect.display_name(key)} {size}")
     coverage = "; k = 2" if any(e.u is not None for e in effect.parameters.values()) else ""
     return f"{effect.name} ({'; '.join(parts)}{coverage})"
+
+
+def limit_words(e: Estimate) -> str:
+    """State a one-sided limit in words; empty for a parameter that the data limit on both sides."""
+    unit = f" {e.unit}" if e.unit else ""
+    if e.at_least is not None:
+        return f"at least {e.at_least:.4g}{unit} (95 %)"
+    return "" if e.at_most is None else f"at most {e.at_most:.4g}{unit} (95 %)"
 
 
 def answer(
@@ -116,8 +126,8 @@ def beyond_the_search(best: Explanation, problem: Problem) -> tuple[str, ...]:
     """Sentences on parameters that may lie beyond the range in which they were searched."""
     return tuple(
         f"{effect}: the {parameter.words} may lie beyond {parameter.upper:.4g} {parameter.unit}, the end of its search "
-        "range: it is longer than these data can show, and so the effect's other parameters have no uncertainty "
-        "either; only what it does within the table is known."
+        "range: it is longer than these data can show, and so the effect's parameters are limited on one side only; "
+        "what it does within the table is known."
         for effect, parameter in open_parameters(best, problem)
     )
 

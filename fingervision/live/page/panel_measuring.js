@@ -25,6 +25,7 @@ panel("tolerance", "Tolerance", `
 panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
   <form id="scale_form" class="row">
     <label><input id="px_per_mm" type="number" step="any" min="0" required> px/mm</label>
+    <label>u <input id="u_px_per_mm" type="number" step="any" min="0" placeholder="unknown"></label>
     <button>Set</button>
   </form>
   <form id="calibrate_form" class="row">
@@ -46,7 +47,7 @@ on("tips", "change", () => ask({ do: "tips", tips: at("tips").value }));
 on("below_tip", "change", () => ask({ do: "height", below_tip_mm: number("below_tip") }));
 submit("region_form", () => ({ do: "region", box: ["region_x", "region_y", "region_w", "region_h"].map(number) }));
 submit("limits_form", () => ({ do: "limits", least: number("least"), greatest: number("greatest") }));
-submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm") }));
+submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm"), u_px_per_mm: number("u_px_per_mm") }));
 submit("calibrate_form", () => {
   const box = shown.box || (page.state && [0, 0, page.state.width_px, page.state.height_px]);
   shown.box = null;

@@ -43,9 +43,9 @@ class Playback:
     """
 
     def __init__(self, opened: Recorded, out: Path) -> None:
-        self.recorded, self.out, self.choices = opened, out, opened.choices
+        self.recorded, self.out = opened, out
         self.description: Description = opened.source.description
-        opened.choices.check(self.description)
+        self.choices = opened.choices.for_frames(self.description)
         self.features: dict[str, Any] = {}
         self.seen: Seen | None = None
         self.range: tuple[int, int] | None = None
@@ -138,8 +138,7 @@ class Playback:
             The choice does not fit the recording's frames.
         """
         chosen, unzeroed = self.choices.changed(**changes)
-        chosen.check(self.description)
-        self.choices = chosen
+        self.choices = chosen.for_frames(self.description)
         if unzeroed:
             self.say("zero", ZERO_IS_OFF)
         if MOVES_ZERO & set(changes):

@@ -7,7 +7,6 @@ from typing import Any
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
-from fingervision.measuring.clock.alignment import find_clock_offset
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.drive_at import DriveState, drive_at
 from fingervision.measuring.series import GapSeries
@@ -21,6 +20,8 @@ def clock_of(series: GapSeries, drive: DriveHistory) -> ClockOffset | NoClockOff
     times = series.times_s()
     if times is None:
         return NoClockOffset("the recording has no times: give --rate-hz, or a times.csv beside the images.")
+    from fingervision.measuring.clock.alignment import find_clock_offset  # slow to import, needed with a drive only
+
     return find_clock_offset(times[0], series.gap_mm, drive)
 
 

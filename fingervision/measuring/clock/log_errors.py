@@ -17,13 +17,18 @@ ALIKE = 0.5
 by 0.0725 of its change of step on average and by 0.105 as RMS (the integrals of x^2 (1 - x)^2 and of its square root),
 so that the mean's square is half of the variance."""
 
+TURNS_ALIKE = 1.0
+"""Error that all reversals without a halt have in common, outwards or inwards, over the rounding of an encoder: a stage
+that slows down unseen, within half a step of a line, is drawn to turn half a step too far: 1.7 roundings at most."""
+
 
 def drawn_paths(path: LogPath) -> Iterator[LogPath]:
     """Draw paths of the stage that are compatible with the log's rows.
 
-    Three kinds of error are drawn. The smoothing averages a row's noise over some rows, which then share an error. The
-    part of an encoder's rounding error that remains is the same during a halt, a reversal, or a stretch of a stroke.
-    Between two rows a corner may lie anywhere, and a smooth curve cuts all corners on the same side.
+    Three kinds of error are drawn. A row's noise is averaged by the smoothing over some rows, and common to these. What
+    an encoder's rounding leaves open is common to a halt, a turn, or a stretch of a stroke. Between two rows a corner
+    may lie anywhere, and a smooth curve cuts all corners on the same side. Reversals between two of an encoder's lines
+    are cut alike as well, by the rounding and by the smoothing.
 
     Parameters
     ----------
@@ -43,7 +48,9 @@ def drawn_paths(path: LogPath) -> Iterator[LogPath]:
         own = np.sqrt(1.0 - ALIKE) * rng.normal(size=int(parts.interval.max()) + 1)
         input_mm = path.drive.input_mm + np.interp(time_s, path.rows.time_s, rows_mm)
         input_mm = input_mm + (common + own[parts.interval]) * parts.between_mm
-        input_mm = input_mm + (shared.u_mm * rng.normal(size=shared.u_mm.size))[stretch]
+        errors_mm = shared.u_mm * rng.normal(size=shared.u_mm.size)
+        errors_mm += TURNS_ALIKE * shared.u_mm * rng.normal() * shared.outward
+        input_mm = input_mm + errors_mm[stretch]
         yield replace(path, drive=replace(path.drive, input_mm=input_mm))
 
 

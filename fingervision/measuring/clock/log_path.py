@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.measuring.clock.path_between_rows import STANDS, piece
+from fingervision.measuring.clock.sharp_reversals import sharp_reversals
 from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
@@ -34,11 +35,14 @@ class SharedErrors:
         Standard uncertainty of each stretch's shared error.
     halts : ndarray of bool, shape (g,)
         Whether the stretch is a halt or a reversal, whose position determines the state of the play.
+    outward : ndarray of float, shape (g,)
+        1 for a reversal without a halt at a maximum, -1 at a minimum, else 0.
     """
 
     begin_s: Array
     u_mm: Array
     halts: NDArray[np.bool_]
+    outward: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,8 +120,10 @@ class LogPath:
         for run in runs:
             smooth_mm[run] = _flattened(smooth_mm[run], sigma_mm, leverage[run])
         still = _standing_step(smooth_mm, sigma_mm, leverage)
-        shared = SharedErrors(np.zeros(0), np.zeros(1), np.zeros(1, dtype=np.bool_))
+        shared = SharedErrors(np.zeros(0), np.zeros(1), np.zeros(1, dtype=np.bool_), np.zeros(1))
         if step_mm > 0.0:
+            for run in runs:
+                smooth_mm[run] = sharp_reversals(log.time_s[run], snapped_mm[run], smooth_mm[run], step_mm)
             shared, u_mm = _shared_errors(log.time_s, snapped_mm, smooth_mm, u_mm, leverage, still, step_mm)
         pieces = [piece(log.time_s[run], smooth_mm[run], u_mm[run]) for run in runs]
         of_runs = tuple(names[run.start] for run, part in zip(runs, pieces, strict=True) for _ in part[0])
@@ -168,7 +174,7 @@ def _shared_errors(
         max(CORNER_ROWS, round(step_mm * (end - begin) / moved)) if moved > step_mm else 0
         for (begin, end), moved in zip(stretches, moved_mm, strict=True)
     ]
-    found: list[tuple[int, float, bool]] = []
+    found: list[tuple[int, float, bool, float]] = []
     unseen: list[tuple[int, int]] = []
     for k, (begin, end) in enumerate(stretches):
         inner = CORNER_ROWS if end - begin > LONG_ROWS else 0
@@ -176,7 +182,7 @@ def _shared_errors(
         left_mm = max(step_mm - float(np.ptp(away[middle])), 0.0) / float(np.sqrt(12.0))
         scatter_mm[middle] *= float(np.sqrt(max(1.0 - (left_mm / rounding_mm) ** 2, 0.0)))
         if not near[k]:
-            found.append((begin, left_mm, True))
+            found.append((begin, left_mm, True, 0.0))
             continue
         unseen += [(begin - near[k], begin + near[k]), (end - near[k], end + near[k])]
         averaged = float(np.median(leverage[middle]))
@@ -189,14 +195,14 @@ def _shared_errors(
         last = end - near[k] if k + 1 < len(stretches) and near[k + 1] else end
         if last > first:
             count = max(1, round((last - first) * averaged))
-            found += [(int(row), error_mm, False) for row in np.linspace(first, last, count + 1)[:-1]]
+            found += [(int(row), error_mm, False, 0.0) for row in np.linspace(first, last, count + 1)[:-1]]
         if last < end:  # a turn without a halt: its place is known to a step
-            found.append((max(last, first), rounding_mm, True))
+            found.append((max(last, first), rounding_mm, True, float(np.sign(smooth_mm[end] - smooth_mm[begin]))))
     for begin, end in unseen:
         near_rows = slice(max(begin, 0), min(end, time_s.size - 1) + 1)
         scatter_mm[near_rows] = np.maximum(scatter_mm[near_rows], rounding_mm)
-    rows, errors, halts = (np.array(part) for part in zip(*found, strict=True))
-    return SharedErrors(time_s[rows[1:]], errors, halts), scatter_mm
+    rows, errors, halts, outward = (np.array(part) for part in zip(*found, strict=True))
+    return SharedErrors(time_s[rows[1:]], errors, halts, outward), scatter_mm
 
 
 def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:

@@ -60,8 +60,9 @@ CORRELATED = 0.15
 """Lower bound of the ratio of the variance in second differences to 6 times the noise variance: for noise with
 correlation rho from frame to frame, second differences have 6 - 8 rho + 2 rho^2 times the noise variance, which is 1.4
 of 6 for rho = 0.7 and 0.8 of 6 for rho = 0.8."""
-CLIPPED = 9.0
-"""Limit of squared normalised residuals: three standard deviations, beyond which a frame may be wrong."""
+WRONG, WIDER = 0.01, 100.0
+"""Share of frames that may be wrong, and the variance of these, relative to the residuals' own: ten standard
+deviations."""
 
 
 def noise_of(motion: Motion, found: Fit) -> Noise:
@@ -143,15 +144,21 @@ def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Ar
 
 
 def _even_variance(squares: Array, input_mm2: Array) -> float:
-    """Maximum-likelihood variance that must be added to `input_mm2`; outlying frames are clipped.
+    """Maximum-likelihood variance that must be added to `input_mm2`; a share of the frames may be wrong.
 
     Frames with a well-known input determine this variance; a median over all frames would fail if they are a minority.
+    The density is that of a contaminated normal distribution (Tukey 1960). Squares that are only clipped have no
+    density: the smallest variance, at which every frame is clipped, would then be the most likely one.
     """
     high = max(float(np.median(squares)) / MEDIAN_CHI_SQUARE, 1e-18)
     tried = high * np.geomspace(1e-4, 4.0, TRIED)
-    whole = tried[:, None] + input_mm2
-    minus_twice_log = np.sum(np.log(whole) + np.minimum(squares / whole, CLIPPED), axis=1)
-    return float(tried[int(np.argmin(minus_twice_log))])
+
+    def density(variance: Array | float) -> Array:
+        return np.asarray(np.exp(-0.5 * squares / variance) / np.sqrt(variance))
+
+    wrong = WRONG * density(WIDER * (high + input_mm2))
+    likelihood = [float(np.sum(np.log((1.0 - WRONG) * density(one + input_mm2) + wrong))) for one in tried]
+    return float(tried[int(np.argmax(likelihood))])
 
 
 def _least_variance(residual_mm: Array) -> float:

@@ -1,12 +1,15 @@
 """Reasons to refuse a log: no motion, a gap that does not follow the log, or a motion that repeats."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.measuring.clock.clock_offset import NoClockOffset
 from fingervision.measuring.clock.joint_fit import Fit
-from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.motion_model import WHITE, Motion
+from fingervision.measuring.clock.play_posterior import most_likely
 from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
 
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
@@ -44,9 +47,18 @@ def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset 
 
 
 def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse a log of target positions instead of actual ones."""
+    """Refuse a log of target positions instead of actual ones.
+
+    A gap that follows later leaves residuals like a random walk, and a fit to their differences may explain nothing;
+    the fit to the gap itself shows how much of the jumps is made in their time.
+    """
     share = gap_arrives(motion, found)
-    if share is None or share >= ARRIVED:
+    if share is None:
+        return None
+    even = replace(motion, noise=WHITE)
+    by_gap = gap_arrives(even, most_likely(even, found.at))
+    share = share if by_gap is None else min(share, by_gap)
+    if share >= ARRIVED:
         return None
     return NoClockOffset(
         f"the drive's rows jump from one place to the next, and the gap makes a share of {max(share, 0.0):.2f} of "
