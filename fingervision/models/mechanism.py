@@ -28,7 +28,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A driven face: it moves by the input times `per_input`.
+    """A driven face, which moves by the input times `per_input`.
 
     Parameters
     ----------

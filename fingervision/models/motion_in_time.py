@@ -128,7 +128,7 @@ def gripper_motion(
 
 
 def check_small_vibration(small: Motion, column: str, travel_mm: float) -> None:
-    """Refuse a drive that shakes a length too much for the modes at rest to vibrate about the equilibria.
+    """Refuse a drive that vibrates a length too strongly for the modes at rest to be superposed on the equilibria.
 
     Parameters
     ----------
