@@ -10,7 +10,7 @@ from calib.limits import Limits
 from calib.measured_scale import Calibration
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.calibration_reader import SCHEMA, CalibrationReader
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import text_of
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:

@@ -24,6 +24,7 @@ from fingervision.vision.mean_profile import (
     REACH_PX,
     STRAIGHT_ONLY,
     STRAIGHT_OR_ROUND,
+    MeanProfile,
     mean_profile,
 )
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
@@ -133,7 +134,10 @@ def with_profile(
         if left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
             moved = _moved(edges, glare, U_GLARE, all_around, "glare")
             return without_additions(upright, moved, light, GLARE, glare)
-    outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
+    # Along the picture's border there are lines but no flank.
+    outer: list[MeanProfile | None] = [None, None]
+    if are_outer_flanks_in_view(edges):
+        outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         wall = fits.of(WALL)
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
@@ -188,11 +192,12 @@ def with_profile(
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
             chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
             return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
-    resolved = np.maximum(edges.blur_px, LEAST_RESOLVED_BLUR_PX)
-    flanks, tips = (resolved[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
-    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
-    if any(widened):
-        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
+    flanks, tips = squared_blurs(edges)
+    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
+    if np.any(widened):
+        widened *= is_surely_broader(edges, displaced_px)
+    if np.any(widened):
+        return _unsure(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
     if is_step:
         return edges
     wall, glare = fits.of(WALL), fits.of(GLARE)

@@ -80,9 +80,10 @@ def test_a_high_speed_cameras_own_file_says_what_to_export(suffix: str, tmp_path
         open_frames(str(path), Wish())
 
 
-@pytest.mark.parametrize(("number", "name"), [(16, "pq"), (18, "hlg")])
+@pytest.mark.parametrize("stated", [1, 2], ids=["studio", "full"])
+@pytest.mark.parametrize(("number", "name"), [(16, "pq"), (18, "hlg"), (1, "bt709")])
 def test_high_dynamic_range_is_read_with_its_own_curve(
-    number: int, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    number: int, name: str, stated: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = Path("12:30:05.mkv")  # FFmpeg takes what precedes a colon for a protocol
