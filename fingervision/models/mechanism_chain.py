@@ -66,7 +66,7 @@ class MechanismChain:
         bodies = [self._only(drive.face) for drive in mechanism.drives]
         if len(set(bodies)) < len(bodies):
             raise ModelError(
-                f"The stiffness matrix is that of a chain with one drive a body, but {mechanism.name} drives one body "
+                f"The stiffness-matrix model allows one driven face per body, but {mechanism.name} drives one body "
                 "at several faces; take --kind lumped or finite_element."
             )
         self._paths = [self._path_from(self._ground, body) for body in bodies]

@@ -244,7 +244,7 @@ class DrivenMechanism:
             if step < _LEAST_STEP:
                 raise ModelError(
                     f"The equilibrium of {self.name} could be computed up to an input of "
-                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are asked for; take a smaller input."
+                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are requested; take a smaller input."
                 )
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
         drives = np.asarray(self.by_drive.T @ loads)

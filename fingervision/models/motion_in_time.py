@@ -146,8 +146,8 @@ def check_small_vibration(small: Motion, column: str, travel_mm: float) -> None:
     """
     if (shaken_mm := small.vibration_mm(column)) > _FAST * travel_mm:
         raise ModelError(
-            f"With large rotation or contact this drive must shake {column.removesuffix('_mm')} by at most {_FAST:g} "
-            f"of its travel of {travel_mm:.3g} mm, but shakes it by {shaken_mm:.3g} mm; slow it down, or leave "
+            f"With large rotation or contact this drive must vibrate {column.removesuffix('_mm')} by at most {_FAST:g} "
+            f"of its travel of {travel_mm:.3g} mm, but vibrates it by {shaken_mm:.3g} mm; slow it down, or leave "
             "--large-rotation and --contact off."
         )
 

@@ -79,7 +79,7 @@ def in_utf8(path: Path, text: str) -> str:
     except UnicodeEncodeError as error:
         line = next(each for each in text.splitlines() if error.object[error.start] in each)
         raise OutputError(
-            f"{path.name} must be in UTF-8, but would name a file that is not ({line.strip()[:200]!a}): rename that "
-            "file and run again."
+            f"{path.name} is written in UTF-8, but would contain a file name that UTF-8 cannot encode "
+            f"({line.strip()[:200]!a}): rename that file and run again."
         ) from error
     return text

@@ -52,7 +52,7 @@ def _jog(view: View, request: Request) -> Answer:
     bench = _movable(view)
     speed_mm_s, for_s = number(request, "speed_mm_s"), number(request, "for_s")
     if not 0.0 < for_s <= LONGEST_JOG_S:
-        raise UsageError(f"A jog must last more than 0 s and at most {LONGEST_JOG_S:g} s, but {for_s:g} was asked.")
+        raise UsageError(f"A jog must last more than 0 s and at most {LONGEST_JOG_S:g} s, but {for_s:g} was requested.")
     bench.jog(speed_mm_s, for_s)
     return Answer()
 
