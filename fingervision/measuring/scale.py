@@ -62,7 +62,7 @@ def check_one_scale(calibration: object, px_per_mm: object, u_px_per_mm: object)
         Both a calibration and a scale are given, or the uncertainty of a scale that is not.
     """
     if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
     if u_px_per_mm is not None and calibration is not None:
         raise UsageError(
             "--u-px-per-mm belongs to --px-per-mm, but --calibration is given, which has its own uncertainty: "
