@@ -165,7 +165,7 @@ REFUSED: tuple[tuple[str, object, str], ...] = (
     ("gain", 3, "was asked for gain 3 and stays at 1"),
     ("focus", 13, "refused to set focus 13 (OSError: VIDIOC_S_CTRL"),
     ("focus", 251, "must be 0 to 250, but is 251"),
-    ("shutter", 1, "lets exposure, gain, focus, frame rate be set while it runs, but 'shutter' was asked"),
+    ("shutter", 1, "lets exposure, gain, focus, frame rate be changed while it runs, but 'shutter' was requested"),
     ("", 1, "name must be a text"),
     ("<script>" * 200, 1, "name must be a text"),
 )
