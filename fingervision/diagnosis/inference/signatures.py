@@ -130,7 +130,7 @@ def start_patterns(history: History) -> tuple[dict[str, float], ...]:
 
 
 def derivatives(problem: Problem, explanation: Explanation) -> Array:
-    """Derivatives of the prediction by an explanation's parameters, before whitening; shape (m, p)."""
+    """Derivatives of the prediction with respect to an explanation's parameters, before whitening; shape (m, p)."""
     base = problem.chain.stacked(explanation.values)
     columns = []
     for name, parameter in problem.parameters(explanation.names):
