@@ -147,7 +147,11 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     state = replace(state, triples=triples)
     if not triples:
         return state
-    large = added_share(problem, state.best, triples[0]) > TRIPLE_SHARE
+    share = added_share(problem, state.best, triples[0])
+    if share == 0.0:
+        # The best third effect follows the roundings of the input, and so may the others.
+        return state
+    large = share > TRIPLE_SHARE
     if not (large or completes(state, state.best, triples[0])) or not state.speaks_for(triples, state.best):
         return state
     imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
@@ -155,7 +159,8 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
         # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
         return replace(state, imitation=imitation) if large else state
     triples.sort(key=lambda e: e.bic(state.values))
-    triples = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
+    again = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
+    triples = beyond_the_input(problem, state.best, again) or triples
     return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST], state.values), peers=triples)
 
 
