@@ -52,6 +52,7 @@ _HOMES = {
     "Reference": "measured_scale",
     "ScaleFit": "scale_from_sizes",
     "ScaleLines": "line_scale",
+    "StatedScale": "stated_scale",
     "find_corners": "board",
     "find_lines": "line_scale",
     "find_widths": "known_widths",

@@ -25,10 +25,10 @@ def estimator_mm(limits: Limits, px_per_mm: float, count: int) -> Floats:
 
 
 def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, covariance: Floats) -> Floats:
-    """Contribution of a cause that changes scale and edge bias, from the covariance of (px_per_mm, edge_bias_px).
+    """Contribution of one cause that changes scale and edge bias, from the covariance of (px_per_mm, edge_bias_px).
 
-    It is called once for each cause: the reference's size, the reference's edges, and the edge bias if no reference
-    determines it.
+    The function is called once for each cause: the reference's size, the reference's edges, and the edge bias if no
+    reference determines it.
     """
     variance = (
         covariance[1, 1] + value_mm**2 * covariance[0, 0] - 2.0 * polarity * value_mm * covariance[0, 1]

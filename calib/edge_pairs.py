@@ -78,7 +78,7 @@ def has_square_end(grey: Grey, region: tuple[int, int, int, int] | None, pair: P
 
 
 def _part(grey: Grey, region: tuple[int, int, int, int] | None) -> tuple[Grey, int, int]:
-    """Return the region of a picture, and the region's origin."""
+    """Return a region of a picture, and the region's origin in the picture."""
     x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
     if x < 0 or y < 0 or width < 1 or height < 1 or x + width > grey.shape[1] or y + height > grey.shape[0]:
         raise CalibrationError(

@@ -68,7 +68,7 @@ class EdgeRows:
     x_px : ndarray
         Column at which the edge crosses the middle of the row.
     u_x_px : ndarray
-        Standard uncertainty from the noise common to all rows.
+        Standard uncertainty from the noise that all rows share.
     contrast : ndarray
         Step in grey levels; positive if it has the expected sign.
     unexplained : ndarray
@@ -123,7 +123,9 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
     columns = np.rint(middle).astype(np.int_)
     inside = (columns - reach >= 0) & (columns + reach < grey.shape[1])
     if np.count_nonzero(inside) < OWN_PARAMETERS or 2 * reach + 1 <= OWN_PARAMETERS + 1:
-        raise CalibrationError("The edge has no room: it is nearer to the border or to another edge than its own blur.")
+        raise CalibrationError(
+            "The edge is nearer to the border or to another edge than its own blur: leave more room around it."
+        )
     rows, columns, middle = rows[inside], columns[inside], middle[inside]
     window = columns[:, None] + np.arange(-reach, reach + 1)
     levels = grey[rows[:, None], window]

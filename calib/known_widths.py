@@ -102,7 +102,7 @@ def _choices(
 ) -> list[ParallelEdges]:
     """List the possible widths of the object: one, or two for a rectangle that is completely visible.
 
-    The pair with the longer edges comes first.
+    If there are two possible widths, the pair with the longer edges comes first.
     """
     where = "the region" if region is not None else "the picture"
     if not pairs:
@@ -180,7 +180,7 @@ def _expected(
 
 
 def _settled(pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelEdges]]) -> list[ParallelEdges]:
-    """Choose the widths that agree on one scale."""
+    """Choose the widths that agree on one scale (px/mm)."""
     sizes = np.array([picture.size_mm for picture in pictures])
     longer_edges = [found[0] for found in choices]
     combinations = [list(each) for each in product(*choices)] if len(choices) <= MOST_COMBINED else [longer_edges]
@@ -212,7 +212,7 @@ def _disagreement(widths: Sequence[ParallelEdges], sizes: NDArray[np.float64]) -
 def _refuse_unit(
     pictures: Sequence[KnownSize], combinations: Sequence[Sequence[ParallelEdges]], sizes: NDArray[np.float64]
 ) -> None:
-    """Refuse sizes if changing the unit of a single one would make all pictures agree."""
+    """Refuse sizes for which another unit of a single size would make all pictures agree."""
     for index, picture in enumerate(pictures):
         for factor, words in WRONG_UNITS.items():
             other = sizes.copy()

@@ -21,7 +21,7 @@ WORTH_A_PARAMETER = 10.8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensFit:
-    """A fitted lens, with the residuals of the fit.
+    """A fitted lens, with the residuals of the fit (px).
 
     Parameters
     ----------

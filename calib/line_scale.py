@@ -2,32 +2,25 @@
 
 A line is a stripe with two edges: c + A (step(t - x1) - step(t - x2)), each step blurred by the same Gaussian. Blooming
 and the camera's response move the two edges in opposite directions and leave the centre of the line in place, so that
-the pitch does not depend on the edge bias. The width of a line does; if its true width is known, the edge bias follows.
+the pitch does not depend on the edge bias. The width of a line does depend on the edge bias; if the true width is
+known, the edge bias follows from it.
 """
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 from calib.errors import CalibrationError
+from calib.line_search import FEWEST_ROWS, CoarseLines, lines_to_a_pixel
 
 Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Lines must be at least so many pixels apart, and so many of them in view.
-NEAREST_PX, FEWEST_LINES = 4.0, 3
-# Lines are cut into so many pieces along their length: their scatter is the uncertainty. Each needs so many rows.
-PIECES, FEWEST_ROWS = 8, 3
-# A row of pixels shows the scale where the lines have this share of their usual contrast.
-LEAST_CONTRAST = 0.85
-# Lines are looked for within so many degrees of the direction that the gradients have; the second step is finer.
-SEARCH_DEG, FINE_DEG = 3.0, 0.02
-# A pattern whose lines stand out from the noise of their mean profile by less than this is none.
-LEAST_SIGNAL = 8.0
+# Lines are cut into so many pieces along their length: their scatter is the uncertainty.
+PIECES = 8
 # A line narrower than so many blurs shows its middle, but not its two edges.
 RESOLVED_BLURS = 2.0
 # Pixels of a line are summed up in bins of this breadth.
@@ -103,14 +96,11 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
     part = grey[y0 : y0 + height, x0 : x0 + width].astype(np.float64)
     if min(part.shape) < 2 * PIECES:
         raise CalibrationError(f"A picture of a scale must have at least {2 * PIECES} rows and columns.")
-    slope, is_turned = _direction(part)
-    upright = part.T if is_turned else part
-    slope = _refined(upright, slope)
-    rows = _rows(upright, slope)
-    first = _coarse(upright, slope, rows)
-    at, lean, width_px, blur, u_at = _measured(upright, slope, rows, first)
+    first = lines_to_a_pixel(part)
+    upright, rows, is_turned = (part.T if first.is_turned else part), first.rows, first.is_turned
+    at, lean, width_px, blur, u_at = _measured(upright, first)
     # Lines lean alike: what all of them share turns `across`.
-    slope += float(np.median(lean))
+    slope = first.slope + float(np.median(lean))
     length = float(np.hypot(1.0, slope))
     across = np.array([1.0, -slope]) / length
     row = 0.5 * (rows[0] + rows[1])
@@ -140,141 +130,20 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
     )
 
 
-def _direction(part: Floats) -> tuple[float, bool]:
-    """Slope of the lines in columns per row (structure tensor: Bigun & Granlund, ICCV 1987).
-
-    Also return whether the lines are horizontal; the slope is then that of the transposed picture.
-    """
-    soft = cv2.GaussianBlur(part, (0, 0), 1.0)
-    gx, gy = cv2.Sobel(soft, cv2.CV_64F, 1, 0), cv2.Sobel(soft, cv2.CV_64F, 0, 1)
-    angle = 0.5 * np.arctan2(2.0 * float(np.sum(gx * gy)), float(np.sum(gx * gx) - np.sum(gy * gy)))
-    is_turned = abs(np.cos(angle)) < abs(np.sin(angle))
-    slope = -1.0 / np.tan(angle) if is_turned else -np.tan(angle)
-    return float(slope), bool(is_turned)
-
-
-def _refined(upright: Floats, slope: float) -> float:
-    """Slope at which the mean profile along the lines has the largest contrast."""
-    step = np.tan(np.radians(SEARCH_DEG)) / 4.0
-    while step > np.radians(FINE_DEG):
-        tried = [slope + k * step for k in (-2, -1, 0, 1, 2)]
-        slope = max(tried, key=lambda each: float(np.var(_profile(upright, each, (0, upright.shape[0] - 1)))))
-        step *= 0.5
-    return slope
-
-
-def _profile(upright: Floats, slope: float, rows: tuple[int, int]) -> Floats:
-    """Mean level along the lines, as a function of the column in the middle row.
-
-    Columns for which less than half of the rows lie inside the picture are left out.
-    """
-    used = np.arange(rows[0], rows[1] + 1)
-    offset = slope * (used - 0.5 * (rows[0] + rows[1]))
-    columns = np.arange(upright.shape[1], dtype=np.float64)
-    at = columns[None, :] + offset[:, None]
-    left = np.floor(at).astype(int)
-    inside = (left >= 0) & (left + 1 < upright.shape[1])
-    left = np.clip(left, 0, upright.shape[1] - 2)
-    share = at - left
-    lines = used[:, None]
-    level = (1.0 - share) * upright[lines, left] + share * upright[lines, left + 1]
-    count = inside.sum(axis=0)
-    total = np.where(inside, level, 0.0).sum(axis=0)
-    full = count >= max(1, used.size // 2)
-    return np.asarray(total[full] / count[full])
-
-
-def _rows(upright: Floats, slope: float) -> tuple[int, int]:
-    """Longest run of rows in which the lines have nearly their largest contrast."""
-    middle = 0.5 * (upright.shape[0] - 1)
-    offset = np.rint(slope * (np.arange(upright.shape[0]) - middle)).astype(int)
-    shifted = np.array([np.roll(row, -by) for row, by in zip(upright, offset, strict=True)])
-    margin = int(np.abs(offset).max())
-    inner = shifted[:, margin : shifted.shape[1] - margin] if 2 * margin < shifted.shape[1] // 2 else shifted
-    # Each row against the lines as the best third of the rows shows them.
-    own = inner - inner.mean(axis=1, keepdims=True)
-    best = np.argsort(own.std(axis=1))[-max(len(own) // 3, FEWEST_ROWS) :]
-    usual = np.median(own[best], axis=0)
-    seen = own @ usual / max(float(usual @ usual), 1e-12)
-    soft = np.convolve(np.pad(seen, 2, mode="edge"), np.full(5, 0.2), mode="valid")
-    good = np.flatnonzero(soft > LEAST_CONTRAST * float(np.quantile(soft, 0.9)))
-    if not good.size:
-        raise CalibrationError("A picture of a line scale must show lines, but there are none: check light and focus.")
-    runs = np.split(good, np.flatnonzero(np.diff(good) > 1) + 1)
-    run = max(runs, key=len)
-    # What is cut by the ends of lines is no line.
-    first, last = int(run[0]) + (2 if run[0] > 0 else 0), int(run[-1]) - (2 if run[-1] < len(own) - 1 else 0)
-    if last - first + 1 < FEWEST_ROWS * 2:
-        raise CalibrationError("A scale's lines must be seen over at least six rows of pixels, but are not: use --roi.")
-    return first, last
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Coarse:
-    """Lines located to the nearest pixel, along the middle row."""
-
-    middle: Floats
-    width: float
-    pitch: float
-    is_dark: bool
-
-
-def _coarse(upright: Floats, slope: float, rows: tuple[int, int]) -> _Coarse:
-    profile = _profile(upright, slope, rows)
-    # Columns that the slanted rows do not all reach are left out at both sides alike.
-    first = (upright.shape[1] - profile.size) // 2
-    low, high = (float(level) for level in np.percentile(profile, (2, 98)))
-    noise = 1.4826 * float(np.median(np.abs(np.diff(upright[rows[0] : rows[1] + 1], axis=0)))) / np.sqrt(2.0)
-    if high - low < LEAST_SIGNAL * max(noise / np.sqrt(rows[1] - rows[0] + 1), 0.05):
-        raise CalibrationError("A picture of a line scale must show lines, but there are none: check light and focus.")
-    is_low = profile < 0.5 * (low + high)
-    is_dark = bool(is_low.mean() <= 0.5)
-    marks = is_low if is_dark else ~is_low
-    starts = np.flatnonzero(marks & ~np.roll(marks, 1))
-    ends = np.flatnonzero(marks & ~np.roll(marks, -1))
-    if marks[0]:  # a line that the picture's border cuts has one edge only
-        starts, ends = starts[starts > 0], ends[ends >= (starts[starts > 0][0] if (starts > 0).any() else profile.size)]
-    if starts.size and marks[-1]:
-        starts = starts[:-1]
-    ends = ends[: starts.size]
-    if starts.size < FEWEST_LINES:
-        raise CalibrationError(
-            f"A line scale must show at least {FEWEST_LINES} whole lines, but {starts.size} are in view: move the "
-            "scale, or choose the lines with --roi."
-        )
-    middle, width = 0.5 * (starts + ends) + first, float(np.median(ends - starts + 1))
-    pitch = float(np.median(np.diff(middle)))
-    if pitch < NEAREST_PX:
-        raise CalibrationError(
-            f"Lines of a scale must be at least {NEAREST_PX:g} px apart, but are {pitch:.1f} px: use a coarser scale."
-        )
-    # Digits and dirt are not of a line's width.
-    alike = (ends - starts + 1 < 2.0 * width + 2.0) & (ends - starts + 1 > 0.5 * width - 2.0)
-    reach = 0.5 * pitch
-    alike &= (middle > reach) & (middle < upright.shape[1] - 1 - reach)
-    if np.count_nonzero(alike) < FEWEST_LINES:
-        raise CalibrationError(
-            f"A line scale must show at least {FEWEST_LINES} whole lines alike, but {np.count_nonzero(alike)} are in "
-            "view: choose them with --roi."
-        )
-    return _Coarse(middle[alike].astype(np.float64), width, pitch, is_dark)
-
-
-def _measured(
-    upright: Floats, slope: float, rows: tuple[int, int], coarse: _Coarse
-) -> tuple[Floats, Floats, Floats, float, Floats]:
+def _measured(upright: Floats, coarse: CoarseLines) -> tuple[Floats, Floats, Floats, float, Floats]:
     """Position in the middle row, residual slope, width, common blur, and uncertainty of the positions of the lines."""
+    rows = coarse.rows
     row = 0.5 * (rows[0] + rows[1])
     whole = np.arange(rows[0], rows[1] + 1)
     # The spread of the optics is one for all lines: some of them tell it.
     some = coarse.middle[:: max(1, coarse.middle.size // LINES_FOR_BLUR)]
-    fits = [_fit(upright, slope, row, whole, middle, coarse, None) for middle in some]
+    fits = [_fit(upright, row, whole, middle, coarse, None) for middle in some]
     blur = float(np.median([fit[2] for fit in fits]))
     count = min(PIECES, whole.size // FEWEST_ROWS)
     pieces = np.array_split(whole, count)
     at, lean, width, u_at = [], [], [], []
     for middle in coarse.middle:
-        own = np.array([_fit(upright, slope, row, piece, middle, coarse, blur)[:2] for piece in pieces])
+        own = np.array([_fit(upright, row, piece, middle, coarse, blur)[:2] for piece in pieces])
         height = np.array([piece.mean() - row for piece in pieces])
         place = own[:, 0]
         # Dirt spoils a piece: the line goes through those that agree.
@@ -293,16 +162,15 @@ def _measured(
 
 def _fit(
     upright: Floats,
-    slope: float,
     row: float,
     rows: NDArray[np.int_],
     middle: float,
-    coarse: _Coarse,
+    coarse: CoarseLines,
     blur: float | None,
 ) -> tuple[float, float, float]:
     """Fit centre (in the middle row), width and blur of one line, or of a part of it, to the levels."""
     reach = int(np.ceil(0.5 * coarse.pitch))
-    line = middle + slope * (rows - row)
+    line = middle + coarse.slope * (rows - row)
     columns = np.rint(line).astype(int)[:, None] + np.arange(-reach, reach + 1)
     inside = (columns >= 0) & (columns < upright.shape[1])
     t = (columns - line[:, None])[inside]

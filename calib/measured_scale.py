@@ -167,7 +167,7 @@ class Calibration:
         return not self.stated and not any(limits)
 
     def how_stated(self, name: str, unit: str) -> str:
-        """Limit `name` in words, with a note whether the user stated it, or another program's file lacks it."""
+        """Limit `name` in words; a note says whether the user stated it, or whether another program's file lacks it."""
         if name not in self.stated and getattr(self.limits, name) == 0.0:
             return f"0 {unit} (not in the calibration file)"
         return f"+-{getattr(self.limits, name):g} {unit} ({'stated' if name in self.stated else 'default'})"

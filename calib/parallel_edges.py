@@ -158,7 +158,7 @@ def _gather(grey: Floats, coarse: CoarseEdge, line: Floats, room_px: float) -> E
 
 
 def _one_run(rows: Ints, sound: NDArray[np.bool_], seed: int, corner_px: float, height: int) -> NDArray[np.bool_]:
-    """Valid rows around `seed`, across short interruptions, without the corners at the ends."""
+    """Valid rows around `seed`, extended over short interruptions, without the corners at the ends."""
     good = rows[sound]
     if good.size == 0:
         return sound

@@ -25,7 +25,7 @@ def lens_shift_px(points_px: Floats, frame_size_px: tuple[int, int]) -> Floats:
 
 
 def tilt_shift_px(points_px: Floats, frame_size_px: tuple[int, int], distance_px: float, axis: int) -> Floats:
-    """Displacement by perspective per radian of tilt of the plane, to first order.
+    """Displacement by perspective (px) per radian of tilt of the plane, to first order.
 
     For a plane tilted by t that recedes along x, at the distance Z, the point (x, y) appears at (x, y) / (1 - x t / Z).
 

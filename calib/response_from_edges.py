@@ -1,10 +1,10 @@
 """Camera response from the shape of straight edges, because blur spreads a step of light symmetrically.
 
 The optics and the pixels blur the light, and nearly every blur is symmetric. In light, an edge spread function is then
-antisymmetric about the edge. In levels after a transfer curve it is not; the exponent that makes it antisymmetric again
-is that of the camera. A slanted edge samples its profile at many positions within a pixel (ISO 12233). Sharpening or
-smoothing after the transfer curve, or a bevel along the edge, also changes the profile: the residuals of the fit then
-exceed the noise.
+antisymmetric about the edge. In the stored levels it is not antisymmetric; the exponent that makes it antisymmetric
+again is that of the camera. A slanted edge samples its profile at many positions within a pixel (ISO 12233). Sharpening
+or smoothing after the transfer curve, or a bevel along the edge, also changes the profile: the residuals of the fit
+then exceed the noise.
 """
 
 from collections.abc import Sequence
@@ -121,8 +121,8 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
         )
     if u_exponent > LARGEST_U:
         raise CalibrationError(
-            f"The edges must tell the exponent to {LARGEST_U:g}, but tell {exponent:.2f} to +-{u_exponent:.2f} only: "
-            "take more of them, with more contrast, or an exposure series."
+            f"The edges must determine the exponent to within {LARGEST_U:g}, but give {exponent:.2f} to "
+            f"+-{u_exponent:.2f} only: take more of them, with more contrast, or an exposure series."
         )
     levels = np.concatenate([profile.level for profile in profiles])
     curve = curve_of(exponent, np.zeros(KNOTS), top_level, name)
@@ -157,7 +157,7 @@ def _profiles(grey: Grey, top_level: int) -> list[_Profile]:
 
 
 def _apart_px(edge: StraightEdge, other: StraightEdge) -> float:
-    """Smallest distance of another edge's ends and centre from the line of an edge, where the two overlap."""
+    """Smallest distance (px) of another edge's ends and centre from the line of an edge, if the two overlap."""
     points = np.vstack([other.ends, other.ends.mean(axis=0)])
     along = (points - edge.ends[0]) @ edge.direction
     beside = np.abs((points - edge.ends[0]) @ edge.to_dark)

@@ -79,7 +79,7 @@ def scale_from_lines(
     u_line_mm : float
         Standard uncertainty of each line's position, independent between lines.
     u_length_mm : float
-        Standard uncertainty of the length between the first and the last line used, common to all lines.
+        Standard uncertainty of the length between the first and the last line used, the same for all lines.
     frame_size_px : tuple of int
         Width and height of the picture.
     limits, stated
@@ -174,7 +174,7 @@ def _straight_line(k: Floats, at: Floats, weight: Floats) -> _Line:
 def _bends(
     lines: ScaleLines, used: NDArray[np.bool_], frame_size_px: tuple[int, int], slope: float, limits: Limits
 ) -> tuple[Floats, ...]:
-    """Shift of each line per unit of lens distortion, and per radian of tilt about each axis."""
+    """Shift of each line per unit of lens distortion, and per radian of tilt about each axis of the picture."""
     points = lines.middle_px[used]
     distance_px = limits.camera_distance_mm * slope
     lens = lens_shift_px(points, frame_size_px) @ lines.across

@@ -81,8 +81,9 @@ def scale_from_sizes(
 ) -> ScaleFit:
     """Fit gap_mm = (gap_px + p b) / s to objects of known size, with p = +1 for a light gap and -1 for a dark object.
 
-    Written as a straight line, the equation is p gap_px = s (p gap_mm) - b. Three different sizes, or a light gap and a
-    dark object, determine s and b; fewer determine only s, and b is included in the uncertainty budget with its limit.
+    Written as a straight line with the slope s, the equation is p gap_px = s (p gap_mm) - b. Three different sizes, or
+    a light gap and a dark object, determine scale s and edge bias b; fewer objects determine only s, and b is included
+    in the uncertainty budget with its limit.
 
     Parameters
     ----------

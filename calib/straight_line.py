@@ -51,7 +51,7 @@ def line_with_errors(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> Straight
     """Maximum-likelihood line for points whose x and y are both uncertain, with independent errors.
 
     Source: York, Evensen, Lopez Martinez & De Basabe Delgado, American Journal of Physics 72 (2004), 367-375. For `u_x`
-    = 0 the result is the weighted least-squares line.
+    = 0 (exact x) the result is the weighted least-squares line.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ ROUNDS = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightRows:
-    """A straight edge: x = at_px + slope * (row - middle_row).
+    """A straight edge, given by x = at_px + slope * (row - middle_row).
 
     Parameters
     ----------

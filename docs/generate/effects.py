@@ -28,7 +28,7 @@ def effects_page(pictures: Path) -> str:
 
 def _overview(effects: list[Effect]) -> str:
     rows = [f"| [`{e.name}`](#{e.name}) | {e.stage} | {e.words} |" for e in effects]
-    return "\n".join(["| effect | stage | what happens |", "|---|---|---|", *rows])
+    return "\n".join(["| effect | acts in | what happens |", "|---|---|---|", *rows])
 
 
 def _section(effect: Effect, pictures: Path) -> str:

@@ -7,6 +7,7 @@ from sphinx.application import Sphinx
 
 from generate.commands import commands_page
 from generate.effects import effects_page
+from generate.package_notes import NOTES, note
 from generate.python_interface import python_page
 from generate.recipe_kinds import recipe_kinds_page
 
@@ -18,6 +19,9 @@ def write_pages(app: Sphinx) -> None:
     (folder / "commands.md").write_text(commands_page(), encoding="utf-8")
     (folder / "python.md").write_text(python_page(), encoding="utf-8")
     (folder / "recipe_kinds.md").write_text(recipe_kinds_page(), encoding="utf-8")
+    (folder / "notes").mkdir(exist_ok=True)
+    for name in NOTES:
+        (folder / "notes" / f"{name}.md").write_text(note(name), encoding="utf-8")
     (folder / "effects.md").write_text(effects_page(folder / "effects"), encoding="utf-8")
 
 

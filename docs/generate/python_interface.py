@@ -1,21 +1,41 @@
 """The reference of the Python interface: every public name, from its docstring."""
 
+import importlib
 import inspect
 from types import ModuleType
 
 import calib
 import fingervision
 
+FOR_AUTHORS = {
+    "fingervision.testbed.actuator": ("Actuator", "StageLimits", "Alarm"),
+    "fingervision.testbed.reading": ("Reading",),
+    "fingervision.testbed.motion.move_limits": ("check_move", "check_speed"),
+    "fingervision.testbed.camera": ("BedCamera", "Shot", "Latency"),
+    "fingervision.testbed.force_sensor": ("ForceSensor",),
+    "fingervision.domain.effect": ("DriveEffect", "PointEffect", "History", "Stage"),
+    "fingervision.domain.response": ("Response",),
+    "fingervision.domain.drawing_form": ("DrawingForm",),
+}
+"""What the author of a device or an effect imports beside `fingervision` itself, by module."""
+
 
 def python_page() -> str:
-    """Write a section for each package, and in it an entry for each name of its `__all__`."""
-    return "\n\n".join((_section(fingervision, "fingervision"), _section(calib, "calib"))) + "\n"
+    """Write a section for each package, and in it an entry for each public name."""
+    testing = importlib.import_module("fingervision.testing")
+    sections = (_section(fingervision, "fingervision"), _section(calib, "calib"), _for_authors(), _section(testing))
+    return "\n\n".join(sections) + "\n"
 
 
-def _section(module: ModuleType, title: str) -> str:
+def _section(module: ModuleType, title: str = "fingervision.testing, the contract tests") -> str:
     names = [name for name in module.__all__ if not name.startswith("__")]
     entries = "\n\n".join(_entry(module, name) for name in names)
     return f"## Every name of {title}\n\n```{{eval-rst}}\n{entries}\n```"
+
+
+def _for_authors() -> str:
+    entries = [_entry(importlib.import_module(path), name) for path, names in FOR_AUTHORS.items() for name in names]
+    return "## For authors of devices and effects\n\n```{eval-rst}\n" + "\n\n".join(entries) + "\n```"
 
 
 def _entry(module: ModuleType, name: str) -> str:

@@ -1,7 +1,8 @@
 """A test bed for bluesky: stage, force sensor and camera as devices of the RunEngine of bluesky.
 
-The stage is movable, readable, stoppable and flyable; the force sensor is readable. The camera is readable and flyable:
-each measured frame is one event, with stage position and force at its exposure. `bluesky_agent` suggests the next run.
+In bluesky's terms, the stage is movable, readable, stoppable and flyable; the force sensor is readable. The camera is
+readable and flyable: each measured frame is one event, with stage position and force at its exposure. `bluesky_agent`
+suggests the next run.
 
 The adapter is tested with a RunEngine of bluesky 1.15 on the simulated test bed (tests/adapters/test_bluesky.py); on
 hardware, only the devices of the test bed are tested. A simulated test bed must be opened with `pace=1`, so that its
@@ -31,7 +32,7 @@ JOINED_WITHIN_S = 5.0
 
 
 class _Shared:
-    """An actuator whose readings go to several readers; otherwise each reading would reach only one of them."""
+    """An actuator whose readings are distributed to several readers, because each reading is returned only once."""
 
     def __init__(self, actuator: Any, lock: threading.RLock) -> None:
         self._actuator, self._lock = actuator, lock
@@ -66,7 +67,7 @@ class _Consumer:
 
 
 class StageDevice:
-    """The stage: `set(mm)` moves, `stop` stops at once, `prepare((to_mm, speed_mm_s))` and `kickoff` start a flight."""
+    """The stage as a bluesky device: `set(mm)` moves; `stop` stops at once; `prepare` and `kickoff` start a flight."""
 
     parent = None
 
@@ -79,7 +80,7 @@ class StageDevice:
 
     @property
     def hints(self) -> dict[str, list[str]]:
-        """Fields that bluesky plots by default."""
+        """Names of the fields that bluesky plots by default."""
         return {"fields": [self.name]}
 
     def set(self, value: float) -> ThreadStatus:
@@ -106,7 +107,7 @@ class StageDevice:
         return {f"{self.name}_speed": {"value": self.speed_mm_s, "timestamp": time.time()}}
 
     def describe_configuration(self) -> dict[str, dict[str, Any]]:
-        """Return the unit of the speed."""
+        """Return the unit of the stage's speed."""
         return {f"{self.name}_speed": {"source": "settings", "dtype": "number", "shape": [], "units": "mm/s"}}
 
     def prepare(self, value: tuple[float, float]) -> ThreadStatus:
@@ -127,7 +128,7 @@ class StageDevice:
         return ThreadStatus(lambda: None)
 
     def complete(self) -> ThreadStatus:
-        """Wait for the end of the flight."""
+        """Wait until the flight (a motion with continuous readings) has ended."""
 
         def work() -> None:
             self._until_rest()
@@ -140,7 +141,7 @@ class StageDevice:
         return {f"{self.name}_flight": self.describe()}
 
     def collect(self) -> Iterator[dict[str, Any]]:
-        """Yield every reading of the flight."""
+        """Yield every position reading of the flight."""
         for one in self._flown:
             at_s = self._unix_s + one.got_s
             yield {"time": at_s, "data": {self.name: one.value}, "timestamps": {self.name: at_s}}
@@ -151,7 +152,7 @@ class StageDevice:
         if not limits.lower_mm <= float(to_mm) <= limits.upper_mm:
             raise LimitError(
                 f"{self.name} must stay between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but {float(to_mm):g} "
-                "mm is asked for: nothing was moved."
+                "mm is requested: nothing was moved."
             )
 
     def _until_rest(self) -> None:
@@ -183,7 +184,7 @@ class ForceDevice:
 
 
 class GapDevice:
-    """The camera as a device that measures the gap: readable after `trigger`, or flyable with one event per frame."""
+    """The camera as a bluesky device that measures the gap: readable after `trigger`; a flight yields all frames."""
 
     parent = None
 
@@ -199,7 +200,7 @@ class GapDevice:
 
     @property
     def hints(self) -> dict[str, list[str]]:
-        """Fields that bluesky plots by default."""
+        """Names of the fields that bluesky plots by default."""
         return {"fields": [f"{self.name}_gap_mm"]}
 
     def trigger(self) -> ThreadStatus:
@@ -251,11 +252,11 @@ class GapDevice:
         return ThreadStatus(work)
 
     def describe_collect(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """Describe the data stream of a flight: the columns of a frame."""
+        """Describe the data stream of a flight: the columns of a measured frame."""
         return {f"{self.name}_flight": self.describe()}
 
     def collect(self) -> Iterator[dict[str, Any]]:
-        """Yield every frame of the flight."""
+        """Yield every measured frame of the flight."""
         for exposed_s, data in self._flown:
             at_s = self._unix_s + exposed_s
             yield {"time": at_s, "data": data, "timestamps": dict.fromkeys(data, at_s)}
@@ -264,7 +265,7 @@ class GapDevice:
     def _begin(self) -> float:
         """Read the stage position before the first frame to be used, and return the time from which frames are used.
 
-        The time is in seconds by the test bed's clock.
+        That time is in seconds, on the test bed's clock.
         """
         instruments = [one for one in (self._sight.position, self._sight.force) if one is not None]
         until_s = self._clock.now_s() + JOINED_WITHIN_S
@@ -273,7 +274,7 @@ class GapDevice:
         while any(one.clock.joined() is None for one in instruments):
             if self._clock.now_s() > until_s:
                 raise DeviceError(
-                    "The clocks of stage and force sensor must be joined to the test bed's within "
+                    "The clocks of stage and force sensor must be synchronised with the test bed's clock within "
                     f"{JOINED_WITHIN_S:g} s, "
                     "but are not: check that both devices respond."
                 )
@@ -315,7 +316,7 @@ class GapDevice:
 
 
 class Devices(NamedTuple):
-    """The bluesky devices of a test bed; None for a part that the test bed lacks."""
+    """The bluesky devices of a test bed; an attribute is None if the test bed has no such part."""
 
     stage: StageDevice
     force: ForceDevice | None
@@ -323,7 +324,7 @@ class Devices(NamedTuple):
 
 
 def devices(bed: Bed, *, prefix: str = "") -> Devices:
-    """Make the devices of an open test bed: `stage`, `force` and `gap`, with the prefix before each name."""
+    """Make the bluesky devices `stage`, `force` and `gap` of an open test bed; `prefix` stands before each name."""
     lock, unix_s = threading.RLock(), time.time() - bed.clock.now_s()
     shared = _Shared(bed.actuator, lock)
     return Devices(

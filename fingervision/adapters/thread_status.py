@@ -33,22 +33,22 @@ class ThreadStatus:
 
     @property
     def done(self) -> bool:
-        """Whether the work has ended."""
+        """Whether the work in the thread has ended."""
         return self._ended.is_set()
 
     @property
     def success(self) -> bool:
-        """Whether the work has ended without an error."""
+        """Whether the work in the thread has ended without an error."""
         return self.done and self._error is None
 
     def exception(self, timeout: float | None = 0.0) -> BaseException | None:
-        """Wait for the end and return the exception raised, if any; TimeoutError if it still runs at the time limit."""
+        """Wait until the thread has ended; return the exception that it raised, if any, or raise TimeoutError."""
         if not self._ended.wait(timeout):
             raise TimeoutError
         return self._error
 
     def add_callback(self, callback: Callable[["ThreadStatus"], None]) -> None:
-        """Call `callback` when the work is done; at once if it already is."""
+        """Call `callback` when the thread has ended; immediately if it already has."""
         with self._lock:
             if not self._ended.is_set():
                 self._callbacks.append(callback)

@@ -140,7 +140,7 @@ def _absolute(task: Task) -> Task:
 
 
 def _work_there(task: Task, perform: Perform, wanted: dict[str, str]) -> Outcome:
-    """On a worker, process a task; the versions of a worker that joined the cluster late are checked first."""
+    """Process a task on a worker; if the worker joined the cluster late, first check its software versions."""
     words = difference(wanted, versions())
     if words:
         return failure(task, f"A worker joined that has {words}: install the same there and restart it.")

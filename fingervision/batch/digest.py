@@ -32,7 +32,7 @@ class Digest:
 
 
 def thinned(values: NDArray[np.float64]) -> tuple[float | None, ...]:
-    """Select evenly spaced values, rounded to five significant digits.
+    """Select evenly spaced elements of an array, rounded to five significant digits.
 
     Parameters
     ----------

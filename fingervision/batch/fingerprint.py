@@ -21,7 +21,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def stamp_of(path: Path) -> str:
-    """Sizes and modification times of an input's files; if they are unchanged, so is the content of settled files.
+    """Sizes and modification times of an input's files, by which an unchanged input is recognised without reading it.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def stamp_of(path: Path) -> str:
 
 
 def is_settled(path: Path) -> bool:
-    """Whether the last change is so old that any further change would give a different modification time.
+    """Whether the last change of a file is so old that any further change would give a different modification time.
 
     Raises
     ------

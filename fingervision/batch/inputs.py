@@ -14,7 +14,7 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
 
     A folder is a single input (a sequence of images), and the files in this folder are then not inputs. Files inside
     `out` are not inputs, because videos written by an earlier call may match a pattern. A missing path is kept, so that
-    it is listed with its error; a pattern without a match is kept too if other names match.
+    it is listed with its error; if other names match, a pattern without a match is kept too.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
         for match in matches or [name]:
             found.setdefault(_absolute(match), match)
     if not matched and inside:
-        raise UsageError(f"--out must lie apart from the inputs, but they are in {out}: name another folder.")
+        raise UsageError(f"--out must be a folder without inputs, but the inputs are in {out}: name another folder.")
     if not matched:
         words = ", ".join(names)
         raise InputFileError(

@@ -57,7 +57,7 @@ class LocalCrew:
         self._fill_up()
 
     def __enter__(self) -> Self:
-        """Return this object; all of its processes are ended when the `with` block is left."""
+        """Start the worker processes; all of them are ended when the `with` block is left."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -67,7 +67,7 @@ class LocalCrew:
             worker.process.join()
 
     def answer(self, command: str, arguments: tuple[str, ...]) -> Ended:
-        """Let a worker execute a command, and return the worker's result.
+        """Let one worker execute a command, and return the worker's result.
 
         The command is sent to every process, so that all of them already import the modules that the tasks need; the
         first result is returned.
@@ -162,7 +162,7 @@ class LocalCrew:
         del self._workers[worker.link]
 
     def _let_go(self) -> None:
-        """End workers with a task in progress; idle workers end by themselves."""
+        """End the workers that still have a task in progress; idle workers end by themselves."""
         busy = [worker for worker in self._workers.values() if worker.number is not None or worker.is_asked]
         for worker in busy:
             worker.process.kill()

@@ -43,6 +43,6 @@ def reduction_of(command: str) -> Reduction:
 
 
 def commands() -> tuple[str, ...]:
-    """Names of the commands whose results can be summarised."""
+    """Names of the commands whose results a batch can summarise."""
     names = (module.name for module in pkgutil.iter_modules(fingervision.batch.__path__))
     return tuple(sorted(name.removeprefix(PREFIX) for name in names if name.startswith(PREFIX)))

@@ -24,7 +24,7 @@ PART = re.compile(r"\.(?P<name>.+)\.part~(?P<host>[^~]+)~(?P<pid>\d+)~[0-9a-f]{8
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Input of a result, and its outcome.
+    """Record beside a result: its input (files and options) and its outcome.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def write_record(folder: Path, place: Path, record: Record) -> None:
 
 
 def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
-    """Size, modification time (ns) and hash of every table of a result, by file name.
+    """Size, modification time (ns) and hash of every table file of a result, by file name.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
 
 
 def is_whole(folder: Path, record: Record) -> bool:
-    """Whether the tables of a result are unchanged; a table is read only if its modification time differs."""
+    """Whether the table files of a result are unchanged; a file is read only if its modification time differs."""
     try:
         for name, (size, changed_ns, content) in record.tables.items():
             stat = (folder / name).stat()
@@ -153,7 +153,7 @@ def replace_text(path: Path, text: str) -> None:
 
 
 def new_part(folder: Path) -> Path:
-    """Choose a temporary folder name beside the result folder, which contains the identity of the worker."""
+    """Choose a temporary folder name beside the result folder; the name contains the identity of the worker."""
     return folder.with_name(f".{folder.name}.part~{_host()}~{os.getpid()}~{uuid4().hex[:8]}")
 
 
@@ -190,12 +190,12 @@ def publish(part: Path, folder: Path, record: Record) -> None:
 
 
 def is_same(there: Record, wanted: Record) -> bool:
-    """Whether two records are of the same input, with the same content and options."""
+    """Whether two records belong to the same input, with the same content and the same options."""
     return (there.input, there.content, there.options_key) == (wanted.input, wanted.content, wanted.options_key)
 
 
 def remove_left_parts(out: Path) -> None:
-    """Remove unfinished folders of ended workers on this computer, not those of running workers or other computers."""
+    """Remove unfinished result folders of ended workers on this computer; folders of other workers are kept."""
     for entry in out.iterdir():
         found = PART.fullmatch(entry.name)
         if found is not None and found["host"] == _host() and not _lives(int(found["pid"])):

@@ -48,7 +48,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Inputs whose result exists already, and inputs to process.
+    """Division of a batch's inputs: those that already have a result, and those that remain to be processed.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Batch:
 
     @property
     def bad(self) -> tuple[Outcome, ...]:
-        """Outcomes with a message for the user."""
+        """Outcomes of a batch that have a message for the user."""
         return tuple(outcome for outcome in self.outcomes if outcome.exit_code)
 
     @property
@@ -205,7 +205,7 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
 
 
 def _check_folder(job: Job) -> None:
-    """Refuse a result folder that is used for something else."""
+    """Refuse a result folder that contains something other than the results of a batch."""
     try:
         entries = [entry.name for entry in os.scandir(job.out) if not entry.name.startswith(".")]
     except FileNotFoundError:
@@ -216,7 +216,7 @@ def _check_folder(job: Job) -> None:
         raise OutputError(f"The folder {job.out} cannot be read ({error.strerror}): name another.") from error
     if entries and MARK not in entries:
         raise OutputError(
-            f"--out must be a new folder or one of an earlier batch, but {job.out} holds something else "
+            f"--out must be a new folder or that of an earlier batch, but {job.out} contains other files "
             f"({min(entries)}): name another."
         )
     if entries and (command := _command_of(job.out / MARK)) != job.command:

@@ -35,7 +35,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """Result of the execution of a command.
+    """Outcome of one executed command: exit code and message.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Processing of one input in a worker; processing the same input twice is harmless."""
+"""Process one input in a worker process; processing the same input twice is harmless."""
 
 import errno
 import os

@@ -6,6 +6,7 @@ import os
 import pkgutil
 import signal
 import sys
+import unicodedata
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -19,8 +20,8 @@ from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 class Commands(click.Group):
     """Command group in which every module of this package without a leading underscore is a command.
 
-    The module's name is that of the command, and its variable `command` is the command itself. It imports no large
-    libraries at module level, so that `--help` is fast.
+    The module's name is that of the command, and its variable `command` is the command itself. The module imports no
+    large libraries at module level, so that `--help` is fast.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -34,7 +35,7 @@ class Commands(click.Group):
         return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the commands, sorted."""
+        """Names of the subcommands, sorted."""
         return sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -73,7 +74,7 @@ def main() -> None:
     try:
         cli(standalone_mode=True)
     except FingervisionError as error:
-        click.echo(f"fingervision: {error}", err=True)
+        click.echo(f"fingervision: {_printable(str(error))}", err=True)
         sys.exit(error.exit_code)
     except RuntimeError as error:
         if "Symlink loop" not in str(error):
@@ -95,6 +96,14 @@ def main() -> None:
             sys.stdout.flush()
         except OSError as error:
             _give_up_output(error)
+
+
+def _printable(words: str) -> str:
+    """Escape control characters except line ends, because a file's name may contain ones that a terminal obeys."""
+    return "".join(
+        each if each == "\n" or unicodedata.category(each) != "Cc" else each.encode("unicode_escape").decode()
+        for each in words
+    )
 
 
 def _mend_streams() -> None:

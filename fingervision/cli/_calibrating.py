@@ -14,7 +14,7 @@ from fingervision.domain.errors import NoCalibrationError, UsageError
 
 @contextmanager
 def sentences() -> Iterator[None]:
-    """Convert errors of the package `calib` to errors of fingervision."""
+    """Convert errors of the package `calib` to errors of fingervision with the same message."""
     from calib.errors import CalibrationError
 
     try:

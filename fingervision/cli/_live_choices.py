@@ -4,21 +4,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fingervision.cli._where_to_measure import region_of
-from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
     from fingervision.live.choices import Choices
+    from fingervision.measuring.scale import Scale
 
 
 def choices_of(
     source: str | None,
     calibration: Path | None,
-    px_per_mm: float | None,
+    stated: tuple[float | None, float | None],
     below_tip_mm: float,
     tips: str,
     roi: str | None,
 ) -> "Choices":
     """Read scale, measuring height, direction of the tips, and region of interest from the options.
+
+    The argument `stated` contains the values of --px-per-mm and --u-px-per-mm.
 
     Raises
     ------
@@ -27,24 +29,23 @@ def choices_of(
     UsageError
         An option makes no sense.
     """
-    from calib.calibration import BareScale
     from fingervision.domain.direction import Direction
     from fingervision.frames import simulated
     from fingervision.live.choices import Choices
-    from fingervision.measuring.scale import check_px_per_mm
+    from fingervision.measuring.scale import check_one_scale, stated_scale
     from fingervision.storage.calibration_json import read_calibration
 
-    if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+    px_per_mm, u_px_per_mm = stated
+    check_one_scale(calibration, px_per_mm, u_px_per_mm)
     own = simulated.PX_PER_MM if source is not None and simulated.accepts(source) else None
-    stated = own if px_per_mm is None else px_per_mm
-    if stated is not None and not 0.0 < stated < float("inf"):
-        raise UsageError(f"--px-per-mm must be positive, but is {stated:g}.")
-    if stated is not None:
-        check_px_per_mm(stated)
-    scale = None if calibration is None else read_calibration(calibration)
+    known = own if px_per_mm is None else px_per_mm
+    scale: Scale | None = None
+    if calibration is not None:
+        scale = read_calibration(calibration)
+    elif known is not None:
+        scale = stated_scale(known, u_px_per_mm)
     return Choices(
-        scale=scale or (None if stated is None else BareScale(stated)),
+        scale=scale,
         scale_file=calibration,
         below_tip_mm=below_tip_mm,
         direction=None if tips == "auto" else Direction(tips),

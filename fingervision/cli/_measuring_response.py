@@ -33,13 +33,17 @@ def measure_response(
         The pictures tell no response.
     """
     if edges and densities is not None:
-        raise UsageError("--edges and --densities are two ways to measure a response, but both were given: choose one.")
+        raise UsageError(
+            "--edges and --densities are two ways to measure the camera's response, but both were given: choose one."
+        )
     if roi is not None and densities is None:
-        raise UsageError("--roi gives the areas of a grey wedge's fields, but no --densities were given: state them.")
+        raise UsageError("--roi is for the fields of a grey wedge, but their densities are not given: add --densities.")
     if edges or densities is not None:
         exposed = [item for item in items if "=" in item and not Path(item).exists()]
         if exposed:
-            raise UsageError(f"With --edges or --densities an item must be an IMAGE alone, but is {exposed[0]}.")
+            raise UsageError(
+                f"With --edges or --densities a picture must be named without exposure time, but one is {exposed[0]}."
+            )
         pictures = [grey for _, grey in read_pictures([Path(item) for item in items])]
         top = max(top_level(grey) for grey in pictures)
         if densities is None:

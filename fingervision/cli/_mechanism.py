@@ -62,7 +62,9 @@ def predict(
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     if kind not in (*_KINDS, "stiffness_matrix", "all"):
-        raise UsageError(f"A mechanism.toml is computed by the kinds {', '.join(_KINDS)}, but --kind asks for {kind}.")
+        raise UsageError(
+            f"A mechanism.toml can be computed by the kinds of model {', '.join(_KINDS)}, but --kind is {kind}."
+        )
     wanted = _KINDS if kind == "all" else (kind,)
     models: dict[str, MechanismModel] = {}
     refusals: dict[str, FingervisionError] = {}
@@ -119,12 +121,14 @@ def predict(
     if drawing.estimates:
         spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
-    if isinstance(plate, MechanismPlate):
-        bent = large_rotation or contact
-        curve = _curve(states["finite_element"]) if bent and asked.drive is not None else None
-        move_mechanism(plate, asked, curve, out, as_json=as_json)
+    moving = {name: model for name, model in models.items() if isinstance(model, MechanismPlate | MechanismFrame)}
+    if moving:
+        bent = (large_rotation or contact) and asked.drive is not None
+        curves = {name: _curve(states[name]) for name in moving if bent}
+        folders = {name: out if name == chief else out / name for name in moving}
+        move_mechanism(moving, asked, curves, folders, out, as_json=as_json)
     elif asked.moves:
-        click.echo("Motion is answered by the finite elements: add --kind finite_element.", err=True)
+        click.echo("The stiffness matrix has no masses: add --kind lumped or finite_element for motion.", err=True)
     if gripped is not None:
         write_pair_grip(models, gripped, None if drive is None else inputs, out, as_json=as_json)
     if not as_json:
@@ -134,7 +138,7 @@ def predict(
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Add the name of the drawing's file to the message of an error."""
+    """Add the name of the drawing's file to the message of an error that is raised in the `with` block."""
     try:
         yield
     except FingervisionError as error:
@@ -144,14 +148,14 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inputs of the static table (mm): the inputs of the drive table, or enough inputs for a smooth curve."""
+    """Inputs of the static table (mm): those of the drive table, or enough evenly spaced inputs for a smooth curve."""
     if inputs.size < 2:
         raise UsageError(f"--drive must hold at least two different inputs, but holds {inputs.size}.")
     return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
 
 
 def _curve(states: list[MechanismState]) -> PchipInterpolator:
-    """Lengths and force over the input, in the column order of a motion; contacts may cause kinks in these curves."""
+    """Lengths and force over the input, in the column order of the dynamic response; contacts may cause kinks."""
     rows = [
         [*state.pairs_mm.values(), *(part for probe in state.probes_mm.values() for part in probe), state.force_n]
         for state in states

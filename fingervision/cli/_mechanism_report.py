@@ -97,7 +97,7 @@ def _life(mechanism: Mechanism, states: Sequence[MechanismState]) -> Endurance |
 
 
 def say_endurance(kind: str, mechanism: Mechanism, states: Sequence[MechanismState]) -> None:
-    """Print the number of load cycles over the range of inputs that the flexures endure."""
+    """Print the number of load cycles that the flexures endure over the range of inputs."""
     life = _life(mechanism, states)
     if life is not None:
         click.echo(

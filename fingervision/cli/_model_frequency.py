@@ -16,11 +16,14 @@ from fingervision.domain.errors import UsageError
 from fingervision.models.damping_text import parse_damping
 from fingervision.models.driven_body import DrivenBody
 from fingervision.models.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies_hz
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.modal_model import GAP, FreeModes, ModalModel, described, gripper_free_modes, gripper_modes
 from fingervision.models.motion_in_time import MODES
 
 _MOST_MODES = 60
+_LEAST_RANGE, _LEAST_DEG = 1.1, 1.0
+"""Least range of the axes, as a ratio and in degrees."""
 _STYLES = ("-", "--", "-.")
 
 
@@ -99,9 +102,9 @@ def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -
         known = described(law, rad_s).size
         if known < rad_s.size and rad_s[known] / (2.0 * pi) < band.last_hz:
             raise UsageError(
-                f"--damping {damping} describes modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz alone (its ratio "
-                f"leaves 0 to 0.3 beyond), but --frequency goes to {band.last_hz:g} Hz past the mode at "
-                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end it before, or take modal:0.025."
+                f"--damping {damping} is valid for modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz only (beyond, "
+                f"the damping ratio is outside 0 to 0.3), but --frequency goes to {band.last_hz:g} Hz past the mode at "
+                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end the band before that mode, or take modal:0.025."
             )
     frequencies = resolved_frequencies_hz(reduced, free, law, band.first_hz, band.last_hz)
     return frequency_response(reduced, free, frequencies, law)
@@ -158,6 +161,15 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     for axes in (lower, lower_force):
         axes.set_ylabel("phase / degrees")
         axes.set_xlabel("frequency / Hz")
+    for axes in (upper, upper_force):
+        low, high = axes.get_ylim()
+        if high < _LEAST_RANGE * low:
+            # A decade's ticks on a line next to constant would all read alike.
+            axes.set_yscale("linear")
+            axes.set_ylim(low / _LEAST_RANGE, high * _LEAST_RANGE)
+    for axes in (lower, lower_force):
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, -_LEAST_DEG), max(high, _LEAST_DEG))
     for axes in (upper, lower, upper_force, lower_force):
         axes.grid(alpha=0.3, which="both")
     upper.legend()
@@ -165,22 +177,28 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     figure.savefig(path, dpi=130)
 
 
-def mechanism_frequencies(model: MechanismPlate, band: Band, damping: str, out: Path, *, as_json: bool) -> None:
-    """Write frequency.csv and frequency.png of a mechanism whose drawing lists its bodies."""
-    name = model.mechanism.name
-    reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
-    if not reduced.observed:
-        raise UsageError(
-            f"{name} must have a [[probe]] or a [[pair]] as the output of the frequency response, but has "
-            "none: add one point ([[probe]]) or the distance of two ([[pair]])."
-        )
-    answer = respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
-    columns = tuple(answer.per_input)
-    main = main_column(reduced)
-    write_frequencies({"finite_element": answer}, columns, out / "frequency.csv")
-    draw_frequencies({"finite_element": answer}, main, f"{name}, damping {damping}", out / "frequency.png")
+def mechanism_frequencies(
+    models: Mapping[str, MechanismPlate | MechanismFrame], band: Band, damping: str, out: Path, *, as_json: bool
+) -> None:
+    """Write frequency.csv and frequency.png of the models of a mechanism whose drawing lists its bodies."""
+    found: dict[str, FrequencyResponse] = {}
+    main, name = "", ""
+    columns: tuple[str, ...] = ()
+    for kind, model in models.items():
+        name = model.mechanism.name
+        reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
+        if not reduced.observed:
+            raise UsageError(
+                f"{name} must have a [[probe]] or a [[pair]] as the output of the frequency response, but has "
+                "none: add one point ([[probe]]) or the distance of two ([[pair]])."
+            )
+        found[kind] = respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
+        main, columns = main or main_column(reduced), columns or tuple(found[kind].per_input)
+    write_frequencies(found, columns, out / "frequency.csv")
+    draw_frequencies(found, main, f"{name}, damping {damping}", out / "frequency.png")
     if not as_json:
-        click.echo(peaks_of(answer, main))
+        for kind, answer in found.items():
+            click.echo(f"{kind}: {peaks_of(answer, main)}")
 
 
 def main_column(reduced: ModalModel) -> str:

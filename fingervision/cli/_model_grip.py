@@ -26,7 +26,7 @@ _BEYOND_MM = 1e-9
 
 
 def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm: float) -> Part | None:
-    """Read and check the options that describe the part.
+    """Read and check the options that describe the gripped part.
 
     Raises
     ------
@@ -43,8 +43,8 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
         raise UsageError(f"--object-n-mm must be a positive stiffness in N/mm, but is {stiffness_n_mm:g}.")
     if width_mm > 10.0 * abs(rest_gap_mm):
         raise UsageError(
-            f"--object-mm must be a part that fits between the fingers, but is {width_mm:g} mm at a rest gap of "
-            f"{rest_gap_mm:g} mm; is it in micrometres?"
+            f"--object-mm must be the width of a part that fits between the fingers, but is {width_mm:g} mm at a rest "
+            f"gap of {rest_gap_mm:g} mm; is it in micrometres?"
         )
     return Part(width_mm) if stiffness_n_mm is None else Part(width_mm, stiffness_n_mm)
 
@@ -55,7 +55,7 @@ def write_grip(
 ) -> None:  # fmt: skip
     """Write grip.csv and grip.png for every kind of model (small displacements), and print how the part is held.
 
-    `errors` are the relative model errors of the gripping force by kind of model.
+    `errors` holds the relative error of the gripping force for each kind of model.
     """
     rows: dict[str, NDArray[np.float64]] = {}
     said = []
@@ -88,7 +88,7 @@ class PartOfPair:
 
 
 def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism: Mechanism) -> PartOfPair | None:
-    """Read and check the part, and find the pair of probes that grips it: the pair named gap, or the only pair.
+    """Read and check the gripped part, and find the pair of probes that grips it: the pair named gap, or the only pair.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism
     if not pairs or (name != "gap" and len(pairs) > 1):
         has = f"{', '.join(pairs)} and none of that name" if pairs else "no [[pair]]"
         raise UsageError(
-            f"--object-mm must have a pair of probes that grips the part, called gap where there are several, but "
+            f"--object-mm needs a pair of probes that grips the part (named gap if there are several), but "
             f"{mechanism.name} has {has}."
         )
     apart = [a - b for a, b in zip(*(mechanism.probes[end] for end in pairs[name]), strict=True)]
@@ -182,7 +182,7 @@ def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
 
 
 def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float, error: float) -> str:
-    """Sentence on the input at which the part is touched, the slope of the gripping force, and the input at yield."""
+    """Sentence on the inputs (mm) at which the part is touched and yields, and on the slope of the gripping force."""
     limit = gripper.material.yield_mpa
     step = 0.2 * abs(model.half.first_touch_mm() or touch_mm)
     near = [model.stressed(grip_equilibrium(model.half, touch_mm - by, part)) for by in (0.0, step)]

@@ -37,7 +37,7 @@ def inputs_mm(drive: Path, columns: Path | None, gripper: Gripper) -> NDArray[np
 
 
 def with_rows_between(inputs: NDArray[np.float64], figures: ModelFigures) -> NDArray[np.float64]:
-    """Add inputs between those of a drive table, and at the first touch, because tables are interpolated linearly."""
+    """Add inputs between those of a drive table and at the first touch: a table is linear between its rows."""
     low, high = float(inputs.min()), float(inputs.max())
     touch = figures.contact_input_mm
     bends = [touch] if touch is not None and low < touch < high else []

@@ -14,7 +14,7 @@ def named_references(
     form: str = "SIZE_MM with a positive size",
     example: str = "ref5.png=5.000",
 ) -> list[tuple[str, Path, float]]:
-    """Read kind, picture and value of every item; an error states with `form` and `example` what the value must be."""
+    """Read kind, picture and size of every reference object; an error states the form that each item must have."""
     return [_item(item, kind, form, example) for item in items]
 
 

@@ -1,4 +1,4 @@
-"""Folder for a command's results; results of another input are never overwritten."""
+"""Folder for a command's results; the results of another input are never overwritten."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import click
 
 
 def results_folder(out: Path, source: Path) -> Path:
-    """Return the folder of --out, or the default folder; if that has results of another input, a new name is chosen.
+    """Return the folder of --out or the default folder; if it has results of another input, choose a new name.
 
     Parameters
     ----------

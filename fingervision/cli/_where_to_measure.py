@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _take_settings(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Take the values of options that are not given from a settings file."""
+    """Take the values of options that the user does not give from a settings file."""
     if path is None:
         return None
     from fingervision.storage.settings_toml import read_settings
@@ -36,26 +36,33 @@ OPTIONS = (
         help="Settings file, as saved by the browser page; options on the command line override it.",
     ),
     click.option(
-        "--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale with its uncertainty."
+        "--calibration",
+        type=click.Path(path_type=Path),
+        help="File calibration.json with the scale and its uncertainty.",
     ),
     click.option(
         "--px-per-mm",
         type=float,
-        help="The scale without its uncertainty; uncertainties then have only the random part.",
+        help="Scale in pixels per mm; without --u-px-per-mm, only the random part of the uncertainty is given.",
+    ),
+    click.option(
+        "--u-px-per-mm",
+        type=float,
+        help="Standard uncertainty of --px-per-mm in pixels per mm, such as of a ruler; u_gap_mm then includes it.",
     ),
     click.option(
         "--below-tip-mm",
         type=float,
         default=0.3,
         show_default=True,
-        help="How far below each finger's tip the gap is measured.",
+        help="Distance (mm) below each finger's tip at which the gap is measured.",
     ),
     click.option(
         "--tips",
         type=click.Choice(["auto", "up", "down", "left", "right"]),
         default="auto",
         show_default=True,
-        help="Where the fingers point in the picture.",
+        help="Direction in which the fingertips point in the picture.",
     ),
     click.option(
         "--roi", metavar="X,Y,W,H", help="Region of interest: first column, first row, width, height in pixels."
@@ -75,6 +82,9 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
             if options[given] is not None and sources[0] is not from_file and sources[1] is from_file:
                 # The scale of the command line comes before the file's, of whichever kind.
                 options[other] = None
+        is_of_file = context.get_parameter_source("u_px_per_mm") is from_file
+        if is_of_file and (options["px_per_mm"] is None or context.get_parameter_source("px_per_mm") is not from_file):
+            options["u_px_per_mm"] = None  # it belongs to the file's scale
         return command(**options)
 
     decorated: Callable[..., Any] = with_one_scale

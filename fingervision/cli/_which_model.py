@@ -10,7 +10,7 @@ HELP = "Simulation .csv, gripper.toml, model.toml, .fmu, or .py with simulate(ti
 
 
 def _single(context: click.Context, parameter: click.Parameter, value: tuple[Path, ...]) -> Path:
-    """Return the single model; more than one is refused, so that no model is silently ignored."""
+    """Return the single model of an option; more than one is refused, so that no model is silently ignored."""
     if len(value) > 1:
         raise click.BadParameter(
             f"one model is diagnosed at a time, but {len(value)} were given: `fingervision compare` takes several.",
@@ -44,5 +44,5 @@ kind_option = click.option(
     type=KindChoice(),
     default="lumped",
     show_default=True,
-    help="Kind of model that computes a gripper.toml.",
+    help="Kind of model by which a gripper.toml is computed.",
 )

@@ -47,7 +47,7 @@ def command() -> None:
 
 
 def _batch_of(name: str) -> click.Command:
-    """Make a batch command with the options of the single command and those of a batch."""
+    """Make a batch command that has the options of the single command and those of a batch."""
     single = cli.get_command(click.Context(cli), name)
     assert single is not None  # noqa: S101 - named below
     options = [
@@ -69,11 +69,15 @@ def _batch_of(name: str) -> click.Command:
         params=[
             click.Argument(["inputs"], nargs=-1, required=True, metavar="INPUT..."),
             *options,
-            click.Option(["--scheduler"], metavar="tcp://HOST:PORT", help="Work on this Dask cluster."),
+            click.Option(
+                ["--scheduler"],
+                metavar="tcp://HOST:PORT",
+                help="Address of a Dask cluster whose workers process the inputs.",
+            ),
             click.Option(
                 ["--jobs"],
                 type=click.IntRange(min=1),
-                help="Number of processes on this machine; default: one per core.",
+                help="Number of processes on this computer; default: one per core.",
             ),
             click.Option(["--out"], type=click.Path(path_type=Path), required=True, help="Folder for all results."),
             click.Option(["--json", "as_json"], is_flag=True, help="Print the result of every input as JSON."),
@@ -103,7 +107,9 @@ def _run(
     if scheduler is not None and jobs is not None:
         from fingervision.domain.errors import UsageError
 
-        raise UsageError("--jobs is for this machine and --scheduler for others, but both are there: leave one out.")
+        raise UsageError(
+            "--jobs is for this computer and --scheduler for a cluster, but both are given: leave one out."
+        )
     arguments = tuple(_arguments(given, absolute=scheduler is not None))
     plan = planned(Job(name, inputs, arguments, _options_key(name, given), out))
     with ExitStack() as stack:
@@ -123,7 +129,7 @@ def _run(
 
 
 def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str]:
-    """Write options as on the command line; file names get absolute paths if other computers do the work."""
+    """Write options in the form of the command line; file names become absolute if other computers do the work."""
     words: list[str] = []
     for option, value in given.items():
         flag = option.opts[0]
@@ -156,13 +162,11 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
     import tomllib
 
     from fingervision.batch.fingerprint import content_hash
-    from fingervision.storage.plain_file import plain, why
+    from fingervision.storage.plain_file import plain, text_of, why
 
     try:
         found = content_hash(plain(path))
-        base = (
-            tomllib.loads(path.read_text(encoding="utf-8-sig")).get("base") if path.suffix.lower() == ".toml" else None
-        )
+        base = tomllib.loads(text_of(path)).get("base") if path.suffix.lower() == ".toml" else None
     except FileNotFoundError:
         raise InputFileError(f"There is no file {path}: check the options.") from None
     except (OSError, ValueError) as error:
@@ -176,7 +180,7 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
 def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> None:
     """Refuse invalid options once, before any input is processed.
 
-    The command is called with a nonexistent input; if the options are valid, the only error is that about the input.
+    The command is called with a nonexistent input; if the options are valid, the only error is that about this input.
     """
     from tempfile import TemporaryDirectory
 

@@ -78,7 +78,7 @@ def _output_options(command: Command) -> Command:
                 default="auto",
                 show_default=True,
                 metavar="auto|linear|srgb|bt709|FILE",
-                help="Camera response, from grey level to light; auto: as the pictures are tagged, else linear.",
+                help="Camera response (light for each grey level); auto: the pictures' own tag, else linear.",
             ),
             click.option(
                 "--camera",
@@ -87,7 +87,7 @@ def _output_options(command: Command) -> Command:
                 help="A camera setting to record in the calibration; repeatable.",
             ),
             click.option("--no-picture", is_flag=True, help="Write no calibration picture."),
-            click.option("--json", "as_json", is_flag=True, help="Print the result for programs."),
+            click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
         )
     ):
         command = option(command)
@@ -115,9 +115,9 @@ def _size_options(command: Command) -> Command:
 def bar(**options: Any) -> None:
     """Calibrate on bars: objects with two parallel straight edges at a known distance.
 
-    Each picture shows one object, in any direction; the object may extend beyond the picture. Three sizes give scale
-    and edge bias. Fewer sizes give only the scale; the edge bias is then not corrected, and its limit enters the
-    budget. To add slots, prefix an item: slot:ref3.png=3.000.
+    Each picture shows one object, in any direction; the object may extend beyond the picture. Objects of three
+    different sizes determine scale and edge bias. Fewer sizes determine only the scale; the edge bias is then not
+    corrected, and its limit enters the budget. To add slots, prefix an item: slot:ref3.png=3.000.
     """
     calibrate_on_sizes("bar", **options)
 
@@ -129,7 +129,7 @@ def bar(**options: Any) -> None:
 def slot(**options: Any) -> None:
     """Calibrate on slots: openings between two parallel straight edges at a known distance.
 
-    Everything else is as for `bar`. To add bars, prefix an item: bar:ref5.png=5.000.
+    All other options are as for `bar`. To add bars, prefix an item: bar:ref5.png=5.000.
     """
     calibrate_on_sizes("slot", **options)
 
@@ -174,7 +174,7 @@ def chessboard(**options: Any) -> None:
 def charuco(**options: Any) -> None:
     """Calibrate on a ChArUco board, which may extend beyond the picture; its marker dictionary is recognised.
 
-    Everything else is as for `chessboard`, but --squares counts squares and not inner corners.
+    All other options are as for `chessboard`, but --squares counts squares and not inner corners.
     """
     calibrate_on_board("charuco", **options)
 
@@ -182,7 +182,9 @@ def charuco(**options: Any) -> None:
 @command.command("scale", epilog=SCALE_EXAMPLES)
 @click.argument("image", type=click.Path(path_type=Path))
 @click.option("--pitch-mm", type=float, required=True, help="Certified distance of neighbouring lines, mm.")
-@click.option("--u-line-mm", default=0.0003, show_default=True, help="Standard uncertainty of every line's place, mm.")
+@click.option(
+    "--u-line-mm", default=0.0003, show_default=True, help="Standard uncertainty of every line's position, mm."
+)
 @click.option(
     "--u-length-mm", default=0.001, show_default=True, help="Standard uncertainty of the length over all lines, mm."
 )
@@ -193,31 +195,35 @@ def scale(**options: Any) -> None:
     """Calibrate on a line scale (stage micrometer) over all its lines, in any direction.
 
     The scale comes from the middles of the lines: blooming and the camera's response move the two edges of a line in
-    opposite directions and do not move its middle. The edge bias of a gap is therefore not corrected; its limit enters
-    the budget.
+    opposite directions and therefore do not move its middle. The edge bias of a gap is therefore not corrected; its
+    limit enters the budget.
     """
     calibrate_on_lines(**options)
 
 
 @command.command("response", epilog=RESPONSE_EXAMPLES)
 @click.argument("items", nargs=-1, required=True, metavar="IMAGE[=EXPOSURE]...")
-@click.option("--edges", is_flag=True, help="Use pictures of sharp, unclipped, straight, plain edges instead.")
+@click.option(
+    "--edges",
+    is_flag=True,
+    help="Estimate the response from pictures of sharp, straight, plain edges that are not clipped.",
+)
 @click.option(
     "--densities",
     metavar="A:B:STEP|A,B,...",
-    help="Use one picture of a grey wedge instead; optical densities of its fields, lightest first.",
+    help="Measure the response on one picture of a grey wedge with these optical densities, lightest first.",
 )
 @click.option("--roi", metavar="X,Y,W,H", help="With --densities: region of the wedge's fields.")
 @click.option("-o", "--out", default="response.csv", type=click.Path(path_type=Path), show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def response(**options: Any) -> None:
     """Measure the camera's response (light for each grey level), best from a still scene at several exposures.
 
     For an exposure series, the scene needs flat parts of many shades (paper with grey fields). Change only the exposure
-    time; leave aperture, light and focus. Only the ratios of the exposures matter, so their unit is free.
+    time; leave aperture, light and focus unchanged. Only the ratios of the exposures matter, so their unit is free.
 
-    For a grey wedge, one picture and the wedge's certificate suffice. Without series and wedge, --edges estimates a
-    power law to about 5 % from the shape of straight edges, if the camera does not sharpen.
+    For a grey wedge, one picture and the wedge's certified densities suffice. Without exposure series and grey wedge,
+    --edges estimates a power law to about 5 % from the shape of straight edges, if the camera does not sharpen.
     """
     from fingervision.cli._measuring_response import measure_response
 
@@ -228,7 +234,7 @@ def response(**options: Any) -> None:
 @command.command("check", epilog=CHECK_EXAMPLES)
 @click.argument("calibration", type=click.Path(path_type=Path))
 @_size_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
     """Measure an object of known size with an existing calibration and say whether both agree (E_n number)."""
     with sentences():
@@ -266,7 +272,7 @@ def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | 
 @click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=click.Path(path_type=Path))
 @click.option("--tolerance-mm", type=float, default=None, help="Full width of the tolerance, for %GRR.")
 @click.option("--by-input", is_flag=True, help="Treat every input_mm of the drive as a separate part of the study.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, as_json: bool) -> None:
     """Gauge repeatability and reproducibility over repeated recordings (AIAG, analysis of variance).
 

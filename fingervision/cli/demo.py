@@ -1,4 +1,4 @@
-"""`fingervision demo`: the complete procedure on the simulated test bed, with one printed line per step."""
+"""`fingervision demo`: run the complete procedure on the simulated test bed, and print one line for each part of it."""
 
 from pathlib import Path
 
@@ -22,12 +22,12 @@ Examples:
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True,
               help="Seed of all randomness; without --hide, it also chooses the hidden effect.")  # fmt: skip
 @click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("demo"), show_default=True, help="Folder to write."
+    "--out", type=click.Path(path_type=Path), default=Path("demo"), show_default=True, help="Folder for the results."
 )
 def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
-    """Hide an effect in the simulated test bed, run a recipe, measure its video, and find the hidden effect.
+    """Add an effect to the simulated test bed, run a recipe, measure its video, and identify the added effect.
 
-    If the first run leaves several explanations, the proposed next run is made as well.
+    If several explanations remain after the first run, the proposed next run is executed as well.
     """
     from fingervision.demonstration.demonstrate import demonstrate, drawn
     from fingervision.testbed.simulation.parse_injected_effects import hidden_from

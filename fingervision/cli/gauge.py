@@ -36,10 +36,12 @@ USUAL_GAUGES = Path("gauges.toml")
 )
 @click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for what the browser page measures.  [default: live]"
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder for the measurements that the browser page saves.  [default: live]",
 )
 @port_of_page
-@click.option("--no-browser", is_flag=True, help="Print the page's address, but open no browser.")
+@click.option("--no-browser", is_flag=True, help="Print the address of the browser page, but open no browser.")
 @where_to_measure
 def command(
     recording: str,
@@ -50,15 +52,16 @@ def command(
     no_browser: bool,
     calibration: Path | None,
     px_per_mm: float | None,
+    u_px_per_mm: float | None,
     below_tip_mm: float,
     tips: str,
     roi: str | None,
 ) -> None:
     """Draw gauges on RECORDING (a video, images, a run folder) in the browser page of `fingervision live`.
 
-    Gauges are edges, pairs of edges, lines, circles, marks, patches and gaps. You draw, drag, type and name them, and
-    save them to a file for `fingervision measure --gauges`. Gauges can be drawn before a scale is known; their values
-    appear once the scale is entered on the page.
+    Gauges are edges, pairs of edges, lines, circles, marks, patches and gaps. On the browser page you draw, drag, type
+    and name the gauges, and save them to a file for `fingervision measure --gauges`. Gauges can be drawn before a scale
+    is known; their values appear once the scale is entered on the browser page.
     """
     from fingervision.live.access import Access
     from fingervision.live.beside import Beside
@@ -68,9 +71,9 @@ def command(
     if not is_recording(recording):
         raise UsageError(
             "Gauges are drawn on an existing recording (a video, images, a run's folder), but "
-            f"{recording} is none: name another, or draw them on a camera's picture with "
+            f"{recording} is not such a recording: name another, or draw them on a camera's picture with "
             "`fingervision live CAMERA --gauges FILE`."
         )
-    choices = choices_of(None, calibration, px_per_mm, below_tip_mm, tips, roi)
+    choices = choices_of(None, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)
     showing = Showing(page=True, json_lines=False, way=Access(port=port), record=False, browser=not no_browser)
     look_through(recorded(recording, rate_hz, choices, ()), out or USUAL_OUT, showing, Beside(), gauges)

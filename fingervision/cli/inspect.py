@@ -25,23 +25,33 @@ WITHOUT_SCALE_PX = 10.0
 @click.command(epilog=EXAMPLES)
 @click.argument("source")
 @where_to_measure
-@click.option("--seconds", type=float, default=5.0, show_default=True, help="Duration of the inspection, in seconds.")
+@click.option("--seconds", type=float, default=5.0, show_default=True, help="Duration of the inspection in seconds.")
 @click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
 @click.option(
     "--response",
     default="auto",
     show_default=True,
     metavar="auto|linear|srgb|bt709|FILE",
-    help="Camera response; auto: as in the calibration, else as the recording is tagged, else linear.",
+    help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
 )
-@click.option("--bits", type=click.IntRange(8, 16), help="True bit depth of levels stored in 16 bits, if not 16.")
-@click.option("--fingers", type=click.Choice(["auto", "dark", "light"]), default="auto", show_default=True)
+@click.option(
+    "--bits",
+    type=click.IntRange(8, 16),
+    help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
+)
+@click.option(
+    "--fingers",
+    type=click.Choice(["auto", "dark", "light"]),
+    default="auto",
+    show_default=True,
+    help="Whether the fingers are darker or lighter than the background.",
+)
 @click.option(
     "--picture",
     type=click.Path(path_type=Path),
     default="inspection.png",
     show_default=True,
-    help="Where the picture is written.",
+    help="File to which the picture of the inspection is written.",
 )
 @click.option("--no-picture", is_flag=True, help="Write no picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
@@ -49,6 +59,7 @@ def command(
     source: str,
     calibration: Path | None,
     px_per_mm: float | None,
+    u_px_per_mm: float | None,
     below_tip_mm: float,
     tips: str,
     roi: str | None,
@@ -61,10 +72,11 @@ def command(
     no_picture: bool,
     as_json: bool,
 ) -> None:
-    """Look at SOURCE (camera or recording) for some seconds and list what limits the measurement, worst first.
+    """Watch SOURCE (camera or recording) for some seconds and list what limits the measurement, worst first.
 
     Each limit (focus, exposure, gamma, compression, motion, light, tilt, scale, vibration, surroundings, view) is
-    listed with its numbers, its cost in µm of uncertainty, and what to change. Without a scale, costs are in pixels.
+    listed with its numbers, its cost in µm of uncertainty, and what to change. Without a scale, the costs are given in
+    pixels.
     """
     import json
 
@@ -77,18 +89,20 @@ def command(
     from fingervision.inspection.frames_to_look_at import frames_to_look_at
     from fingervision.inspection.picture import draw_inspection
     from fingervision.inspection.sample import take_sample
-    from fingervision.measuring.task import Task, check_task
+    from fingervision.measuring.scale import Scale, check_one_scale, stated_scale
+    from fingervision.measuring.task import Task, task_for_frames
     from fingervision.storage.calibration_json import read_calibration
     from fingervision.storage.response_csv import response_named
 
     if not 0.0 < seconds < float("inf"):
         raise UsageError(f"--seconds must be positive, but is {seconds:g}.")
-    if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
-    if px_per_mm is not None and not 0.0 < px_per_mm < float("inf"):
-        raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.")
+    check_one_scale(calibration, px_per_mm, u_px_per_mm)
     stated = simulated.PX_PER_MM if px_per_mm is None and simulated.accepts(source) else px_per_mm
-    scale = read_calibration(calibration) if calibration else None if stated is None else BareScale(stated)
+    scale: Scale | None = None
+    if calibration is not None:
+        scale = read_calibration(calibration)
+    elif stated is not None:
+        scale = stated_scale(stated, u_px_per_mm)
     task = Task(
         scale=scale or BareScale(WITHOUT_SCALE_PX / below_tip_mm if below_tip_mm > 0.0 else 1.0),
         scale_file=calibration,
@@ -101,7 +115,8 @@ def command(
     )
     opened = open_source(source, Wish(rate_hz=rate_hz))
     description = opened.description
-    check_task(task, description)
+    task = task_for_frames(task, description)
+    scale = None if scale is None else task.scale
     settings, warning = task.settings_for(description.files)
     try:
         sample = take_sample(frames_to_look_at(opened, seconds), description, settings, scale)

@@ -1,4 +1,4 @@
-"""`fingervision table`: show how a table of another program is interpreted, and write columns.toml to repeat it."""
+"""`fingervision table`: show how a table of another program is interpreted; save the interpretation."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

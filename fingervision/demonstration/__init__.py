@@ -1,1 +1,1 @@
-"""Demonstration of the complete procedure on the simulated test bed, from a hidden effect to its diagnosis."""
+"""Demonstration of the complete procedure on the simulated test bed, from an added effect to its diagnosis."""

@@ -1,4 +1,4 @@
-"""Demonstration on the simulated test bed: hide an effect, run, measure, diagnose, and execute the proposed run."""
+"""Demonstration on the simulated test bed: add an effect, run, measure, diagnose, and execute the proposed next run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -58,12 +58,12 @@ class Shown:
 
     @property
     def among(self) -> bool:
-        """Whether the hidden effect is in the ambiguity set of the diagnosis."""
+        """Whether the effect that the demonstration added is in the ambiguity set of the diagnosis."""
         return any(set(names) == set(self.hidden.effects) for names in self.report.alternatives)
 
     @property
     def found(self) -> bool:
-        """Whether the diagnosis named the hidden effect."""
+        """Whether the diagnosis named the effect that the demonstration added."""
         return {effect.name for effect in self.report.effects} == set(self.hidden.effects) and (
             self.report.verdict is (Verdict.NAMED if self.hidden.effects else Verdict.AGREES)
         )
@@ -75,7 +75,7 @@ def demonstrated() -> tuple[str, ...]:
 
 
 def drawn(seed: int) -> Hidden:
-    """Choose, by a seed, the effect to hide, among those declared suitable for a demonstration, and its size.
+    """Choose, by a seed, an effect and its size for the demonstration, among the effects declared suitable.
 
     A random number is drawn for each effect from the seed and the effect's name, and the effect with the highest number
     is chosen (rendezvous hashing: Thaler & Ravishankar 1998, doi:10.1109/90.663936). A new effect therefore changes

@@ -1,1 +1,1 @@
-"""Compare simulation and measurement: where they disagree, which effect explains it, and what remains unexplained."""
+"""Compare simulation and measurement: where they disagree, which effect explains the disagreement, and what remains."""

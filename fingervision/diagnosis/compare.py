@@ -28,7 +28,7 @@ PIECE_S, LEAST_PIECE = 1.0, 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Regions where the residual is more than noise, and the residual.
+    """Result of a comparison: the residual, and the regions where the residual is more than noise.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Comparison:
     noise_mm: float
 
     def document(self) -> dict[str, object]:
-        """The comparison as data for other programs."""
+        """Return the comparison as a mapping that can be written as JSON."""
         return {
             "schema": 1,
             "rms_mm": self.rms_mm,
@@ -73,9 +73,9 @@ class Comparison:
 
 
 def rough(residual_mm: Array, history: History) -> Array:
-    """Residual minus broken lines, which extend from reversal to reversal in each run; same shape.
+    """Residual minus straight segments that extend from reversal to reversal in each run; same shape as the residual.
 
-    A step at a reversal contains all frequencies, so that it would be counted as noise in a spectrum.
+    A jump at a reversal contains all frequencies, so that a spectrum would count it as noise.
     """
     n = history.input_mm.size
     if history.time_s is None:

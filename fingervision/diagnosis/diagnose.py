@@ -100,7 +100,7 @@ def _diagnosed(
     without: frozenset[str],
     progress: Progress,
 ) -> Diagnosis:
-    """Diagnose once; a failing plug-in effect ends the diagnosis with an error."""
+    """Run a diagnosis once; if an effect of a plug-in fails, the diagnosis ends with an error."""
     table, bare = without_places(table, model)
 
     def explain(seen: MeasuredTable, by: CorrectedModel) -> Diagnosis:

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Role(IntEnum):
-    """Function of a pin; the numbers are defined by the Arduino sketch of the board (`lines.h`)."""
+    """Function of a pin of the board; the numbers are defined by the Arduino sketch of the board (`lines.h`)."""
 
     SELECT_0 = 0
     SELECT_1 = 1

@@ -7,7 +7,7 @@ from fingervision.domain.parameter import Parameter
 
 
 class DrawnPart(StrEnum):
-    """Part of a drawing that an effect changes; a diagnosis tries every such part of the drawing."""
+    """Kind of part of a drawing that an effect changes; a diagnosis tries every part of this kind."""
 
     HINGE = "hinge"
     """The bending stiffness of one hinge."""
@@ -29,7 +29,7 @@ class DrawnPart(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DrawingForm:
-    """Action of one effect on a drawing: the part that the effect changes, and the parameter that states by how much.
+    """How an effect changes a drawing: the kind of part that it changes, and the parameter that states by how much.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ REZEROED = "rezeroed"
 
 
 class Stage(StrEnum):
-    """Part of the measuring chain in which an effect acts: drive, mechanism or camera."""
+    """Section of the measuring chain in which an effect acts: drive, mechanism or camera."""
 
     DRIVE = "drive"
     MECHANISM = "mechanism"
@@ -33,7 +33,7 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Samples over which effects are computed, with all data that an effect may use besides the signal it acts on.
+    """Samples over which effects are computed, with all data that an effect may use besides its input signal.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class InputPath:
     owner: NDArray[np.intp]
 
     def moved(self, by_mm: Array) -> "InputPath":
-        """Shift the recorded inputs of the measured rows and of the points that repeat them; `by_mm` of shape (n,)."""
+        """Shift the inputs of the measured rows, and of the path's points that repeat them, by `by_mm`, shape (n,)."""
         shift = np.where(self.owner >= 0, by_mm[self.owner], 0.0)
         return replace(self, history=replace(self.history, input_mm=self.history.input_mm + shift))
 
@@ -308,7 +308,7 @@ class DriveEffect(Effect):
 class PointEffect(Effect):
     """An effect of the mechanism or camera: `act(response, history, values)` returns the changed measuring points.
 
-    `act_curved` means the same as in `DriveEffect`.
+    `act_curved` has the same meaning as in `DriveEffect`.
     """
 
     act: PointAct

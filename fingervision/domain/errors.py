@@ -28,7 +28,7 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """Exit code of a command: how it ended."""
+    """Exit code of a command, which tells a calling program how the command ended."""
 
     DONE = 0
     COULD_NOT = 1

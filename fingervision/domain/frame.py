@@ -13,7 +13,7 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 class Coding(StrEnum):
-    """Compression between sensor and pixels, which determines the pixels whose errors are correlated.
+    """Kind of compression between sensor and pixels, which determines the pixels whose errors are correlated.
 
     A lossy codec that codes every picture independently (JPEG) causes errors that are correlated over a few pixels; a
     codec that predicts a picture from neighbouring pictures (H.264) displaces whole blocks.

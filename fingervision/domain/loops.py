@@ -24,8 +24,8 @@ def loop(name: str) -> Callable[..., Any]:
     """Return one of the compiled loops of the package's .c files.
 
     The loop releases Python's global interpreter lock, so that other threads can run at the same time. The same input
-    gives identical results on every computer, apart from exp, log and erf of the C library, because no sum is reordered
-    for speed.
+    gives identical results on every computer, apart from exp, log and erf of the C library, because the compiler may
+    not reorder sums.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def _library() -> ModuleType:
 
 
 def _places() -> Iterator[Path]:
-    """Folders in which the compiled library may be: in the installation, beside the sources, or in the user's cache."""
+    """Folders in which the compiled library may lie: the installation, that of the sources, or the user's cache."""
     yield loops_build.PACKAGE / "domain"
     yield loops_build.PACKAGE / "domain" / "__pycache__"
     own = os.environ.get("LOCALAPPDATA") if sys.platform == "win32" else os.environ.get("XDG_CACHE_HOME")

@@ -99,7 +99,7 @@ def compiler() -> list[str] | None:
 
 
 def _links() -> list[str]:
-    """Linker options by which the loops find the functions of Python and of the C library."""
+    """Linker options by which the compiled loops find the functions of Python and of the C library."""
     if sys.platform == "win32":
         return [f"-L{Path(sys.base_prefix) / 'libs'}", "-lpython3"]
     return ["-fPIC", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-fPIC", "-lm"]

@@ -30,7 +30,7 @@ class Model(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PhysicalLaw:
-    """Action of an effect in a model built from a gripper's drawing, used instead of the formula for simulation tables.
+    """Action of an effect in a model that is built from a drawing; it replaces the formula for simulation tables.
 
     Parameters
     ----------
@@ -59,17 +59,17 @@ class PhysicalModel(Model, Protocol):
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Dimensions of the drawing that have a stated uncertainty, by dotted name; a fit may vary them within it."""
+        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may vary them accordingly."""
         ...
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalModel":
         """Return the gripper with some of its dimensions changed by the given amounts, each in its own unit.
 
-        The implementation may scale its response by the ratio of a simpler model's responses, which is accurate enough
+        An implementation may scale its response by the ratio of a simpler model's responses, which is accurate enough
         for derivatives.
         """
         ...
 
     def drawn_anew(self, changes: Mapping[str, float]) -> "PhysicalModel":
-        """Return the changed gripper as `redrawn` does, but with the response fully recomputed, which may take long."""
+        """Return the gripper with some dimensions changed, with its response fully recomputed, which may take long."""
         ...

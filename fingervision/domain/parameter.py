@@ -89,8 +89,13 @@ class Estimate:
         Standard uncertainty; None if the data do not determine it (the value lies at a bound, or was set by the user).
     unit : str
         Unit as printed.
+    at_least, at_most : float or None
+        One-sided 95 % limit if the data limit the parameter on one side only; `value` is then merely the value with
+        which the prediction was computed.
     """
 
     value: float
     u: float | None
     unit: str = ""
+    at_least: float | None = None
+    at_most: float | None = None

@@ -13,9 +13,9 @@ BLOCK_PX = 16
 class Quantiser:
     """Quantiser steps of a codec, to multiples of which the coefficients of its cosine transform are rounded.
 
-    An encoder does not transmit changes that are smaller than a fraction of a step (the dead zone), so that an edge may
-    be displaced by a corresponding amount. The steps of other codecs, whose dead zone is another fraction, are stated
-    as the H.264 steps with the same dead zone.
+    A picture's encoder does not transmit changes that are smaller than a fraction of a step (the dead zone), so that an
+    edge may be displaced by a corresponding amount. The steps of other codecs, whose dead zone is another fraction, are
+    stated as the H.264 steps with the same dead zone.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ class Quantiser:
         return Quantiser(self.step, (self.first_px[0] - x_px, self.first_px[1] - y_px))
 
     def turned(self, quarters: int, width_px: int, height_px: int) -> "Quantiser":
-        """Return the quantiser steps of the picture rotated anticlockwise by `quarters` right angles.
+        """Return the quantiser steps for the picture rotated anticlockwise by `quarters` right angles.
 
-        Width and height are those before the rotation.
+        Width and height are those of the picture before the rotation.
         """
         found = self
         for _ in range(quarters % 4):

@@ -1,4 +1,4 @@
-"""Step data: the blocks stored in a motor controller, each of which is one motion.
+"""Step data: the numbered blocks stored in a motor controller, each of which defines one motion.
 
 The two ways of defining a block, by cycle time or by speed, follow section 3 of Hricko and Havlik (2015).
 """
@@ -18,7 +18,7 @@ class Coordinates(StrEnum):
 
 
 class Operation(StrEnum):
-    """Action of a block at its target: hold the position, or push with a limited force."""
+    """What the controller does at the target of a block: hold the position, or push with a limited force."""
 
     MOVING = "moving"
     PUSHING = "pushing"
@@ -88,7 +88,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class StepData:
-    """All blocks of a controller, and the order in which they are executed.
+    """All step data of a controller, and the order in which its blocks are executed.
 
     Parameters
     ----------

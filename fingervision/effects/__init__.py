@@ -47,7 +47,7 @@ def origin_of(name: str) -> Origin:
 
 
 def that_show(check: FurtherCheck) -> tuple[str, ...]:
-    """Names of the effects that are visible in a check, in the order of the catalogue."""
+    """Names of the effects that are visible in a given check, in the order of the catalogue."""
     return tuple(name for name, effect in catalogue().items() if effect.checks.get(check) is True)
 
 
@@ -92,7 +92,7 @@ def _catalogue() -> tuple[dict[str, Effect], dict[str, Origin]]:
 
 
 def _place(effect: Effect, *, built_in: bool) -> tuple[int, float, bool, str]:
-    """Sort key in the measuring chain: stage, then `order`, then built-in effects before others, then the name."""
+    """Sort key of an effect in the measuring chain: section, then `order`, built-in effects first, then the name."""
     return list(Stage).index(effect.stage), effect.order, not built_in, effect.name
 
 

@@ -9,7 +9,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Reduce the opening by half the play on either side of rest; simulation tables do not describe single pivots."""
+    """Reduce the opening by half the play on either side of rest: simulation tables do not describe single pivots."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     half_mm = 0.5 * values["play_mm"]
     return response.with_gap(history.rest_gap_mm + opening_mm - np.clip(opening_mm, -half_mm, half_mm))

@@ -1,4 +1,4 @@
-"""Lever ratio error: the motion amplification differs, because of a link length or a hinge position."""
+"""Lever ratio error: the ratio of gap to input differs, because of a link length or a hinge position."""
 
 from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
@@ -8,7 +8,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the motion amplification differs, because of a link length or a hinge position."""
+    """Apply the effect: the ratio of gap to input differs, because of a link length or a hinge position."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     return response.with_gap(history.rest_gap_mm + (1.0 + values["ratio"]) * opening_mm)
 

@@ -15,7 +15,7 @@ def play(input_mm: Array, width_mm: float, start: float) -> Array:
 
 
 def drawn_sliders(input_mm: Array, reach_mm: float, count: int, start: float) -> Array:
-    """Sum of the extensions of `count` elastic sliders, along the input of one run; shape (n,).
+    """Sum of the extensions of `count` elastic sliders (Prandtl-Ishlinskii model of friction) over one run; shape (n,).
 
     The reach (largest extension) of slider k is k / count of `reach_mm`, and its extension is the difference between
     the input and the output of a play operator whose full width is twice the slider's reach. The initial extension of

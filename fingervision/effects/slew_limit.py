@@ -42,7 +42,7 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
     """Mean speeds over `WINDOW` samples of one direction; over fewer samples, encoder steps would dominate.
 
-    `jumps`, shape (n - 1,), marks steps between samples that are jumps of a command instead of a motion; windows that
+    `jumps`, shape (n - 1,), marks pairs of samples between which a command jumps instead of moving; windows that
     contain a jump are excluded.
     """
     if input_mm.size <= WINDOW:

@@ -15,7 +15,7 @@ FEWEST = 4
 
 
 def late(signal: Array, history: History, delay_s: float, *, curved: bool = False) -> Array:
-    """Delay a signal; before the start of a run, the signal is assumed to be constant.
+    """Delay a signal by a given time; before the start of a run, the signal is assumed to be constant.
 
     Parameters
     ----------

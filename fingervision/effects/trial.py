@@ -84,7 +84,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
             )
     for word in ("words", "formula", "source", "residual"):
         if not isinstance(getattr(effect, word), str) or not getattr(effect, word):
-            raise MisfitError(f"must state its {word} in half a sentence, but does not")
+            raise MisfitError(f"must state its {word} in a few words, but does not")
     history = trial_history()
     searched = effect.search(history)
     if isinstance(searched, str):
@@ -98,7 +98,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
 
 
 def guarded(effect: DriveEffect | PointEffect) -> Effect:
-    """Wrap an effect so that each of its responses is checked; an error for an invalid one names the effect."""
+    """Wrap an effect so that each of its responses is checked; the error for an invalid response names the effect."""
     if isinstance(effect, DriveEffect):
         return replace(effect, act=partial(_checked_drive, effect))
     return replace(effect, act=partial(_checked_points, effect))

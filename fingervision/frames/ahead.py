@@ -15,7 +15,7 @@ PATIENCE_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """Marks the end of the frames, with the exception that ended the reading, if there was one."""
+    """Mark at the end of the frames, with the exception that ended the reading, if there was one."""
 
     error: BaseException | None
 

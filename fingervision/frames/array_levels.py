@@ -21,7 +21,7 @@ MUST = (
 
 
 def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.generic]:
-    """Interpret an array as a stack of pictures; its levels are not checked yet.
+    """Interpret an array as a stack of pictures, without checking its levels.
 
     Parameters
     ----------
@@ -55,7 +55,10 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
         )
     if pictures.dtype.kind == "b":
         raise ArgumentTypeError(
-            argument, MUST, "holds true and false", "a binary picture has lost where its edges are; give the grey one"
+            argument,
+            MUST,
+            "holds true and false",
+            "a binary picture lacks the exact positions of edges; give the grey picture",
         )
     if not (pictures.dtype.kind == "f" or (pictures.dtype.kind == "u" and pictures.dtype.itemsize <= 2)):
         advice = (
@@ -78,7 +81,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
     """Return the levels of one picture in 8 or 16 bits.
 
     An alpha channel is dropped where it is opaque. Floats must lie between 0 (black) and 1 (full scale); they are
-    converted to 16-bit levels, or to 8-bit levels if they were computed from such.
+    converted to 8-bit levels if all are multiples of 1/255, else to 16-bit levels.
 
     Parameters
     ----------
@@ -132,7 +135,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
                 subject,
                 "be opaque where it has an alpha channel",
                 f"{see_through} of {native[:, :, 3].size} pixels are not",
-                "give the colours alone, source[..., :3], where what lies below is what the camera saw",
+                "give the colours alone, source[..., :3], if they are what the camera recorded",
             )
     return np.ascontiguousarray(native[:, :, :3])
 
@@ -147,7 +150,7 @@ def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def what_it_is(value: object) -> str:
-    """Type of a value in words, with its size if it has one: 'a list of 3'."""
+    """Type of a value in words, with its size if the value has one: 'a list of 3'."""
     kind = type(value)
     library = kind.__module__.partition(".")[0]
     name = kind.__name__ if library in ("builtins", "__main__") else f"{library} {kind.__name__}"

@@ -18,7 +18,7 @@ HEADER_BYTES = 160
 
 @dataclass(frozen=True, slots=True)
 class ShownPicture:
-    """Information that a packet contains on the picture that it presents.
+    """Information that an AV1 packet contains on the picture that it presents.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class _Sequence:
 
 
 class Av1Order:
-    """Reads frame headers; stores the sequence header, and which picture is in each of the eight reference slots.
+    """Reader of AV1 frame headers, which stores the sequence header and the content of the eight reference slots.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Av1Order:
             self.of(extradata[4:])
 
     def of(self, packet: bytes) -> ShownPicture | None:
-        """Read a packet; return None if it presents no picture, or one without a number."""
+        """Read a packet; return None if the packet presents no picture, or a picture without a number."""
         shown: ShownPicture | None = None
         try:
             for kind, content in _units(packet):
@@ -106,7 +106,7 @@ class Av1Order:
 
 
 def _units(packet: bytes) -> list[tuple[int, bytes]]:
-    """Open bitstream units of a packet: kind and content."""
+    """Bitstream units (OBUs) of a packet: kind and content of each."""
     units, at = [], 0
     while at < len(packet):
         header = packet[at]
@@ -126,7 +126,7 @@ def _units(packet: bytes) -> list[tuple[int, bytes]]:
 
 
 def _sequence(bits: BitReader) -> _Sequence | None:
-    """Read a sequence header up to the length of the numbers; None if frame headers contain decoder times."""
+    """Read a sequence header as far as the length of the frame numbers; None if frame headers contain decoder times."""
     bits.take(3 + 1)
     if bits.take(1):
         return None  # a still picture

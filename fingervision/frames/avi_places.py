@@ -1,10 +1,10 @@
 """Frame number of an AVI packet from its position in the file, because AVI stores no times, only an order.
 
-If a reader loses a frame at a damaged place and goes on counting, every later frame gets too low a number. The file's
+If a reader loses a frame at a damaged place and continues to count, every later frame gets too low a number. The file's
 own index (idx1) states the position of each frame, so that a packet at a stated position is identified, whatever was
 lost before it. If bytes are missing, the following packets lie nearer to the start of the file than the index states.
-They are identified by a sequence of packet lengths that occurs only once in the rest of the index. If no byte is
-missing, a packet at a position that is not in the index was never written: its header is damaged. Without a valid
+Such packets are identified by a sequence of packet lengths that occurs only once in the rest of the index. If no byte
+is missing, a packet at a position that is not in the index was never written: its header is damaged. Without a valid
 index, frames are counted as long as the chunks follow each other without a gap.
 
 Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
@@ -60,7 +60,7 @@ class AviPlaces:
         """Numbers of frames that the index lists, with a picture, between the last two packets with a number."""
 
     def number(self, position: int, size: int) -> int | None:
-        """Frame number, from 0, of the packet whose bytes start at a position; None if it cannot be determined.
+        """Frame number, from 0, of the packet whose bytes start at a given position; None if it cannot be determined.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class AviPlaces:
         return found
 
     def _by_length(self, begin: int, size: int) -> int | None:
-        """Frame number from the lengths of this packet and of those without a number before it, if it is unique."""
+        """Frame number from the lengths of this packet and the unidentified ones before it, if only one number fits."""
         if self.is_lost:
             possible = self._possible + 1
             possible = possible[possible < len(self._sizes)]
@@ -103,7 +103,7 @@ class AviPlaces:
         return number
 
     def _counted(self, begin: int) -> int | None:
-        """Count pictures from chunk to chunk; pictures skipped on the way were dropped by the camera or the reader."""
+        """Number of pictures up to a chunk; those that are skipped were dropped by the camera or the reader."""
         if self._end is None:
             return None
         at, number = self._end, self._number + 1

@@ -85,7 +85,7 @@ class CameraFrames:
             )
         if not self._capture.isOpened():
             raise DeviceError(
-                f"The camera {name} cannot be opened: it is in use by another program, or no camera; close the other "
+                f"The camera {name} cannot be opened: another program uses it, or it is not a camera; close the other "
                 "program, or see `fingervision live --list`."
             )
         self._ask(wish)
@@ -125,7 +125,7 @@ class CameraFrames:
             self._capture.release()
 
     def close(self) -> None:
-        """End the iteration with the next frame."""
+        """End the iteration over the frames with the next frame."""
         self._closed.set()
 
     def controls(self) -> tuple[CameraControl, ...]:
@@ -134,7 +134,7 @@ class CameraFrames:
             return control_list(self._capture.getBackendName(), self._read(), self._ranges)
 
     def set_control(self, name: str, value: float) -> None:
-        """Ask the camera for another value of one of its controls.
+        """Request another value of one of the camera's settings.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ class CameraFrames:
         self.description = self._described(Wish(), (self.description.width_px, self.description.height_px))
 
     def _ask(self, wish: Wish) -> None:
-        """Request the wished settings, and no automatic changes; a camera accepts only some of them."""
+        """Request the given settings, and no automatic changes; a camera accepts only some of them."""
         with _quiet():
             for what, value in requests(self._capture.getBackendName(), wish, self._read()):
                 self._capture.set(what, value)
@@ -216,7 +216,7 @@ def _first_line(file: Path) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Suppress OpenCV's own messages about missing cameras."""
+    """Suppress OpenCV's own messages about missing cameras in the `with` block."""
     before = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:

@@ -24,7 +24,7 @@ WHILE_RUNNING = (EXPOSURE, GAIN, FOCUS, WHITE_BALANCE)
 def control_list(
     backend: str, read: Mapping[int, float], ranges: Mapping[int, tuple[int, int]]
 ) -> tuple[CameraControl, ...]:
-    """What a camera lets be changed.
+    """List the settings that a camera allows to be changed while it runs.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def _controls(
 
 
 def request_of(backend: str, name: str, value: float) -> tuple[int, float]:
-    """OpenCV's property and value for a control of `control_list`.
+    """OpenCV's property and value for a setting of `control_list`.
 
     Parameters
     ----------

@@ -3,13 +3,13 @@
 The meaning of the properties differs between OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
 cap_avfoundation_mac.mm of OpenCV 4 and 5):
 
-* V4L2 returns -1 for a property that a camera lacks. Its exposure counts units of 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE);
-  its automatic exposure is a menu in which 1 is manual and 3 is the usual automatic mode. If the environment asks for
-  normalised values, the menu returns 0.25 and 0.75 and every other property a fraction of an unknown range; mode 0
-  switches that off.
-* Media Foundation's exposure is the logarithm to base 2 of seconds. Setting an automatic mode also sets its value (the
-  focus would run to 0), and reading the mode back gives no information. Setting a value makes it manual, so that
-  writing back the value just read holds it.
+* V4L2 returns -1 for a property that a camera lacks. The exposure in V4L2 counts units of 0.1 ms
+  (V4L2_CID_EXPOSURE_ABSOLUTE); its automatic exposure is a menu in which 1 is manual and 3 is the usual automatic mode.
+  If the environment asks for normalised values, the V4L2 menu returns 0.25 and 0.75 and every other property a fraction
+  of an unknown range; mode 0 switches that off.
+* Media Foundation's exposure is the logarithm to base 2 of seconds. In Media Foundation, setting an automatic mode also
+  sets its value (the focus would run to 0), and reading the mode back gives no information. Setting a value there makes
+  the property manual, so that writing back the value just read holds it.
 * AVFoundation supports size and frame rate only.
 """
 
@@ -190,7 +190,7 @@ def four_letters(number: float) -> str:
 
 
 def is_there(read: Mapping[int, float], what: int) -> bool:
-    """Whether a camera has a property, by what it read back."""
+    """Whether a camera has a property, judged by the value that was read back."""
     return read.get(what, UNSUPPORTED) != UNSUPPORTED
 
 
@@ -199,14 +199,14 @@ def _is_manual(name: str, value: float) -> bool:
 
 
 def of_camera(backend: str, control: Control, value: float) -> float:
-    """A user's value in the units of a camera's backend."""
+    """Convert a user's value to the units of a camera's backend."""
     if control is not EXPOSURE:
         return value
     return float(round(log2(1e-3 * value))) if backend == MSMF else float(max(1, round(10.0 * value)))
 
 
 def of_user(backend: str, control: Control, value: float) -> float:
-    """A backend's value in the user's units."""
+    """Convert a backend's value to the user's units."""
     if control is not EXPOSURE:
         return value
     return float(1e3 * 2.0**value) if backend == MSMF else 0.1 * value

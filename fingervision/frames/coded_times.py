@@ -10,6 +10,7 @@ import av
 
 from fingervision.frames.av1_order import Av1Order
 from fingervision.frames.mpeg4_headers import Mpeg4Headers, Mpeg4Kind
+from fingervision.frames.open_container import open_container
 from fingervision.frames.spoken_damage import listening
 
 
@@ -48,7 +49,7 @@ def is_shown(packet: "av.Packet[Any]", codec: str) -> bool:
 
 
 def coded_times(path: Path, stream: av.VideoStream) -> list[CodedTime]:
-    """Read the packets of a file as far as they can be read.
+    """Read the packets of a file as far as the file can be read.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ def coded_times(path: Path, stream: av.VideoStream) -> list[CodedTime]:
 
 
 def _coded_times(path: Path, stream: int, codec: str) -> Iterator[CodedTime]:
-    with suppress(av.FFmpegError, IndexError, OSError), av.open(f"file:{path}") as container:
+    with suppress(av.FFmpegError, IndexError, OSError), open_container(path) as container:
         extradata = container.streams[stream].codec_context.extradata
         mpeg4, av1 = Mpeg4Headers(extradata), Av1Order(extradata)
         for packet in container.demux(container.streams[stream]):

@@ -1,7 +1,7 @@
-"""Settings of a camera that may be changed while it runs: what it has, within which limits, and what it took.
+"""Settings of a camera that may be changed while it runs: which it has, their limits, and the values that it accepted.
 
-A live source that has them has `controls()` and `set_control(name, value)`; both are called by the thread that reads
-its frames, between two of them, so that a driver needs no lock. A source without these two methods has no such
+A live source with such settings has `controls()` and `set_control(name, value)`; both are called by the thread that
+reads its frames, between two of them, so that a driver needs no lock. A source without these two methods has no such
 settings.
 """
 
@@ -20,7 +20,7 @@ SAME_SHARE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class CameraControl:
-    """A setting of a camera, as it is now.
+    """A setting of a camera, with its present value and its limits.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class CameraControl:
     greatest: float | None = None
 
     def words(self, value: float) -> str:
-        """A value with its unit."""
+        """The value of a setting with its unit."""
         return f"{value:.4g} {self.unit}".strip()
 
 
@@ -49,11 +49,11 @@ class Adjustable(Protocol):
     """A live source whose camera may be set while it runs."""
 
     def controls(self) -> tuple[CameraControl, ...]:
-        """What may be set, with its present values."""
+        """Settings that may be changed while the camera runs, with their present values."""
         ...
 
     def set_control(self, name: str, value: float) -> None:
-        """Ask the camera for another value of one of its controls; what it took is read by `controls`.
+        """Request another value of a setting of the camera; `controls` then states the accepted value.
 
         Raises
         ------
@@ -64,7 +64,7 @@ class Adjustable(Protocol):
 
 
 def controls_of(source: object) -> tuple[CameraControl, ...]:
-    """Settings that may be changed now; none where the source has no such thing, or fails to say.
+    """Settings that may be changed now; none if the source has no settings or fails to state them.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def controls_of(source: object) -> tuple[CameraControl, ...]:
 
 
 def check_value(controls: tuple[CameraControl, ...], name: str, value: float) -> CameraControl:
-    """Find a control, and refuse a value beyond its limits.
+    """Find a setting by its name, and refuse a value beyond its limits.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def check_value(controls: tuple[CameraControl, ...], name: str, value: float) ->
     control = next((each for each in controls if each.name == name), None)
     if control is None:
         there = ", ".join(each.name for each in controls) or "nothing"
-        raise UsageError(f"The camera lets {there} be set while it runs, but {name[:40]!r} was asked.")
+        raise UsageError(f"The camera lets {there} be changed while it runs, but {name[:40]!r} was requested.")
     least, greatest = control.least, control.greatest
     is_known = name in (EXPOSURE, FRAME_RATE)
     if not isfinite(value) or (is_known and value <= 0.0):
@@ -109,7 +109,7 @@ def check_value(controls: tuple[CameraControl, ...], name: str, value: float) ->
 
 
 def adjust(source: object, name: str, value: float) -> tuple[CameraControl, CameraControl]:
-    """Ask a camera for another value, and read back what it took.
+    """Request another value of a camera's setting, and read back the value that the camera accepted.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def adjust(source: object, name: str, value: float) -> tuple[CameraControl, Came
         raise
     except Exception as error:  # a driver's fault must not end the live view
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". ")
-        raise DeviceError(f"The camera did not take {name} {before.words(value)} ({said}).") from error
+        raise DeviceError(f"The camera refused to set {name} {before.words(value)} ({said}).") from error
     after = next((each for each in controls_of(source) if each.name == name), None)
     if after is None:
         raise DeviceError(f"The camera was asked for {name} {before.words(value)} and no longer says what it has.")

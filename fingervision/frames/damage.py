@@ -12,12 +12,12 @@ Picture = tuple[int | None, av.VideoFrame | str]
 
 
 class DamageTrail:
-    """Follows packets into a decoder and pictures out of it, and marks the damaged pictures.
+    """Follower of packets into a decoder and of pictures out of it, which marks the damaged pictures.
 
-    A picture that is coded as a difference depends on the pictures before it. After a packet that could not be decoded,
-    the decoder continues with substituted content, and its pictures look undamaged but are wrong. Every picture coded
-    after a broken packet is therefore damaged, until a key frame that is not itself broken. Pictures leave the decoder
-    in another order than their packets enter, so that every packet carries its number through the decoder (FFmpeg's
+    A picture that is coded as a difference depends on earlier pictures. After a packet that could not be decoded, the
+    decoder continues with substituted content, and its pictures look undamaged but are wrong. Every picture coded after
+    a broken packet is therefore damaged, until a key frame that is not itself broken. Pictures leave the decoder in
+    another order than their packets enter, so that every packet's number is passed through the decoder (FFmpeg's
     `copy_opaque`, see `prepare`).
     """
 
@@ -36,7 +36,7 @@ class DamageTrail:
         codec.copy_opaque = True
 
     def enters(self, packet: av.Packet[av.VideoStream], *, is_shown: bool = True) -> None:
-        """Record a packet that enters the decoder, and whether a picture is expected from it."""
+        """Record that a packet enters the decoder, and whether a picture is expected from it."""
         self._last = next(self._numbers)
         packet.opaque = self._last
         if packet.is_keyframe and self._broken:
@@ -47,11 +47,11 @@ class DamageTrail:
             heapq.heappush(self._entered, (packet.pts, self._last))
 
     def breaks(self, why: str) -> None:
-        """Record that the last packet could not be decoded, or was incomplete."""
+        """Record that the last packet could not be decoded or was incomplete."""
         self._broken.setdefault(self._last, why)
 
     def recovers(self, over: int) -> None:
-        """Record that the last picture is correct, whatever came before the packet `over` positions earlier.
+        """Record that the last picture is correct whatever came before the packet `over` positions earlier.
 
         Streams without key frames are refreshed part by part: once every part has been refreshed, pictures no longer
         depend on those before the refresh.
@@ -60,7 +60,7 @@ class DamageTrail:
             self._recoveries[self._last] = self._last - over
 
     def fails(self, why: str) -> Iterator[Picture]:
-        """Record that the last packet, whose picture depends on no other, gives none; yield a lost frame instead."""
+        """Record that the last packet, which depends on no other, gives no picture; a lost frame is yielded instead."""
         self.breaks(why)
         own = [entry for entry in self._entered if entry[1] == self._last]
         for entry in own:
@@ -69,7 +69,7 @@ class DamageTrail:
         yield own[0][0] if own else None, why
 
     def hole(self, why: str) -> None:
-        """Record a hole in the stream after the last packet, whose end may be damaged, too."""
+        """Record a hole in the stream after the last packet; the end of this packet may be damaged, too."""
         self.breaks(why)
         self.missing(why)
 
@@ -84,7 +84,7 @@ class DamageTrail:
         heapq.heappush(self._entered, (tick, self._last))
 
     def leaves(self, picture: av.VideoFrame) -> Iterator[Picture]:
-        """Yield a picture that left the decoder, after the lost frames that belong before it."""
+        """Yield a picture that left the decoder, and before it the lost frames that belong there."""
         tick = picture.pts
         if tick in self._given_up:
             return  # behind damage pictures may leave too late; its place is taken

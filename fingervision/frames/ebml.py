@@ -25,9 +25,9 @@ class Element:
 
 
 def element(content: mmap.mmap, at: int) -> Element | None:
-    """Read the element that begins at this position; None where none does.
+    """Read the element that begins at a given position; None if no element begins there.
 
-    One of unknown length, as in live streams, extends to the file's end.
+    An element of unknown length, as in live streams, extends to the file's end.
     """
     name, begin = number(content, at, keep_marker=True)
     if begin == at or begin - at > 4:
@@ -41,7 +41,7 @@ def element(content: mmap.mmap, at: int) -> Element | None:
 
 
 def children(content: mmap.mmap, parent: Element) -> list[Element]:
-    """List the elements inside another, as far as they are whole."""
+    """List the elements inside another element, up to the first that is incomplete."""
     found, at = [], parent.begin
     while at < parent.end and (child := element(content, at)) is not None and child.end <= parent.end:
         found.append(child)
@@ -50,12 +50,12 @@ def children(content: mmap.mmap, parent: Element) -> list[Element]:
 
 
 def child(content: mmap.mmap, parent: Element, name: bytes) -> Element | None:
-    """Find the first element of a name inside another."""
+    """Find the first element with a given name inside another element."""
     return next((each for each in children(content, parent) if each.name == name), None)
 
 
 def number(content: mmap.mmap, at: int, *, keep_marker: bool) -> tuple[int, int]:
-    """Read a number of 1 to 8 bytes, and its end, which equals its beginning if there is no number."""
+    """Read a number of 1 to 8 bytes, and return it with the position of its end (the start if there is no number)."""
     if at >= len(content) or content[at] == 0:
         return 0, at
     length = 9 - content[at].bit_length()

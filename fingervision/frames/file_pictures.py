@@ -15,6 +15,7 @@ from fingervision.frames.matroska_checksums import BROKEN, UNCHECKED_CODECS, Clu
 from fingervision.frames.matroska_times import ClusterTimes
 from fingervision.frames.missing_references import OWN_RECORDING, missing_references
 from fingervision.frames.mp4_durations import NO_SCALE, states_another_duration
+from fingervision.frames.open_container import open_container
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
@@ -87,7 +88,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
-    """A packet, with information on its position that only the next packet gives.
+    """A packet, with the information on its position that only the next packet gives.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
 
 
 def _first_packets(path: Path, stream: av.VideoStream) -> Iterator[bytes]:
-    with suppress(av.FFmpegError, IndexError, OSError), av.open(f"file:{path}") as container:
+    with suppress(av.FFmpegError, IndexError, OSError), open_container(path) as container:
         for packet in container.demux(container.streams[stream.index]):
             if packet.size:
                 yield bytes(packet)

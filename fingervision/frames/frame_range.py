@@ -1,4 +1,4 @@
-"""Part of a recording: frames from one number to another, with their numbers and times in the whole recording."""
+"""Part of a recording: the frames from one number to another, with their numbers and times in the whole recording."""
 
 from collections.abc import Iterable, Iterator
 
@@ -6,7 +6,7 @@ from fingervision.domain.frame import Frame, LostFrame
 
 
 def frame_range(frames: Iterable[Frame | LostFrame], first: int, last: int) -> Iterator[Frame | LostFrame]:
-    """Yield the frames of a range.
+    """Yield the frames of a part of a recording.
 
     Parameters
     ----------

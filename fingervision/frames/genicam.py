@@ -1,11 +1,12 @@
 """GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) through the maker's GenTL producer (extra `genicam`).
 
 A camera's name is `genicam:PRODUCER.cti`, or `genicam:PRODUCER.cti#SERIAL` if there are several cameras. The producer
-is the driver file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` loads it. Tested
-with Viky, the simulated camera that comes with the GenICam reference implementation; not with hardware.
+is the driver file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` loads it. The
+adapter is tested with Viky, the simulated camera that comes with the GenICam reference implementation, and not with
+hardware.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -20,22 +21,20 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DeviceError, InputFileError, MissingLibraryError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.status import Status
-from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraControl
+from fingervision.frames.controls import CameraControl
+from fingervision.frames.genicam_features import (
+    CONTROLS,
+    MONO,
+    control_list,
+    error_words,
+    feature_value,
+    read_settings,
+    request_settings,
+)
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
 
 START = "genicam:"
-MONO = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
-"""Pixel formats in which each grey level has one or two bytes of its own, by the names of the PFNC (EMVA, Pixel Format
-Naming Convention)."""
-NODES = {"exposure_ms": ("ExposureTime", 1e3), "gain": ("Gain", 1.0)}
-"""Feature of the Standard Features Naming Convention for what may be asked, and its units in ours."""
-CONTROLS = {
-    EXPOSURE: (*NODES["exposure_ms"], "ms"),
-    GAIN: (*NODES["gain"], "dB"),
-    FRAME_RATE: ("AcquisitionFrameRate", 1.0, "Hz"),
-}
-"""What may be set while the camera runs: its feature, its units in ours, our unit."""
 SILENT_S, ASKED_EVERY_S = 2.0, 0.2
 """Time without data after which a camera counts as disconnected, and interval of the checks whether the source was
 closed."""
@@ -81,8 +80,8 @@ class GenicamFrames:
         self._closed = Event()
         self._harvester, self._camera = _connected(name)
         nodes = self._camera.remote_device.node_map
-        notes = _ask(nodes, wish)
-        self._format = _value(nodes, "PixelFormat")
+        notes = request_settings(nodes, wish)
+        self._format = feature_value(nodes, "PixelFormat")
         if self._format not in MONO:
             self._release()
             raise DeviceError(
@@ -94,10 +93,10 @@ class GenicamFrames:
             first = self._camera.fetch(timeout=SILENT_S)
         except Exception as error:  # a producer has classes of its own
             self._release()
-            raise DeviceError(f"The camera {name} is open but gives no picture ({_said(error)}).") from error
+            raise DeviceError(f"The camera {name} is open but gives no picture ({error_words(error)}).") from error
         self.has_own_clock = _own_time_s(first) is not None
         picture = first.payload.components[0]
-        rate_hz = _value(nodes, "AcquisitionFrameRate")
+        rate_hz = feature_value(nodes, "AcquisitionFrameRate")
         self.description = Description(
             name=name,
             kind="camera (GenICam)",
@@ -109,7 +108,7 @@ class GenicamFrames:
             has_times=True,
             frame_count=None,
             notes=notes,
-            camera=_settings(nodes),
+            camera=read_settings(nodes),
         )
         first.queue()
 
@@ -141,7 +140,7 @@ class GenicamFrames:
             self._release()
 
     def close(self) -> None:
-        """End the iteration with the next frame."""
+        """End the iteration over the frames with the next frame."""
         self._closed.set()
 
     def controls(self) -> tuple[CameraControl, ...]:
@@ -149,7 +148,7 @@ class GenicamFrames:
         return control_list(self._camera.remote_device.node_map)
 
     def set_control(self, name: str, value: float) -> None:
-        """Ask the camera for another value of one of its controls.
+        """Request another value of one of the camera's settings.
 
         Parameters
         ----------
@@ -161,16 +160,16 @@ class GenicamFrames:
         nodes = self._camera.remote_device.node_map
         node, factor, _ = CONTROLS[name]
         getattr(nodes, node).value = factor * value
-        self.description = replace(self.description, camera=_settings(nodes))
+        self.description = replace(self.description, camera=read_settings(nodes))
 
     def _next(self) -> Any:
-        """Return the next buffer; None once the source is closed."""
+        """Return the next picture buffer; None once the source is closed."""
         silent_since_s = monotonic()
         while not self._closed.is_set():
             try:
                 buffer = self._camera.try_fetch(timeout=ASKED_EVERY_S)
             except Exception as error:
-                raise DeviceError(f"The camera {self.name} can no longer be read ({_said(error)}).") from error
+                raise DeviceError(f"The camera {self.name} can no longer be read ({error_words(error)}).") from error
             if buffer is not None:
                 return buffer
             if monotonic() - silent_since_s > SILENT_S:
@@ -193,39 +192,6 @@ class GenicamFrames:
                 act()
             except Exception:
                 continue
-
-
-def control_list(nodes: Any) -> tuple[CameraControl, ...]:
-    """What a camera's features let be changed; a feature that is locked now states no value or no limit.
-
-    Parameters
-    ----------
-    nodes : GenApi's map of nodes
-        Of the camera.
-    """
-    found = []
-    for name, (node, factor, unit) in CONTROLS.items():
-        value = _value(nodes, node)
-        if value is None:
-            continue
-        least, greatest = (_limit(nodes, node, end) for end in ("min", "max"))
-        found.append(
-            CameraControl(
-                name,
-                float(value) / factor,
-                unit,
-                None if least is None else least / factor,
-                None if greatest is None else greatest / factor,
-            )
-        )
-    return tuple(found)
-
-
-def _limit(nodes: Any, node: str, end: str) -> float | None:
-    try:
-        return float(getattr(getattr(nodes, node), end))
-    except Exception:  # the camera does not tell it now
-        return None
 
 
 def levels(data: NDArray[np.generic], size: tuple[int, int]) -> Pixels:
@@ -253,7 +219,9 @@ def _connected(name: str) -> tuple[Any, Any]:
         found = [str(each.serial_number) for each in harvester.device_info_list]
     except Exception as error:
         harvester.reset()
-        raise DeviceError(f"{file} must be a GenTL producer, but cannot be used as one ({_said(error)}).") from error
+        raise DeviceError(
+            f"{file} must be a GenTL producer, but cannot be used as one ({error_words(error)})."
+        ) from error
     if not found or (serial and serial not in found):
         harvester.reset()
         which = f"with the serial number {serial} " if serial else ""
@@ -264,62 +232,13 @@ def _connected(name: str) -> tuple[Any, Any]:
     except Exception as error:
         harvester.reset()
         raise DeviceError(
-            f"The camera {name} cannot be opened ({_said(error)}): close the other program that uses it."
+            f"The camera {name} cannot be opened ({error_words(error)}): close the other program that uses it."
         ) from error
 
 
-def _ask(nodes: Any, wish: Wish) -> tuple[str, ...]:
-    """Request settings and a grey format; return a sentence for each one that the camera refuses."""
-    asked: dict[str, Any] = {}
-    if _value(nodes, "PixelFormat") not in MONO:
-        asked["PixelFormat"] = next((each for each in MONO if each in _choices(nodes, "PixelFormat")), None)
-    if wish.size_px is not None:
-        asked["Width"], asked["Height"] = wish.size_px
-    if wish.rate_hz is not None:
-        asked["AcquisitionFrameRateEnable"], asked["AcquisitionFrameRate"] = True, float(wish.rate_hz)
-    for name, (node, factor) in NODES.items():
-        value = getattr(wish.camera, name)
-        if value is not None:
-            asked[node] = factor * value
-    notes = []
-    for node, value in asked.items():
-        try:
-            if value is not None:
-                getattr(nodes, node).value = value
-        except Exception as error:  # not there, not now, beyond its range: each producer has its own class
-            if node != "AcquisitionFrameRateEnable":  # many cameras have no such switch, and need none
-                notes.append(f"The camera was asked for {node} = {value:g}, and did not take it ({_said(error)}).")
-            continue
-    return tuple(notes)
-
-
-def _settings(nodes: Any) -> Mapping[str, str]:
-    units = {"AcquisitionFrameRate": "Hz", "ExposureTime": "us", "Gain": "dB", "PixelFormat": ""}
-    found = {node: _value(nodes, node) for node in units}
-    return {node: f"{value} {units[node]}".strip() for node, value in found.items() if value is not None}
-
-
-def _value(nodes: Any, node: str) -> Any:
-    try:
-        return getattr(nodes, node).value
-    except Exception:  # the camera has no such feature, or does not tell it now
-        return None
-
-
-def _choices(nodes: Any, node: str) -> tuple[str, ...]:
-    try:
-        return tuple(getattr(nodes, node).symbolics)
-    except Exception:
-        return ()
-
-
 def _own_time_s(buffer: Any) -> float | None:
-    """Time of the exposure by the camera's own clock (s); None if the camera states none."""
+    """Time of the exposure (s) by the camera's own clock; None if the camera does not state it."""
     try:
         return 1e-9 * float(buffer.timestamp_ns)
     except Exception:
         return None
-
-
-def _said(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". :")

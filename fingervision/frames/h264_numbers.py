@@ -59,7 +59,7 @@ class _Sequence:
 
 
 class H264Numbers:
-    """Reads slice headers (ITU-T H.264, 7.3.3); stores the parameter sets to which they refer.
+    """Reader of slice headers (ITU-T H.264, 7.3.3), which stores the parameter sets to which they refer.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class H264Numbers:
                 self._learn(unit)
 
     def of(self, packet: bytes) -> CodedPicture | None:
-        """Read the slice header in a packet; return None if the packet contains no readable picture."""
+        """Read the first slice header in a packet; return None if the packet contains no readable picture."""
         recovers_after = None
         try:
             units = _after_lengths(packet, self._length_bytes) if self._length_bytes else _between_start_codes(packet)
@@ -131,12 +131,12 @@ class H264Numbers:
 
 
 def _bits(unit: bytes) -> BitReader:
-    """Bits of a unit after its first byte, without the emulation prevention bytes (7.3.1)."""
+    """Bits of an H.264 unit after its first byte, without the emulation prevention bytes (ITU-T H.264, 7.3.1)."""
     return BitReader(unit[1 : 1 + HEADER_BYTES].replace(b"\0\0\3", b"\0\0"))
 
 
 def _sequence(bits: BitReader) -> tuple[int, _Sequence]:
-    """Read the sequence parameters (7.3.2.1.1) up to the last one needed."""
+    """Read the sequence parameters (ITU-T H.264, 7.3.2.1.1) as far as they are needed."""
     profile = bits.take(8)
     bits.take(16)
     name = bits.golomb()

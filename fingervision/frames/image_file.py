@@ -77,7 +77,7 @@ def read_image(file: Path) -> Pixels:
 
 
 def _stated_size_px(content: bytes) -> tuple[int, int]:
-    """Width and height stated by a PNG or JPEG, read before memory is reserved; (0, 0) for other formats."""
+    """Width and height that a PNG or JPEG states, read before memory is reserved; (0, 0) for other formats."""
     if content.startswith(PNG_SIGNATURE) and len(content) >= 24:
         width_px, height_px = struct.unpack_from(">II", content, 16)
         return width_px, height_px
@@ -92,7 +92,7 @@ def _stated_size_px(content: bytes) -> tuple[int, int]:
 
 
 def _decoded(content: bytes) -> NDArray[Any] | None:
-    """Levels in OpenCV's channel order (blue first); None if the content cannot be decoded."""
+    """Decoded levels in OpenCV's channel order (blue first); None if the content cannot be decoded."""
     try:
         return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:

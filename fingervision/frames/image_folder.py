@@ -1,4 +1,4 @@
-"""Folders and glob patterns of images, in natural order, with times if these are given."""
+"""Folders and glob patterns of images, in natural order, with times if a table states these."""
 
 import glob
 import re
@@ -12,6 +12,9 @@ from fingervision.domain.status import Status
 from fingervision.frames.image_file import IMAGE_SUFFIXES, LOSSY_SUFFIXES, UnreadableImageError, read_image
 from fingervision.frames.image_times import TIMES_FILE, times_of
 from fingervision.frames.source import Description, Wish
+
+# From a picture in eleven days to the fastest cameras; what lies beyond is a slip, and gives times without meaning.
+LEAST_HZ, GREATEST_HZ = 1e-6, 1e7
 
 
 def accepts(name: str) -> bool:
@@ -55,6 +58,11 @@ class ImageFolder:
     def __post_init__(self) -> None:
         if self.rate_hz is not None and not 0.0 < self.rate_hz < float("inf"):
             raise UsageError(f"--rate-hz must be positive, but is {self.rate_hz:g}.")
+        if self.rate_hz is not None and not LEAST_HZ <= self.rate_hz <= GREATEST_HZ:
+            raise UsageError(
+                f"--rate-hz must be between {LEAST_HZ:g} and {GREATEST_HZ:g} images per second, but is "
+                f"{self.rate_hz:g}."
+            )
         files = _files(self.name)
         times_s = times_of(files)
         if times_s is not None and self.rate_hz is not None:
@@ -145,7 +153,7 @@ def _natural(file: Path) -> tuple[tuple[int, int, str], ...]:
 
 
 def _first_readable(name: str, files: tuple[Path, ...]) -> tuple[int, int]:
-    """Height and width of the first readable image, which are those of the recording."""
+    """Height and width of the first readable image, which all images of the recording must have."""
     first_words = ""
     for file in files:
         try:

@@ -53,7 +53,7 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
 
 
 def _rows(table: Path) -> list[tuple[int, list[str]]]:
-    """Rows of the table with their line numbers, without comments and empty lines."""
+    """Rows of the table with their line numbers; comments and empty lines are omitted."""
     try:
         lines = table.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -1,10 +1,11 @@
-"""Check the clusters of a Matroska file that have a checksum, for codecs that have none.
+"""Verify the checksums of a Matroska file's clusters, for codecs that cannot detect damage themselves.
 
-The arithmetic decoders of VP8 and VP9 give a picture for any bytes: a flipped bit in a packet leaves no error, and a
-finger stands where it was a frame ago. The container may help: a cluster whose first element is a CRC-32 states the
-checksum of all that follows in it (FFmpeg writes it into `.mkv`, not into `.webm`). If it does not fit, every picture
-of the cluster is doubtful, and what hangs on them. Codecs that tell their damage by themselves are not so judged: they
-lose a picture, where this loses a cluster.
+The arithmetic decoders of VP8 and VP9 give a picture for any bytes: after a flipped bit there is no error message, and
+a finger may be shown at its position in an earlier frame. The container may help: a cluster whose first element is a
+CRC-32 states the checksum of all following bytes (FFmpeg writes it into `.mkv`, not into `.webm`). If the checksum does
+not fit, every picture of the cluster counts as damaged, and every later picture that depends on one of them. Codecs
+that detect damage themselves are not checked in this way, because they lose a single picture where this check loses a
+cluster.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 11.3.1 (CRC-32: of ISO 3309, little-endian).
 """
@@ -25,7 +26,7 @@ BROKEN = "The checksum of the part of the file that it stands in (a Matroska clu
 
 
 class ClusterChecksums:
-    """The clusters of a file whose checksums fit.
+    """The clusters of a file, each with the result of its checksum.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class ClusterChecksums:
             return
 
     def is_broken(self, position: int | None) -> bool:
-        """Whether the packet at this position stands in a cluster whose checksum is wrong or gone."""
+        """Whether the packet at a given position lies in a cluster whose checksum is wrong or missing."""
         if not self.are_stated or position is None:
             return False
         at = bisect_right(self._sound, (position + 1, 0)) - 1
@@ -68,7 +69,7 @@ class ClusterChecksums:
 
 
 def _stated(content: mmap.mmap, at: int) -> int | None:
-    """Checksum that stands at the beginning of a cluster; None where there is none."""
+    """Checksum at the beginning of a cluster; None if the cluster has no checksum."""
     first = element(content, at)
     if first is None or first.name != CHECKSUM or first.end - first.begin != CHECKSUM_BYTES:
         return None

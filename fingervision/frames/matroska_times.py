@@ -2,8 +2,8 @@
 
 A cluster states one time, relative to which the times of its blocks are given, so that one flipped bit shifts seconds
 of frames forward or back. The file's index (cues) repeats the times of the key frames: a cluster that contains none of
-the times stated by its cues has a wrong time. Without cues, clusters must follow one another in time: of two that
-overlap, neither is trusted unless a cue confirms it, and the last cluster must lie within the stated duration.
+the times stated by its cues has a wrong time. Without cues, clusters must follow one another in time: if two overlap,
+neither is trusted unless a cue confirms it, and the last cluster must lie within the stated duration.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters), 5.1.5 (cues).
 """
@@ -35,7 +35,7 @@ class _Cluster:
 
 
 class ClusterTimes:
-    """Finds the clusters of a file whose times are not trustworthy.
+    """The clusters of a file, each with the result of checking its time.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class ClusterTimes:
         self._doubtful = _doubtful(clusters, cues, duration)
 
     def is_doubtful(self, position: int | None) -> bool:
-        """Whether the packet at this position has an untrustworthy time."""
+        """Whether the packet at a given position has an untrustworthy time."""
         at = -1 if position is None else bisect_right(self._begins, position) - 1
         return at >= 0 and self._doubtful[at]
 

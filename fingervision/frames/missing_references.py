@@ -5,16 +5,16 @@ H.264 numbers its pictures (see `reference_chain`), HEVC names the reference pic
 are added to an older one, and a moving finger is shown in an old position. Four criteria are used, all from data that
 are read before decoding:
 
-* AV1 numbers the pictures in the order in which they are shown. An omitted number means a missing picture; consecutive
-  numbers prove that none is missing, whatever the times are.
-* MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing picture is visible in it;
-  if the bit fits, an odd number of missing times was never coded.
-* In MPEG-4 part 2 a B picture lies between two others in time. A B picture presented after all pictures received so far
-  depends on a missing one.
+* AV1 numbers the pictures in the order in which they are shown. If a number is omitted, a picture is missing;
+  consecutive numbers prove that none is missing, whatever the times are.
+* MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing picture is visible in this
+  bit; if the bit fits although a time is missing, an odd number of pictures was never coded.
+* In MPEG-4 part 2 a B picture lies between two others in time. A B picture that is presented after all pictures
+  received so far depends on a missing picture.
 * Times. In a file with equidistant times (coded at a rate, instead of as a camera delivered the frames), a hole of
   whole steps is a missing picture. If times are irregular, or holes are frequent, the camera or the coder omitted
-  pictures, and a hole means nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay undetected. Where every
-  n-th picture is a key frame and n packets lie between two of them, none is missing: the camera paused.
+  pictures, and a hole means nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay undetected. If every
+  n-th picture is a key frame and n packets lie between two key frames, no picture is missing: the camera paused.
 
 AVI is not judged by times, because it counts frames and marks omitted ones by an empty chunk.
 """
@@ -123,7 +123,7 @@ def _by_number(packets: list[CodedTime]) -> dict[int, str]:
 
 
 def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
-    """Check MPEG-4's bit, if it toggles with every P picture and starts with the same value after I pictures."""
+    """Check MPEG-4's rounding bit, if every P picture toggles it and it has the same value after every I picture."""
     needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
     pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]
     inner = [(number, packet.turn != before.turn) for number, before, packet in pairs if before.turn is not None]
@@ -180,10 +180,10 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
 
 
 def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
-    """Whether as many packets as usual lie between the key frames around a hole, so that the camera paused.
+    """Whether as many packets as usual lie between the key frames around a hole, which means that the camera paused.
 
     A coder that makes every n-th picture a key frame counts the pictures that it coded. If pictures had been lost,
-    there would be fewer between the key frames, unless a multiple of n was lost.
+    there would be fewer packets between the key frames, unless a multiple of n was lost.
     """
     lengths = [after - before for before, after in pairwise(key_numbers)]
     behind = bisect_right(key_numbers, number)
@@ -195,7 +195,7 @@ def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
 
 
 def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -> bool:
-    """Whether the bit is in use, and the next P picture toggles it as if no picture were missing."""
+    """Whether MPEG-4's rounding bit is in use, and the next P picture toggles it as if no picture were missing."""
     before = next((each for each in reversed(packets[:number]) if each.is_needed), None)
     following = next((k for k in range(number, len(packets)) if packets[k].is_needed), None)
     if before is None or before.turn is None or following is None or packets[following].turn is None:
@@ -204,14 +204,14 @@ def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -
 
 
 def _key_is_due(keys: list[int], at: int, missing_ticks: float) -> bool:
-    """Whether a key frame, which resets the bit, may be missing after a time."""
+    """Whether a key frame, which resets MPEG-4's rounding bit, may be missing after a given time."""
     before = bisect_right(keys, at)
     every = min((b - a for a, b in pairwise(keys)), default=None)
     return every is None or before == 0 or at + missing_ticks + TICKS >= keys[before - 1] + every
 
 
 def _sticks_out(steps: list[int], k: int) -> bool:
-    """Whether a step is longer than the usual steps before and after it, unlike at a change of rate."""
+    """Whether a time step is longer than the usual steps before and after it (at a change of rate, it is not)."""
     before, behind = steps[max(0, k - BESIDE) : k], steps[k + 1 : k + 1 + BESIDE]
     return all(steps[k] > median(some) + TICKS for some in (before, behind) if some)
 
@@ -221,7 +221,7 @@ def _is_whole(step: int, usual: float) -> bool:
 
 
 def _usual(steps: list[int]) -> float | None:
-    """Step of equidistant times, in ticks; None if they are not equidistant."""
+    """Time step of equidistant times (ticks); None if the times are not equidistant."""
     if not steps:
         return None
     middle = sorted(steps)[len(steps) // 2]

@@ -13,7 +13,7 @@ INNER = frozenset({b"moov", b"trak", b"mdia", b"minf", b"stbl", b"edts"})
 
 
 def boxes(content: mmap.mmap, begin: int, end: int) -> Iterator[tuple[bytes, int, int]]:
-    """Boxes with the position of their content, those inside others behind them."""
+    """List the boxes of an MP4 file with the positions of their contents; inner boxes follow the outer box."""
     while begin + HEAD_BYTES <= end:
         size, name = struct.unpack_from(">I4s", content, begin)
         inside = begin + HEAD_BYTES
@@ -30,14 +30,14 @@ def boxes(content: mmap.mmap, begin: int, end: int) -> Iterator[tuple[bytes, int
 
 
 def numbers(content: mmap.mmap, begin: int, end: int) -> tuple[int, int]:
-    """Ticks a second, and duration, of `mvhd` or `mdhd`."""
+    """Ticks per second, and duration in ticks, as stated in a box `mvhd` or `mdhd`."""
     form = ">4x8xII" if content[begin] == 0 else ">4x16xIQ"
     scale, ticks = struct.unpack_from(form, content[begin:end])
     return scale, ticks
 
 
 def rows(content: mmap.mmap, place: tuple[int, int], form: str) -> Iterator[tuple[int, int]]:
-    """Rows of a table that announces their number.
+    """Rows of a table that begins with the number of its rows.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def rows(content: mmap.mmap, place: tuple[int, int], form: str) -> Iterator[tupl
 
 
 def edits(content: mmap.mmap, place: tuple[int, int]) -> Iterator[tuple[int, int]]:
-    """Durations of an edit list, with the ticks at which they begin; -1 shows nothing.
+    """Durations in an edit list, with the ticks at which they begin; -1 means that nothing is shown.
 
     Raises
     ------

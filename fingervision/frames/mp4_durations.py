@@ -1,15 +1,15 @@
-"""Check the times of an MP4 file's table of contents, because one damaged number there moves all of its frames.
+"""Check the times in an MP4 file's table of contents, because one damaged number in it shifts all frames.
 
-The file states how long its pictures take three times: as the sum of their durations (`stts`), in the head of the track
-(`mdhd`), both in the track's own ticks, and, in the ticks of the whole film, in the edit list (`elst`), which also says
-from which picture on they are shown. A table that cannot be read to its end leaves the rest unread, and then the
-pictures begin where the coder began, too late by its reordering. In a sound file
+The file states the duration of its pictures three times: as the sum of the pictures' durations (`stts`), in the head of
+the track (`mdhd`), and in the edit list (`elst`), which also states the first picture to be shown. The first two are in
+the track's own ticks, the third in those of the whole film. If FFmpeg cannot read a table to its end, it leaves the
+rest unread, and the times are too late by the reordering delay of the encoder. The times are accepted if
 
-* all tables of a track that FFmpeg needs can be read to their ends, and tell of the same number of pictures;
-* what is shown is not longer than what there is;
-* if it is shorter, somebody cut the film, and no single damaged byte of the stated durations explains the difference.
+* all tables of a track that FFmpeg needs can be read to their ends, and state the same number of pictures;
+* the shown duration is not longer than that of all pictures;
+* a shorter shown duration is not explained by a single damaged byte, so that somebody cut the film.
 
-Files in fragments state their times with each fragment, and are not judged.
+Files in fragments state their times with each fragment, and are not checked.
 
 Source: ISO/IEC 14496-12, 8.4.2 (`mdhd`), 8.6 (`stts`, `ctts`, `elst`), 8.7.3 (`stsz`).
 """
@@ -25,6 +25,7 @@ from pathlib import Path
 import av
 
 from fingervision.frames.mp4_boxes import boxes, edits, numbers, rows
+from fingervision.frames.open_container import open_container
 from fingervision.frames.spoken_damage import listening
 
 GIVES_UP = "error reading header"
@@ -43,7 +44,7 @@ NO_SCALE = (
 
 @dataclass(frozen=True, slots=True)
 class _Track:
-    """What the table of contents states of one video track.
+    """Times and durations that the table of contents states for one video track.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def states_another_duration(path: Path) -> bool:
 
 def _is_unread(path: Path) -> bool:
     """Whether FFmpeg gives up within the table of contents, and goes on with the half of it."""
-    with listening("") as heard, suppress(av.FFmpegError, IndexError), av.open(f"file:{path}"):
+    with listening("") as heard, suppress(av.FFmpegError, IndexError), open_container(path):
         return any(GIVES_UP in words for _, _, words in heard.log)
     return False
 
@@ -118,6 +119,10 @@ def _contradicts(track: _Track, film_scale: int) -> bool:
     total = sum(count * ticks for count, ticks in track.steps)
     # Programs state the sum of the durations, or from the first presentation to the last; some a picture more.
     more = {total + ticks for _, ticks in track.steps}
+    last_count, last_ticks = track.steps[-1]
+    if last_count == 1:
+        # How long the last picture lasts moves none, and programs that copy a film state it as they like.
+        more |= {one - last_ticks + ticks for one in (*more, total) for _, ticks in track.steps}
     departures = [abs(track.ticks - sound) for sound in (total, track.presented, *more)]
     if min(departures) and (_is_explained(track) or (min(departures) > longest and _is_another(track.ticks, total))):
         return True
@@ -138,7 +143,7 @@ def _contradicts(track: _Track, film_scale: int) -> bool:
 
 
 def _is_explained(track: _Track) -> bool:
-    """Whether one byte that is another, in the durations of a constant rate or in the whole, makes them agree."""
+    """Whether one wrong byte, in the durations of a constant rate or in the total, would make the durations agree."""
     if len(track.steps) > MOST_ENTRIES:
         return False
     total = sum(count * step for count, step in track.steps)
@@ -150,19 +155,19 @@ def _is_explained(track: _Track) -> bool:
 
 
 def _is_another(ticks: int, total: int) -> bool:
-    """Whether one is more than twice the other."""
+    """Whether one of two numbers is more than twice the other."""
     return ticks > 2 * total or total > 2 * ticks
 
 
 def _neighbours(number: int) -> Iterator[int]:
-    """Numbers of four bytes, of which one is another."""
+    """All numbers that differ from a four-byte number in one byte."""
     for shift in (0, 8, 16, 24):
         rest = number & ~(0xFF << shift)
         yield from (rest | value << shift for value in range(BYTE_VALUES))
 
 
 def _coarse_neighbours(number: int) -> Iterator[int]:
-    """As above, but of the last byte one bit only: a cut of less than two per cent always has such a neighbour."""
+    """As `_neighbours`, but with one wrong bit in the last byte: a cut of less than 2 % always has such a neighbour."""
     yield from (other for other in _neighbours(number) if other & 0xFF == number & 0xFF)
     yield from (number ^ (1 << bit) for bit in range(8))
 
@@ -204,7 +209,7 @@ def _track(content: mmap.mmap, inner: dict[bytes, tuple[int, int]]) -> _Track | 
 
 
 def _presented(steps: tuple[tuple[int, int], ...], offsets: tuple[tuple[int, int], ...]) -> tuple[int, int]:
-    """First tick of presentation, and the end of the last."""
+    """First tick at which a picture is presented, and the end of the last picture (ticks)."""
     if sum(count for count, _ in steps) > MOST_PICTURES:
         return 0, sum(count * ticks for count, ticks in steps)
     durations = [ticks for count, ticks in steps for _ in range(count)]

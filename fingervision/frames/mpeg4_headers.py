@@ -1,7 +1,7 @@
 """Data that MPEG-4 part 2 stores in front of every picture: its type, and a bit that encoders toggle.
 
 Half-pixel values are rounded up in one P picture and down in the next, so that rounding errors do not accumulate
-(`vop_rounding_type`). Encoders toggle the bit with every P picture and reset it at each I picture, so that it counts
+(`vop_rounding_type`). Encoders toggle this bit with every P picture and reset it at each I picture, so that it counts
 modulo two and reveals one missing picture.
 
 Source: ISO/IEC 14496-2, 6.2.3 (video object layer), 6.2.5 (video object plane), 6.3.5.
@@ -23,7 +23,7 @@ MOST_SECONDS = 3600
 
 
 class Mpeg4Kind(Enum):
-    """Type of a picture by its dependence on others (`vop_coding_type`)."""
+    """Type of an MPEG-4 picture by its dependence on other pictures (`vop_coding_type`)."""
 
     I_PICTURE = 0
     P_PICTURE = 1
@@ -33,7 +33,7 @@ class Mpeg4Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Mpeg4Picture:
-    """Content of a picture's header.
+    """Content of the header of an MPEG-4 picture.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Mpeg4Picture:
 
 
 class Mpeg4Headers:
-    """Reads the headers of pictures; stores the format of these headers from the layer's header.
+    """Reader of the headers of MPEG-4 pictures, which stores the header format from the layer's header.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Mpeg4Headers:
         self._units(extradata or b"")
 
     def of(self, packet: bytes) -> Mpeg4Picture | None:
-        """Read the first picture header of a packet; return None if there is no readable one."""
+        """Read the first picture header of a packet; return None if the packet contains no readable header."""
         return self._units(packet)
 
     def _units(self, content: bytes) -> Mpeg4Picture | None:

@@ -64,8 +64,8 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
     """
     if wish.rate_hz is not None or wish.size_px is not None:
         raise UsageError(
-            "--size and --rate-hz are for cameras of this machine, but "
-            f"{without_password(name)} decides itself: set them there."
+            "--size and --rate-hz are for cameras of this computer, but "
+            f"{without_password(name)} determines its own: set them in that camera."
         )
     return NetworkStream(name)
 
@@ -90,7 +90,9 @@ class NetworkStream:
     def __init__(self, name: str) -> None:
         self.name = without_password(name)
         try:
-            self._container = av.open(name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S))
+            self._container = av.open(
+                name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S), metadata_errors="replace"
+            )
         except (av.FFmpegError, OSError, ValueError) as error:
             raise DeviceError(
                 f"The stream {self.name} must answer with a video, but does not ({_reason(error)}): check the address, "
@@ -219,7 +221,7 @@ class NetworkStream:
         return OwnPacket(packet, shown_s, decode_s, packet.is_keyframe)
 
     def _time_s(self, tick: int | None, arrived_s: float, before_s: float | None) -> float:
-        """Convert a tick to the source's clock.
+        """Convert a tick of the stream to seconds of the source's clock.
 
         A frame without a tick is placed one tick after the previous frame, which keeps the order.
         """

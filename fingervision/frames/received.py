@@ -81,16 +81,16 @@ class LiveSource(Protocol):
 
     @property
     def has_own_clock(self) -> bool:
-        """Whether times are those of the source; otherwise they are from the computer's monotonic clock on arrival."""
+        """Whether times are from the source's own clock; if not, from the computer's monotonic clock on arrival."""
         ...
 
     @property
     def template(self) -> av.VideoStream | None:
-        """The coded stream to which the packets belong; None if there is none."""
+        """The coded stream to which the packets belong; None if the source has no coded packets."""
         ...
 
     def received(self) -> Iterator[Received]:
-        """Yield the frames as they arrive; a source that is a recording ends at its end.
+        """Yield the frames as they arrive; if the source is a recording, the iteration ends with the recording.
 
         Raises
         ------

@@ -8,6 +8,7 @@ import av
 from fingervision.domain.frame import Coding, Frame
 from fingervision.frames import image_folder, video_file
 from fingervision.frames.luma import luma
+from fingervision.frames.open_container import open_container
 from fingervision.frames.quantiser_steps import EXPORTED
 from fingervision.frames.video_file import upright, upright_steps
 
@@ -61,7 +62,7 @@ class VideoSeeking:
 
     def _found(self, index: int, time_s: float) -> Frame | None:
         if self._container is None:
-            self._container = av.open(f"file:{self._name}")
+            self._container = open_container(self._name)
             self._container.streams.video[0].codec_context.options = EXPORTED
         stream = self._container.streams.video[0]
         if stream.time_base is None:

@@ -38,7 +38,8 @@ def open_frames(name: str, wish: Wish) -> "SimulatedGripper":
     UsageError
         If the rate or size is not that of a camera.
     """
-    return SimulatedGripper(wish.size_px or USUAL_SIZE_PX, wish.rate_hz or USUAL_RATE_HZ)
+    rate_hz = USUAL_RATE_HZ if wish.rate_hz is None else wish.rate_hz
+    return SimulatedGripper(wish.size_px or USUAL_SIZE_PX, rate_hz)
 
 
 def true_gap_mm(index: int) -> float:

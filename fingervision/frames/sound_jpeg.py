@@ -20,7 +20,8 @@ PICTURES_TO_LEARN = 16
 class SoundJpeg:
     """Checks the pictures of one Motion JPEG stream for missing or surplus data.
 
-    A fault is reported only if most pictures of the stream have none: otherwise the camera itself writes such pictures.
+    A fault is reported only if most pictures of the stream have none; if most have a fault, the camera itself writes
+    such pictures.
 
     Parameters
     ----------
@@ -33,7 +34,7 @@ class SoundJpeg:
         self._sound = self._unsound = 0
 
     def learn(self, pictures: Iterable[bytes]) -> None:
-        """Check some pictures in advance, to learn which properties are usual for the stream."""
+        """Examine some pictures in advance, to learn which properties are usual for the stream."""
         if self._is_one:
             for picture, _ in zip(pictures, range(PICTURES_TO_LEARN), strict=False):
                 self._count(not _fault(picture))

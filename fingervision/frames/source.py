@@ -140,12 +140,12 @@ class Wish:
 
 
 class SourceKind(Protocol):
-    """A module, or another object, that opens sources by name."""
+    """Protocol of a kind of frame source: a module, or another object, that opens sources by name."""
 
     def accepts(self, name: str) -> bool:
         """Whether a name belongs to this kind of source.
 
-        This is called for every recording, so that it must be fast and must not open anything.
+        This function is called for every recording, so that it must be fast and must not open anything.
         """
         ...
 
@@ -208,7 +208,7 @@ def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
         raise PluginShapeError(f"{who} could not open {name} ({said}): {entry.origin.remedy}.") from error
     if not (described and hasattr(source, "__iter__")):
         raise PluginShapeError(
-            f"{who} must give a frame source (an object with a Description, over which one can iterate), but gave a "
+            f"{who} must return a frame source (an iterable object with a Description), but returned a "
             f"{type(source).__name__} without: {entry.origin.remedy}."
         )
     return source

@@ -16,7 +16,7 @@ HELPERS = ("swscaler", "swresampler", "")
 
 @dataclass(slots=True)
 class Heard:
-    """Errors logged since the last request.
+    """Errors that FFmpeg has logged since they were last requested.
 
     Decoders replace a damaged part by the previous picture, and container readers skip to the next place that looks
     undamaged. Such damage is only logged; most of it is never returned to the caller as an error.
@@ -34,7 +34,7 @@ class Heard:
     log: list[tuple[int, str, str]] = field(default_factory=list)
 
     def of_picture(self) -> str:
-        """Return the decoder's first message and delete its messages; empty if there is none."""
+        """Return the first message of the decoder and delete all of its messages; empty if there is none."""
         said = [
             words.strip() for level, speaker, words in self.log if speaker == self.decoder and level <= av.logging.ERROR
         ]

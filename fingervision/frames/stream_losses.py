@@ -10,7 +10,7 @@ LOST_REFERENCE = "A picture that it hangs on is missing: the numbers of the code
 
 
 class StreamLosses:
-    """Follows the packets of a stream, and reports missing ones to the damage trail.
+    """Checks the packets of a stream in order, and reports missing ones to the object that marks damaged pictures.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class StreamLosses:
         self._chain = ReferenceChain(codec.name, codec.extradata)
 
     def before(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> str:
-        """Report missing packets before this one to the damage trail.
+        """Report the packets that are missing before this one, so that damaged pictures can be marked.
 
         Return a sentence if whole frames are missing from a series with equidistant times.
         """
@@ -39,7 +39,7 @@ class StreamLosses:
         return MISSING if leaps else ""
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:
-        """Report damage of the last packet to the damage trail, after it entered the decoder."""
+        """Report damage of the packet that last entered the decoder, so that damaged pictures can be marked."""
         self._transport.behind(packet, trail)
         if self._chain.recovered_over is not None:
             trail.recovers(self._chain.recovered_over)

@@ -19,10 +19,10 @@ OUT_OF_ROW = "Its time does not fit between those of the frames around it, which
 def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
     """Yield pictures in order of presentation, with lost frames in place of those whose time is impossible.
 
-    Pictures leave a decoder in the order of presentation. If a time is earlier than the one before, one of the two is
-    wrong, but it is not known which. Both pictures count as lost, and so do all that follow until times are later than
-    both. A single time that deviates from an otherwise regular series is itself wrong. A repeated time is left
-    unchanged, because it means a duplicate frame.
+    Pictures leave a decoder in the order of presentation. If a time is earlier than the time before it, one of the two
+    is wrong, but it is not known which. Both pictures count as lost, and so do all following pictures until times are
+    later than both. A single time that deviates from an otherwise regular series is itself wrong. A repeated time is
+    left unchanged, because it means a duplicate frame.
 
     Parameters
     ----------
@@ -68,8 +68,8 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
 class EvenRow:
     """Detects missing frames in a regular series of times, in decoding order.
 
-    It is used for broadcast formats (MPEG-TS): their encoders keep a constant rate, so that a missing frame was lost in
-    transmission.
+    The class is used for broadcast formats (MPEG-TS): their encoders keep a constant rate, so that a missing frame was
+    lost in transmission.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class EvenRow:
 
 
 def _usual(steps: "deque[int]") -> float | None:
-    """Step of a regular series of times; None if it is irregular."""
+    """Time step of a regular series of times; None if the series is irregular."""
     if len(steps) < EVEN_STEPS:
         return None
     usual = sum(steps) / len(steps)

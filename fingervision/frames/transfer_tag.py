@@ -8,6 +8,7 @@ import av
 
 from calib.camera_response import STUDIO
 from fingervision.frames.image_file import JPEG_START, PNG_SIGNATURE
+from fingervision.frames.open_container import open_container
 
 # Transfer characteristics of ITU-T H.273, table 3, by what `calib.camera_response` calls them.
 VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: "bt709", 16: "pq", 18: "hlg"}
@@ -22,7 +23,7 @@ HEAD_BYTES = 1 << 16
 
 
 def transfer_tag(files: tuple[Path, ...]) -> str | None:
-    """Name of the standard camera response stated in the first file; None if none is stated.
+    """Name of the standard camera response that the first file states; None if no response is stated.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
     if len(files) > 1:
         return None
     try:
-        with av.open(str(files[0])) as container:
+        with open_container(files[0]) as container:
             video = next(iter(container.streams.video), None)
             return None if video is None else _of_video(video.codec_context)
     except (av.FFmpegError, OSError, ValueError):
@@ -51,9 +52,9 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
 
 
 def _of_video(codec: av.VideoCodecContext) -> str | None:
-    """Curve that a video states, with `_studio` where it states that black and white lie within the stored levels.
+    """Transfer curve that a video states, with `_studio` appended if black and white lie within the stored levels.
 
-    A range is stored with luma only; a video that states none is taken as full range.
+    Only luma is stored with such a range; a video that states no range is assumed to use the full range.
     """
     name = VIDEO_TAGS.get(int(codec.color_trc))
     is_luma = (codec.pix_fmt or "").startswith(LUMA_FORMATS)

@@ -13,7 +13,7 @@ EVEN_CODECS = frozenset({"mpeg1video", "mpeg2video"})
 
 
 class TransportLosses:
-    """Follows the packets of a transport stream, or of a codec with constant rate; for others it reports nothing.
+    """Checks the packets of a transport stream, or of a codec with constant rate; for others it reports nothing.
 
     Parameters
     ----------
@@ -32,11 +32,11 @@ class TransportLosses:
         self._was_corrupt = False
 
     def leaps(self, packet: "av.Packet[av.VideoStream]") -> bool:
-        """Whether frames are missing before a packet."""
+        """Whether frames are missing before a given packet."""
         return self._is_even and packet.dts is not None and self._row.leaps(packet.dts)
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:
-        """Report the packet that last entered the decoder as damaged, if it is incomplete without being marked so."""
+        """Report an incomplete packet as damaged after it entered the decoder, if the stream does not mark it so."""
         # Pictures are cut out of the stream after its damage was marked: the mark may be one too early.
         if self._is_one and (packet.pts is None or self._was_corrupt):
             trail.breaks("It is incomplete.")

@@ -28,7 +28,7 @@ Ioctl = Callable[[int, int, bytes], Any]
 
 
 def ranges(name: str, ioctl: Ioctl | None = None) -> dict[int, tuple[int, int]]:
-    """Least and greatest value of each setting, in the driver's units, by OpenCV's property.
+    """Smallest and largest value of each setting of a camera, in the driver's units, by OpenCV's property.
 
     Parameters
     ----------

@@ -18,10 +18,12 @@ from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
 from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
+from fingervision.frames.open_container import open_container
 from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
 from fingervision.frames.told_times import believable
+from fingervision.frames.unseen_damage import unseen_damage
 
 # FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy, because
 # the stream does not say.
@@ -55,7 +57,7 @@ TAKES_THE_REST = True
 
 
 def accepts(name: str) -> bool:
-    """Whether a name is a file that is not an image."""
+    """Whether a name is that of an existing file which is not an image."""
     path = Path(name)
     return path.is_file() and path.suffix.lower() not in IMAGE_SUFFIXES
 
@@ -150,11 +152,13 @@ class VideoFile:
                 # (libavcodec/h264_slice.c, enable_er): parts of older pictures would stand there, unsaid.
                 stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
+            untrusted = unseen_damage(Path(self.name), stream, container.metadata.get("comment"))
             for tick, found in believable(pictures(container, stream, Path(self.name))):
                 index = next(numbers)
                 time_s = None if tick is None or stream.time_base is None else float(tick * stream.time_base)
-                if isinstance(found, str):
-                    yield LostFrame(index, time_s, Status.DAMAGED, found)
+                if untrusted or isinstance(found, str):
+                    words = found if isinstance(found, str) else untrusted
+                    yield LostFrame(index, time_s, Status.DAMAGED, words)
                     last_tick = tick
                     continue
                 pixels = upright(luma(found), found.rotation)
@@ -169,14 +173,13 @@ class VideoFile:
 
     def _opened(self) -> av.container.InputContainer:
         try:
-            # FFmpeg takes what stands before a colon for a protocol: 12:30:05.mp4 is a file.
-            return av.open(f"file:{self.name}")
+            return open_container(self.name)
         except (av.FFmpegError, OSError) as error:
             raise _not_a_video(self.name, error) from error
 
 
 def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream:
-    """Find the first video stream, and its decoder."""
+    """Find the first video stream of a file, and its decoder."""
     tracks = _tracks(container)
     if not tracks:
         raise DataError(f"{name} must hold a video, but has no video stream: give another file.")

@@ -1,4 +1,4 @@
-"""Settings (TOML keys) that several kinds of gauges have in common, with their limits and the reasons for these."""
+"""Settings (TOML keys) that are the same in several kinds of gauges, with their limits and the reasons for these."""
 
 from dataclasses import dataclass
 from math import radians
@@ -21,7 +21,7 @@ def middle(section: Section) -> tuple[float, float]:
 
 
 def reach(section: Section) -> float:
-    """Read `reach_px`: largest motion of the object between frames; nothing similar may be within this distance."""
+    """Read `reach_px`: how far the object may move from frame to frame; within it, nothing may look like the object."""
     return section.number("reach_px", REACH_PX, low=1.0, high=LARGEST_REACH_PX)
 
 
@@ -36,14 +36,14 @@ def angle(section: Section, key: str, default: float | None = None) -> float:
 
 
 def polarity(section: Section) -> int:
-    """Read `polarity`: +1 rising (lighter along the direction), -1 falling, 0 any."""
+    """Read `polarity` of an edge: +1 rising (lighter along the direction), -1 falling, 0 any."""
     word = section.word("polarity", "any", of=POLARITIES)
     return {"any": 0, "rising": 1, "falling": -1}[word]
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeKeys:
-    """Settings of a gauge that tracks one straight edge.
+    """Settings of a gauge that follows one straight edge.
 
     Parameters
     ----------
@@ -66,5 +66,5 @@ class EdgeKeys:
 
 
 def edge_keys(section: Section, direction: str) -> tuple[tuple[float, float], float, float, float, int]:
-    """Read the values of `EdgeKeys`, in the order of its attributes; `direction` is the key of the direction."""
+    """Read the values of `EdgeKeys` in the order of its attributes; `direction` names the key of the direction."""
     return middle(section), angle(section, direction), length(section), reach(section), polarity(section)

@@ -1,4 +1,4 @@
-"""Draw gauges into a picture: searched zone, result, and name of each."""
+"""Draw gauges into a picture: searched zone, result, and name of each gauge."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Fit the edges near the expected position of a gauge's edge, with reasons to refuse the result."""
+"""Fit the edges near the expected position of a gauge's edge, and give a reason if the result is refused."""
 
 from dataclasses import replace
 from math import cos, hypot, sin
@@ -49,7 +49,7 @@ Floats = NDArray[np.float64]
 def fit_near(
     follower: "EdgeFollower", picture: Picture, chosen: list[StepCandidate], steps: list[StepCandidate]
 ) -> tuple[list[EdgeFound], float] | NotFound:
-    """Fit chosen edges together with all other edges within their window.
+    """Fit chosen edges together with all other edges within their fit windows.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _edge(follower: "EdgeFollower", picture: Picture, fitted: StraightEdges, k: 
 
 
 def _cut_plateau(picture: Picture, levels: Floats) -> int:
-    """Whether much of one side is clipped, so that it may be lighter (+1) or darker (-1) than the scale; 0 if not."""
+    """Whether much of one side of an edge is clipped and may be lighter (+1) or darker (-1) than recorded; 0 if not."""
     middle = 0.5 * (float(levels.min()) + float(levels.max()))
     light = levels > middle
     if np.count_nonzero(levels >= picture.top) > MOST_CLIPPED * np.count_nonzero(light):

@@ -51,19 +51,19 @@ class EdgeFollower:
 
     @property
     def zone(self) -> Mark:
-        """The zone in which the edge is searched."""
+        """The zone of the picture in which the edge is searched."""
         return self.axes.box(self.at_px, self.reach_px * self.times, 0.5 * self.length_px)
 
     def turned_to(self, axes: Axes, at_px: float, slope: float) -> None:
-        """Continue the tracking with other axes, in which the edge has the given position and slope."""
+        """Continue to follow an edge with other axes, in which the edge has the given position and slope."""
         self.axes, self.at_px, self.slope = axes, at_px, slope
 
     def lost(self) -> None:
-        """Widen the search zone for the next frame."""
+        """Widen the search zone of the next frame, because the edge was not found."""
         self.times = min(self.times + 1.0, float(MOST_TIMES)) if self.known is not None else 1.0
 
     def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
-        """The only candidate that may be the edge, together with the other candidates beside it."""
+        """The only candidate that may be the edge, together with the other edges beside it."""
         reach = self.first_reach_px if self.known is None else self.reach_px * self.times
         guard = reach if self.known is None else GUARD * reach
         half = ceil(guard) + BEYOND_PX
@@ -133,5 +133,5 @@ class EdgeFollower:
         return one
 
     def keep(self, found: EdgeFound) -> None:
-        """Store the position for the next frame."""
+        """Store the position of the edge for the next frame."""
         self.known, self.at_px, self.slope, self.times = found, found.position_px, found.slope, 1.0

@@ -36,7 +36,7 @@ class Field:
 
     @property
     def usual(self) -> float | str:
-        """Initial value for a new gauge."""
+        """Initial value of a setting for a new gauge."""
         if self.default is not None:
             return self.default
         if self.choices:
@@ -48,7 +48,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class _Noting(Section):
-    """A table that has every key, and records which keys are requested."""
+    """A table that contains every key, and records which keys are requested."""
 
     noted: dict[str, Field] = field(default_factory=dict)
 

@@ -55,18 +55,18 @@ class Picture:
 
     @property
     def shared_pixels(self) -> float:
-        """Number of neighbouring pixels with a common codec error, which count as one pixel."""
+        """Number of neighbouring pixels with the same codec error, which count as one pixel."""
         return SHARED_PIXELS[self.frame.coding]
 
     @property
     def edge_shared_pixels(self) -> float:
-        """Number of pixels with a common error for edge fits; 1 if `displaced_px` already accounts for the codec."""
+        """Number of pixels with the same error for edge fits; 1 if `displaced_px` already accounts for the codec."""
         return EDGE_SHARED_PIXELS[self.frame.coding] if self.frame.quantiser is None else 1.0
 
     def displaced_px(
         self, place_px: tuple[float, float], half_px: tuple[float, float], inside: float, contrast: float
     ) -> float:
-        """Standard uncertainty of an edge's position from a codec error common to the whole edge (pixels).
+        """Standard uncertainty of an edge's position (px) from a codec error that the whole edge shares.
 
         Parameters
         ----------
@@ -95,7 +95,7 @@ class Picture:
         return (stored.astype(np.float64) if self.light is None else self.light[stored]), (left, top)
 
     def holds(self, x_px: float, y_px: float, width_px: float, height_px: float) -> bool:
-        """Whether a rectangle lies entirely inside the picture."""
+        """Whether the picture contains the whole of a rectangle."""
         width, height = self.size_px
         return x_px >= -0.5 and y_px >= -0.5 and x_px + width_px <= width + 0.5 and y_px + height_px <= height + 0.5
 

@@ -1,4 +1,4 @@
-"""Conversion from the picture to the object plane at any point, with the uncertainty common to all frames."""
+"""Conversion from the picture to the object plane at any point, with the uncertainty shared by all frames."""
 
 from dataclasses import dataclass, field
 from math import cos, hypot, pi, sin, sqrt
@@ -19,7 +19,7 @@ SQUARE_PX, SECTOR_RAD, BASELINE_PX = 32.0, pi / 12.0, 64.0
 
 @dataclass(frozen=True, slots=True)
 class PlaneScale:
-    """A scale with the size of the frames for which it is valid.
+    """A scale (px/mm) with the size of the frames for which it is valid.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class PlaneScale:
 
     @property
     def edge_bias_px(self) -> float:
-        """Width that a light gap between dark edges loses in the picture (pixels)."""
+        """Width (px) that a light gap between dark edges loses in the picture."""
         return self.scale.edge_bias_px
 
     @property
@@ -53,9 +53,9 @@ class PlaneScale:
         return self.scale.flatten(points_px) if isinstance(self.scale, Calibration) else points_px
 
     def relative_u(self, point_px: tuple[float, float], direction_rad: float) -> float:
-        """Relative standard uncertainty of a length at a point, common to all frames; 0 if it is unknown.
+        """Relative standard uncertainty of a length at a point, shared by all frames; 0 if it is unknown.
 
-        It includes scale, plane, tilt, lens and temperature, but not the bias and phase error of edges.
+        This uncertainty includes scale, plane, tilt, lens and temperature, but not the bias and phase error of edges.
         """
         if not isinstance(self.scale, Calibration):
             return 0.0
@@ -77,7 +77,7 @@ class PlaneScale:
         return sqrt(variance / length_mm**2 + of_scale)
 
     def u_edge_px(self, u_response_px: float) -> float:
-        """Standard uncertainty (px) of one edge, common to all frames: half of the bias', phase, camera response."""
+        """Standard uncertainty (px) of one edge that all frames share: half of the bias', phase, camera response."""
         if not isinstance(self.scale, Calibration):
             return 0.0
         return hypot(0.5 * self.scale.u_edge_bias_px, self.u_phase_px, u_response_px)

@@ -29,15 +29,15 @@ class Quantity(Protocol):
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """Points of the picture that define the quantity."""
+        """Points of the picture that define the measured quantity."""
         ...
 
     def in_pixels(self) -> Cell:
-        """The quantity in the picture, in pixels or degrees."""
+        """The value of the quantity in the picture, in pixels or degrees."""
         ...
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """The quantity in the object plane; `flat` are the points corrected for lens and perspective."""
+        """The value of the quantity in the object plane; `flat` are the points corrected for lens and perspective."""
         ...
 
 
@@ -74,7 +74,7 @@ class Position:
         return (self.point_px,)
 
     def in_pixels(self) -> Cell:
-        """Position along the direction, in pixels."""
+        """Position of the point along the direction, in pixels."""
         x, y = self.point_px
         return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
 
@@ -118,7 +118,7 @@ class Distance:
         return (self.first_px, self.second_px)
 
     def in_pixels(self) -> Cell:
-        """Distance between the points, in pixels."""
+        """Distance between the two points, in pixels."""
         (x, y), (to_x, to_y) = self.points_px
         return Cell(hypot(to_x - x, to_y - y), self.u_px, "px")
 
@@ -155,16 +155,16 @@ class Shift:
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """The point in the first frame, and now."""
+        """Positions of the followed point in the first frame and in the present frame."""
         return (self.from_px, self.to_px)
 
     def in_pixels(self) -> Cell:
-        """Displacement along the direction, in pixels."""
+        """Displacement of the point along the direction, in pixels."""
         x, y = self.to_px[0] - self.from_px[0], self.to_px[1] - self.from_px[1]
         return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """Displacement in millimetres; a bias common to both pictures cancels, the phase error does not."""
+        """Displacement in millimetres; a bias common to both pictures cancels, the sub-pixel phase error does not."""
         (x, y), (to_x, to_y) = flat
         moved_px = (to_x - x) * cos(self.direction_rad) + (to_y - y) * sin(self.direction_rad)
         shared_px = scale.relative_u(self.from_px, self.direction_rad) * moved_px
@@ -196,7 +196,7 @@ class Angle:
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """Two points along the direction, and for a rotation two more along the x axis."""
+        """Two points along the direction; for a rotation, two more along the x axis."""
         return (*_ends(self.point_px, self.angle_rad), *(_ends(self.point_px, 0.0) if self.is_turn else ()))
 
     def in_pixels(self) -> Cell:
@@ -204,7 +204,7 @@ class Angle:
         return Cell(1e3 * self.angle_rad, 1e3 * self.u_rad, "mrad")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """The angle in the plane, with the same number of full turns as in the picture."""
+        """The angle in the object plane, with the same number of full turns as in the picture."""
         found = _between(*flat[:2]) - (_between(*flat[2:]) if self.is_turn else 0.0)
         turned = found - self.angle_rad
         value = self.angle_rad + (turned + pi) % (2.0 * pi) - pi
@@ -223,7 +223,7 @@ def _between(first: Point, second: Point) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """A quantity that is already computed in pixels and in millimetres.
+    """A quantity that its gauge has already computed, in pixels and in millimetres.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ class Ready:
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """No points, because the values are already computed."""
+        """An empty array of points, because the values are already computed."""
         return ()
 
     def in_pixels(self) -> Cell:
@@ -244,5 +244,5 @@ class Ready:
         return self.pixels
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """Value in the object plane."""
+        """The value that the gauge computed for the object plane."""
         return self.millimetres

@@ -1,4 +1,4 @@
-"""All gauges of one recording: measured frame by frame, converted to rows, counted, drawn."""
+"""All gauges of one recording: measure them frame by frame, convert them to rows, count and draw them."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -130,7 +130,7 @@ class GaugeRecording:
         draw_gauges(canvas, self._gauges, self._newest)
 
     def steps(self, frame: Frame) -> list[tuple[str, Pixels]]:
-        """Picture of this processing step: the newest frame with its gauges."""
+        """The newest frame with its gauges, as the picture of this processing step."""
         grey = in_eight_bits(frame.pixels)
         canvas = np.array(grey if grey.ndim == 3 else np.dstack([grey] * 3), dtype=np.uint8)
         self.draw(canvas)
@@ -159,7 +159,7 @@ class GaugeRecording:
         self._table.add(rows)
 
     def in_words(self) -> dict[str, Any]:
-        """Summary of every gauge for summary.json."""
+        """Summary of every gauge, for summary.json."""
         return {
             gauge.name: {
                 "kind": gauge.kind_name,

@@ -74,7 +74,7 @@ class EdgeFound:
 
     @property
     def dark_side(self) -> int:
-        """+1 if the dark side lies beyond the edge (along the direction), -1 if it lies before it."""
+        """Side of the dark area: +1 beyond the edge (along the direction), -1 before the edge."""
         return -1 if self.contrast > 0.0 else 1
 
 
@@ -88,7 +88,7 @@ class NotFound:
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """The gauge's own axes in the picture: t along its direction, s turned by 90 degrees from t.
+    """The gauge's own axes in the picture: t along its direction, s perpendicular to t.
 
     Parameters
     ----------
@@ -103,16 +103,16 @@ class Axes:
     direction_rad: float
 
     def point(self, t_px: float, s_px: float = 0.0) -> tuple[float, float]:
-        """Picture coordinates of a point given by its coordinates t and s."""
+        """Picture coordinates of a point that is given in the gauge's axes t and s."""
         cosine, sine = cos(self.direction_rad), sin(self.direction_rad)
         return self.x_px + cosine * t_px - sine * s_px, self.y_px + sine * t_px + cosine * s_px
 
     def box(self, t_px: float, half_t_px: float, half_s_px: float) -> Mark:
-        """A rectangle around a position on the axis t, for drawing."""
+        """Corners of a rectangle around a position on the axis t, for drawing."""
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
         return Mark(tuple(self.point(t_px + a * half_t_px, b * half_s_px) for a, b in signs))
 
 
 def normal_of(axes: Axes, slope: float) -> float:
-    """Direction perpendicular to an edge whose slope in the axes is `slope` (radians)."""
+    """Direction (rad) perpendicular to an edge whose slope in the gauge's axes is `slope`."""
     return (axes.direction_rad - atan(slope) + pi) % (2.0 * pi) - pi

@@ -15,7 +15,7 @@ BLOCKY, HEAVY = 0.3, 0.5
 
 
 def blockiness(pixels: Pixels) -> float:
-    """Relative excess of level steps across block borders over those elsewhere; about 0 without a codec.
+    """Relative excess of level differences across block borders over those elsewhere; about 0 without a block codec.
 
     Parameters
     ----------

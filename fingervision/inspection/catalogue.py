@@ -9,7 +9,7 @@ from fingervision.inspection.sample import Sample
 
 
 def inspect(sample: Sample) -> list[Finding]:
-    """Compute all findings of a sample, the most severe first.
+    """Compute all findings (limits of the measurement) of a sample, the most severe first.
 
     Parameters
     ----------

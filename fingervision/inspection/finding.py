@@ -99,7 +99,7 @@ def weighed(
 
 
 def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy: str) -> Finding | None:
-    """Finding for frames that were not measured for one of these reasons; None if they are too few."""
+    """Finding for frames that were not measured for one of the given reasons; None if such frames are too few."""
     count = sum(sample.counts[status] for status in statuses)
     if not count or count < FEW_REFUSED * sample.frames:
         return None

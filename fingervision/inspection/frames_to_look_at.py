@@ -1,4 +1,4 @@
-"""The frames of a recording or camera that are inspected: a limited number from its first seconds."""
+"""Choose the frames of a recording or camera that are inspected: a limited number from its first seconds."""
 
 from collections.abc import Iterator
 from time import monotonic

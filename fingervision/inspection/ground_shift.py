@@ -60,7 +60,7 @@ class GroundTracker:
     _found: list[Floats] = field(default_factory=list)
 
     def add(self, frame: Frame, outcome: GapMeasurement) -> None:
-        """Add a frame in which the gap was measured."""
+        """Add a frame in which the gap was measured to the tracking of the background."""
         if len(self._found) >= MOST_FRAMES or (self._direction not in (None, outcome.direction)):
             return
         grey = to_grey(frame.pixels)
@@ -83,7 +83,7 @@ class GroundTracker:
                 self._register(halves)
 
     def shift(self) -> GroundShift:
-        """Return the displacement of the background in the frames added."""
+        """Return the displacement of the background (px) in the frames that were added."""
         if len(self._found) < 2:
             return GroundShift(np.zeros(0), np.zeros(0), None)
         both = np.array(self._found)

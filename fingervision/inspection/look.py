@@ -57,7 +57,7 @@ class Look:
 
     @property
     def focus_blur_px(self) -> float:
-        """Blur of the optics, the pixel's width included (pixels): of flanks or tips, whichever is smaller."""
+        """Blur of the optics including the pixel's width (px): that of flanks or tips, whichever is smaller."""
         return float(np.sqrt(self.edges.blur_px.min(axis=1).max() ** 2 + PIXEL_VARIANCE))
 
     @property
@@ -69,12 +69,12 @@ class Look:
 
     @property
     def flank_blur_px(self) -> float:
-        """Blur of the flanks, the pixel's width included (pixels)."""
+        """Blur of the flanks including the pixel's width (px)."""
         return float(np.sqrt(self.edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
 
     @property
     def u_camera_px(self) -> float:
-        """Random uncertainty of the gap from the camera's noise alone, without common errors of a codec (pixels)."""
+        """Random uncertainty of the gap (px) from the camera's noise alone, without codec errors that rows share."""
         alone = max(self.outcome.u_gap_px**2 - self.outcome.u_coding_px**2, 0.0)
         shared = 1.0 if self.frame.quantiser is not None else SHARED_POINTS[self.frame.coding]
         return float(np.sqrt(alone / shared))

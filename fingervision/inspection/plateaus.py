@@ -36,12 +36,12 @@ class Plateaus:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the background or a finger is clipped."""
+        """Whether the levels of the background or of a finger are clipped."""
         return self.at_top > AT_END_SHARE or self.at_zero > AT_END_SHARE
 
 
 def plateaus(sample: Sample) -> Plateaus:
-    """Read the levels beside both inner edges in every inspected frame."""
+    """Read the levels of background and fingers beside both inner edges in every inspected frame."""
     found = [_of(look, sample.top_level) for look in sample.looks]
     return Plateaus(*(float(np.median([each[k] for each in found])) for k in range(4)))
 

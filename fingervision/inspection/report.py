@@ -41,7 +41,7 @@ def as_json(sample: Sample, findings: list[Finding]) -> dict[str, Any]:
 
 
 def as_text(sample: Sample, findings: list[Finding]) -> str:
-    """Return the inspection as text: the most severe finding first, each with its cost and what to change."""
+    """Return the inspection as text: the most severe finding first, each with its cost and the remedy."""
     mend = to_mend(findings)
     lines = [_head(sample), ""]
     for number, finding in enumerate(mend, start=1):

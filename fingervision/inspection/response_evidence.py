@@ -86,7 +86,7 @@ def response_evidence(
 
 
 def _agreed(odds: list[float]) -> float:
-    """Sum of the two flanks' values (`_odds`); 0 if one is missing or they contradict each other."""
+    """Sum of the two flanks' values (`_odds`); 0 if one value is missing or the two contradict each other."""
     if len(odds) < 2 or (odds[0] * odds[1] < 0.0 and min(map(abs, odds)) > CONTRADICTING):
         return 0.0
     return sum(odds)

@@ -101,7 +101,7 @@ class Sample:
 
     @property
     def fill(self) -> float:
-        """Share of the picture's extent across the fingers that fingers and gap occupy.
+        """Share of the picture's extent across the fingers that fingers and gap together occupy.
 
         The share is 1 if fingers and gap extend beyond the picture.
         """
@@ -114,9 +114,9 @@ class Sample:
 
     @property
     def good_px(self) -> float:
-        """Cost below which a correction is not worth while, in pixels of this picture.
+        """Cost (in pixels of this picture) below which a correction is not worth while.
 
-        If the fingers do not fill the picture, a pixel covers more of the object than necessary, and the limit is
+        If the fingers do not fill the picture, a pixel covers more of the object than necessary, and this limit is
         proportionally lower.
         """
         return GOOD_PX * min(1.0, self.fill / FILLED) if self.looks else GOOD_PX
@@ -154,12 +154,12 @@ class Sample:
 
     @property
     def is_smeared(self) -> bool:
-        """Whether frames are not measured because the fingers moved too far during the exposure."""
+        """Whether frames are unmeasured because the fingers moved too far during the exposure."""
         return Status.BLURRED in self.refused and self.refused[Status.BLURRED].words.startswith(SMEARED)
 
     @property
     def is_lost_in_blur(self) -> bool:
-        """Whether unmeasured pictures are out of focus: strong blur rounds off a tip until it is not found."""
+        """Whether unmeasured pictures are out of focus: strong blur rounds a tip until it cannot be found."""
         return not self.is_lost_in_noise and self.refused_blur_px > LOST_BLUR_PX
 
     @property
@@ -169,7 +169,7 @@ class Sample:
 
     @property
     def u_shift_px(self) -> float:
-        """Standard uncertainty stated by `measure` for disturbances beside the edges and for clipping (pixels)."""
+        """Standard uncertainty of the gap (px) stated by `measure` for disturbances beside the edges and clipping."""
         return self.median(look.outcome.u_shift_px for look in self.looks)
 
     @property

@@ -1,5 +1,5 @@
-"""What `import fingervision as fv` offers: each function of the Python interface, and what the commands share with it.
+"""Functions of the Python interface (`import fingervision as fv`), and what the commands share with it.
 
-`fingervision.__init__` lists the public names and imports a module of this package when its name is first asked for.
-The commands of `fingervision.cli` call the same functions, so that a number is the same from either side.
+`fingervision.__init__` lists the public names, and imports a module of this package when its name is first used. The
+commands of `fingervision.cli` call the same functions, so that a number is the same from either side.
 """

@@ -22,7 +22,7 @@ def number(argument: str, value: object) -> float:
 
 
 def whole_number(argument: str, value: object, least: int) -> int:
-    """Take a whole number that is not below `least`.
+    """Check that an argument is a whole number not below `least`, and return it.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def whole_number(argument: str, value: object, least: int) -> int:
 
 
 def one_of(argument: str, value: object, words: Iterable[str]) -> str:
-    """Take one of several words.
+    """Check that an argument is one of several words, and return it.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def path_of(argument: str, value: object, what: str) -> Path:
 
 
 def region_of(roi: object) -> tuple[int, int, int, int] | None:
-    """Take a region of interest: first column, first row, width, height in pixels.
+    """Check a region of interest: first column, first row, width, height in pixels.
 
     Raises
     ------

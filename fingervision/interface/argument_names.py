@@ -29,7 +29,7 @@ _of_command: ContextVar[bool] = ContextVar("of_command", default=False)
 
 
 def in_python(sentence: str) -> str:
-    """Put an argument's name in the place of each option: `below_tip_mm` for `--below-tip-mm`.
+    """Replace each option's name in a text by the argument's name: `below_tip_mm` for `--below-tip-mm`.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def in_command(error: ArgumentError) -> str:
 
 @contextmanager
 def command_words() -> Iterator[None]:
-    """Within this block, errors name arguments as the options of a command."""
+    """Within the `with` block, errors name arguments as the options of a command."""
     before = _of_command.set(True)
     try:
         yield
@@ -73,7 +73,7 @@ def command_words() -> Iterator[None]:
 
 @contextmanager
 def python_words() -> Iterator[None]:
-    """Within this block, errors of fingervision and calib name arguments as a Python call does."""
+    """Within the `with` block, errors of fingervision and calib name arguments as a Python call does."""
     from calib.errors import CalibrationError
 
     try:

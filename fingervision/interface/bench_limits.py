@@ -1,4 +1,4 @@
-"""Limits of the bench that enter the uncertainty (plane, tilt, temperature), with defaults for those not stated."""
+"""Limits of the set-up that enter the uncertainty (plane, tilt, temperature), with defaults for those not stated."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ LENS_LEFT = 0.0002
 
 
 def limits_from(stated: Mapping[str, float | None], *, lens_calibrated: bool) -> tuple[Limits, frozenset[str]]:
-    """Return the limits of the bench, and the names of those that the user stated.
+    """Return the limits of the set-up, and the names of those that the user stated.
 
     Parameters
     ----------

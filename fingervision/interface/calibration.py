@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Calibration:
     """Pixels to millimetres with an uncertainty: gap_mm = (gap_px + b) / s for a light gap between dark fingers.
 
-    Made by `fingervision.calibrate`, or read by `Calibration.load`.
+    A calibration is made by `fingervision.calibrate`, or read by `Calibration.load`.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Calibration:
 
     @speaks_python
     def save(self, path: "str | Path" = "calibration.json", *, pictures: bool = False) -> Path:
-        """Write the calibration as `fingervision calibrate` does.
+        """Write the calibration to a file, as `fingervision calibrate` does.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class Calibration:
     def check_sizes(
         self, pictures: Sequence[KnownSize], region: tuple[int, int, int, int] | None
     ) -> tuple[Agreement, ...]:
-        """Check the calibration on pictures that are already read; see `check`."""
+        """Check the calibration on pictures that were already read; see `check`."""
         from dataclasses import replace
 
         height, width = pictures[0].grey.shape
@@ -190,7 +190,7 @@ class Calibration:
         )
 
     def _repr_html_(self) -> str:
-        """Show the report, and the edges found in the first picture."""
+        """HTML for a notebook: the report, and the edges found in the first picture."""
         from fingervision.interface.notebook import image_html, png_of
 
         first = next(iter(self.pictures.values()), None)

@@ -144,7 +144,7 @@ def on_lines(
     limits: Stated,
     noted: Noted,
 ) -> Calibration:
-    """Calibrate on a line scale, with its pitch and the standard uncertainties of a line and of the length."""
+    """Calibrate on a line scale of known pitch; the uncertainties of a line's position and of the length are given."""
     pitch_mm, u_line_mm, u_length_mm = scale_lines
     ((name, stored),) = read_pictures([source])
     read_with = PictureResponse.of(noted.response, files_of([source]))

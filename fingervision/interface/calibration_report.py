@@ -127,7 +127,7 @@ def line_details(fit: "LineScaleFit", lines: "ScaleLines") -> dict[str, object]:
 
 
 def line_lines(fit: "LineScaleFit", lines: "ScaleLines") -> list[str]:
-    """Lines of text with the lines, edges and residuals of a line scale."""
+    """Lines of text about the lines of a line scale, their edges and their residuals."""
     rising, falling = fit.by_edge
     scale = fit.calibration.px_per_mm
     tone = "dark" if lines.is_dark else "light"

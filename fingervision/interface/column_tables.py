@@ -88,7 +88,7 @@ def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
 
 
 def columns_of(argument: str, table: Any, must: str) -> dict[str, list[Any]]:
-    """Give the columns of a DataFrame or mapping as lists of one length.
+    """Return the columns of a DataFrame or mapping as lists of equal length.
 
     Raises
     ------

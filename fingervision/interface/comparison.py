@@ -30,10 +30,10 @@ CALL = "fingervision.compare(...) in Python"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """Where a measurement and models disagree; made by `fingervision.compare`.
+    """Result of `fingervision.compare`: where a measurement and one or more models disagree.
 
-    Iterating gives the names of the models; indexing by a name gives the result for that model. The properties below
-    are those of the first model.
+    Iterating over the object gives the names of the models; indexing by a name gives the result for that model. The
+    properties below describe the first model.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Comparison:
 
     @property
     def first(self) -> OneComparison:
-        """The result for the first model."""
+        """The comparison with the first model."""
         return next(iter(self.models.values()))
 
     @property
@@ -70,22 +70,22 @@ class Comparison:
 
     @property
     def noise_mm(self) -> float:
-        """Random noise of one gap reading, standard deviation."""
+        """Standard deviation of the random noise of one gap reading (mm)."""
         return self.first.noise_mm
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """Regions in which the residual cannot be noise, largest first."""
+        """Regions in which the residual is significantly larger than noise, the largest first."""
         return self.first.places
 
     @property
     def residual_mm(self) -> Mapping[str, NDArray[np.float64]]:
-        """Measured minus predicted, by channel (gap, left, right, midline), each of shape (n,)."""
+        """Measured minus predicted values, by channel (gap, left, right, midline), each of shape (n,) (mm)."""
         return self.first.residual_mm
 
     @property
     def input_mm(self) -> NDArray[np.float64]:
-        """Recorded input of each residual, shape (n,)."""
+        """Recorded input of each residual, shape (n,) (mm)."""
         return self.first.data.chain.history.input_mm
 
     @property
@@ -98,7 +98,7 @@ class Comparison:
         return comparison_document(self.models, self.made)
 
     def report(self) -> str:
-        """Return the result as the command prints it."""
+        """Return the result as the command `compare` prints it."""
         lines = []
         for name, found in self.models.items():
             which = "" if len(self.models) == 1 else f"{name}: "
@@ -108,7 +108,7 @@ class Comparison:
         return "\n".join(lines)
 
     def figure(self) -> "Figure":
-        """Draw the residuals, as in compare.png."""
+        """Draw the residuals of all models, as in compare.png."""
         return residuals_of(self.models)
 
     def save(self, folder: "str | os.PathLike[str]") -> Path:
@@ -129,7 +129,7 @@ class Comparison:
         return save_results(self, folder)
 
     def write(self, out: Path) -> None:
-        """Write the files into an existing folder, overwriting what is in it."""
+        """Write the files of the comparison into an existing folder, overwriting earlier ones."""
         with out_folder(out):
             write_comparison(out, self.models, self.made, self.measured)
         mark_owner(out, self.measured)

@@ -13,6 +13,7 @@ from fingervision.diagnosis.diagnose import diagnose as diagnose_table
 from fingervision.diagnosis.report.answer_files import corrected, write_answer
 from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.diagnosis.report.sentences import detail_lines
 from fingervision.domain.effect import Effect
 from fingervision.domain.errors import ArgumentError
 from fingervision.domain.report import DiagnosisReport, NamedEffect, Verdict
@@ -60,7 +61,7 @@ class Diagnosis:
 
     @property
     def report(self) -> DiagnosisReport:
-        """The result with the fields of report.json."""
+        """The result of the diagnosis, with the fields of report.json."""
         return self.found.report
 
     @property
@@ -70,22 +71,22 @@ class Diagnosis:
 
     @property
     def effects(self) -> tuple[NamedEffect, ...]:
-        """The named effects with their parameters; those of the best explanation where the verdict is ambiguous."""
+        """The named effects with their parameters; those of the best explanation if the verdict is ambiguous."""
         return self.report.effects
 
     @property
     def residual_before_mm(self) -> Mapping[str, NDArray[np.float64]]:
-        """Measured minus predicted by the given model, by channel (gap, left, right, midline), each of shape (n,)."""
+        """Measured minus predicted by the given model (mm), by channel (gap, left, right, midline), each shape (n,)."""
         return by_channel(self.found.data, self.found.before_mm)
 
     @property
     def residual_after_mm(self) -> Mapping[str, NDArray[np.float64]]:
-        """Measured minus predicted by the corrected model, by channel, each of shape (n,)."""
+        """Measured minus predicted by the corrected model (mm), by channel, each of shape (n,)."""
         return by_channel(self.found.data, self.found.after_mm)
 
     @property
     def input_mm(self) -> NDArray[np.float64]:
-        """Recorded input of each residual, shape (n,)."""
+        """Recorded input of each residual, shape (n,) (mm)."""
         return self.found.data.chain.history.input_mm
 
     @property
@@ -104,6 +105,7 @@ class Diagnosis:
         """Return the result in the sentences that the command prints."""
         report = self.report
         lines = [f"{report.verdict}: {report.sentence}"]
+        lines += [f"  {line}" for line in detail_lines(report.verdict, report.effects, report.alternatives)]
         lines += [f"  note: {words}" for words in (*report.outliers, *report.notes)]
         if report.next_run is not None:
             lines.append(f"  next: {report.next_run.words}")
@@ -127,7 +129,7 @@ class Diagnosis:
         return save_results(self, folder)
 
     def write(self, out: Path) -> dict[str, object]:
-        """Write the files into an existing folder, and return the content of report.json."""
+        """Write the files of the diagnosis into an existing folder, and return the content of report.json."""
         with out_folder(out), added(self.own_effects):
             document = write_answer(out, self.found, own_base(self.model, out), self.made, self.measured)
         mark_owner(out, self.measured)

@@ -1,4 +1,4 @@
-"""Pictures of calibration targets, drawn when an example is copied, so that they take no room in the installation."""
+"""Pictures of calibration targets, rendered when an example is copied, to keep the installation small."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,7 +60,7 @@ def step_wedge(folder: Path) -> None:
 
 
 def micrometer(folder: Path) -> None:
-    """Draw a line scale of 0.1 mm pitch, 34 pixels from line to line, turned by a degree against the picture's rows."""
+    """Draw a line scale of 0.1 mm pitch with 34 pixels from line to line, rotated by one degree in the picture."""
     import cv2
 
     rng = np.random.default_rng(SEED)

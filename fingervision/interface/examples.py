@@ -21,7 +21,7 @@ OPENING = {"opening.mp4": "opening/opening.mp4", "calibration.json": "opening/ca
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A folder of files in which the examples of a command can be run.
+    """A runnable example: a folder of files on which the examples of a command's help can be run.
 
     Parameters
     ----------

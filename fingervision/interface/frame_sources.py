@@ -30,7 +30,7 @@ def recording_of(
     frames: int | None = None,
     coding: str = "lossless",
 ) -> Opener:
-    """Return a function that opens the recording anew at each call; a camera's frames are read once and kept.
+    """Return a function that opens the recording anew at each call; the frames of a camera are read once and kept.
 
     Parameters
     ----------

@@ -42,6 +42,7 @@ def measure(
     *,
     calibration: "str | os.PathLike[str] | Calibration | None" = None,
     px_per_mm: float | None = None,
+    u_px_per_mm: float | None = None,
     below_tip_mm: float = 0.3,
     tips: str = "auto",
     roi: Sequence[int] | None = None,
@@ -74,9 +75,12 @@ def measure(
     calibration : path, Calibration or None
         The scale with its uncertainty; one of `calibration` and `px_per_mm` is required.
     px_per_mm : float or None
-        The scale without its uncertainty; uncertainties then have only the random part.
+        Scale in pixels per mm; without `u_px_per_mm`, only the random part of the uncertainty is given.
+    u_px_per_mm : float or None
+        Standard uncertainty of `px_per_mm` in pixels per mm, such as that of a ruler; `u_gap_mm` then includes this
+        uncertainty, an unknown edge bias, and the default limits of the set-up.
     below_tip_mm : float
-        How far below each finger's tip the gap is measured.
+        Distance (mm) below each finger's tip at which the gap is measured.
     tips : str
         Where the fingers point in the picture: auto, up, down, left or right.
     roi : (int, int, int, int) or None
@@ -133,10 +137,10 @@ def measure(
     2.00 mm, ok
     """
     own = source == "simulated" if isinstance(source, str) else hasattr(source, "px_per_mm")
-    if own and calibration is None and px_per_mm is None:
+    if own and calibration is None and px_per_mm is None and u_px_per_mm is None:
         scale: Any = (BareScale(_own_scale(source)), None)
     else:
-        scale = scale_of(calibration, px_per_mm)
+        scale = scale_of(calibration, px_per_mm, u_px_per_mm)
     part, count = range_of(frames)
     again = recording_of(source, rate_hz=rate_hz, times_s=times_s, frames=count, coding=coding)
     recording = again()

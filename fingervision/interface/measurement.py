@@ -74,7 +74,7 @@ class Measurement:
 
     @property
     def rows(self) -> tuple[GapRow, ...]:
-        """The rows, one per frame."""
+        """The rows of gaps.csv, one per frame."""
         return self._found.rows
 
     @property
@@ -96,7 +96,7 @@ class Measurement:
 
     @property
     def u_random_mm(self) -> NDArray[np.float64]:
-        """Random part, from frame to frame, of the standard uncertainties of `gap_mm`; shape (n,)."""
+        """Random part of the standard uncertainties of `gap_mm`, which changes from frame to frame; shape (n,) (mm)."""
         return self._found.series.u_random_mm
 
     @property
@@ -122,15 +122,15 @@ class Measurement:
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to change about the recording, and remarks, in sentences; why no frame has an input stands first."""
+        """Sentences on what to change about the recording, and remarks; why no frame has an input stands first."""
         refusal = () if self.no_input is None else (self.no_input,)
         return (*refusal, *self._found.summary["advice"])
 
     @property
     def no_input(self) -> str | None:
-        """Why no frame got an input from the drive, where a drive was given and none did; else None.
+        """Reason why no frame got an input although a drive was given; None otherwise.
 
-        The gaps are measured nonetheless. `measured_table()` raises the same sentence.
+        In this case the gaps are measured nonetheless. `measured_table()` then raises an error with the same sentence.
         """
         return None if self._found.refusal is None else in_python(str(self._found.refusal))
 
@@ -138,9 +138,10 @@ class Measurement:
     def budget(self) -> Budget:
         """Uncertainty budget of `gap_mm`, with every source and its standard uncertainty for each gap, shape (n,).
 
-        The squares of the sources add to the square of `u_gap_mm` (JCGM 100:2008, equation 10); what is not `shared` is
-        `u_random_mm`. With a scale that has no stated uncertainty, only the sources within the pictures are listed.
-        `print(measured.budget.table())` prints the sources of the first gap, the largest first.
+        The squares of the contributions add to the square of `u_gap_mm` (JCGM 100:2008, equation 10); the contribution
+        that is not `shared` is `u_random_mm`. With a scale that has no stated uncertainty, only the contributions of
+        the pictures are listed. `print(measured.budget.table())` prints the sources of the first gap, the largest
+        first.
 
         Raises
         ------
@@ -189,13 +190,13 @@ class Measurement:
         return f"Measurement({in_one_line(self._found.summary, self._found.series)})"
 
     def _repr_html_(self) -> str:
-        """Show the measured edges of a single frame, or the gap over time of a recording."""
+        """HTML for a notebook: the measured edges of a single frame, or the gap over time of a recording."""
         from fingervision.interface.measurement_pictures import cell_html
 
         return cell_html(self._found, self._again)
 
     def picture(self, frame: int = 0) -> NDArray[np.uint8]:
-        """Draw what was measured into a frame: edges, tips, measuring points, and the value.
+        """Draw the measured edges, tips, measuring points and the value into a frame.
 
         Parameters
         ----------
@@ -219,7 +220,7 @@ class Measurement:
     def to_dataframe(self) -> "pd.DataFrame":
         """Give the rows as a pandas DataFrame with the columns of gaps.csv.
 
-        Numbers have pandas' nullable types (`Float64`, `Int64`); a missing value is `pandas.NA`.
+        Numeric columns have pandas' nullable types (`Float64`, `Int64`); a missing value is `pandas.NA`.
 
         Raises
         ------
@@ -233,8 +234,8 @@ class Measurement:
     def to_xarray(self) -> "xr.Dataset":
         """Return the rows as an xarray Dataset over the dimension `frame`, with `time_s` as a coordinate.
 
-        Every number has its unit as an attribute. A missing value is NaN, because xarray has no other marker; `status`
-        gives the reason.
+        Every variable of the Dataset has its unit as an attribute. A missing value is NaN, because xarray has no other
+        marker; `status` gives the reason.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Pictures of a measurement: the measured edges drawn into a frame, the gap over time, the cell of a notebook."""
+"""Pictures of a measurement: a frame with the measured edges, the gap over time, and the view in a notebook."""
 
 from html import escape
 from typing import TYPE_CHECKING

@@ -11,6 +11,7 @@ from fingervision.domain.status import Status
 from fingervision.interface.column_tables import measured_from_columns
 from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.in_memory import MeasuredInMemory
+from fingervision.storage.assumed_response import response_note
 from fingervision.storage.gaps_csv import COLUMNS, FORCE_PLACES, MM_PLACES, TIME_PLACES, GapRow
 from fingervision.storage.line_file import cell
 from fingervision.storage.measured_table import NUMBERS
@@ -40,7 +41,7 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     task, clock = found.task, found.clock
     if task.drive is None:
         raise UsageError(
-            "The measurement must include a drive (the stage's record), but was made without: call "
+            "The measurement must include a drive (the stage's record), but was made without one: call "
             "fingervision.measure with drive=."
         )
     if found.refusal is not None:
@@ -56,6 +57,8 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     }
     columns["run"] = [row.run for row in found.rows]
     table = measured_from_columns(columns)
+    shifts_px = [row.u_shift_px for row in found.rows if row.u_shift_px is not None]
+    table = replace(table, notes=(*table.notes, *response_note(found.summary, shifts_px)))
     return replace(table, u_clock_s=clock.u_time_s) if isinstance(clock, ClockOffset) else table
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from calib.calibration import BareScale
 from calib.measured_scale import Calibration as MeasuredScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
@@ -16,11 +15,10 @@ from fingervision.domain.region import Region
 from fingervision.frames.array_levels import what_it_is
 from fingervision.gauges.gauge_file import Gauge, read_gauges
 from fingervision.interface.argument_checks import number, one_of, whole_number
-from fingervision.measuring.scale import Scale, check_px_per_mm
+from fingervision.measuring.scale import Scale, check_one_scale, stated_scale
 from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.response_csv import response_named
-from fingervision.tables.read import read_drive
 
 TIPS = ("auto", *(direction.value for direction in Direction))
 FINGERS = {"auto": None, "dark": True, "light": False}
@@ -28,7 +26,7 @@ FACES = ("front", "outline")
 BITS = (8, 16)
 
 
-def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
+def scale_of(calibration: Any, px_per_mm: Any, u_px_per_mm: Any = None) -> tuple[Scale, Path | None]:
     """Return the scale, and the file that it was read from.
 
     Parameters
@@ -37,16 +35,18 @@ def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
         A calibration.json, or what one holds.
     px_per_mm : float or None
         The scale alone.
+    u_px_per_mm : float or None
+        Standard uncertainty of that scale.
 
     Raises
     ------
     UsageError
-        Both a calibration and a scale are given, or neither, or the scale is outside the range of real cameras.
+        Both a calibration and a scale are given, or neither; or the scale is outside the range of real cameras, or its
+        uncertainty is impossible.
     DataError, InputFileError
         The calibration cannot be read.
     """
-    if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+    check_one_scale(calibration, px_per_mm, u_px_per_mm)
     if calibration is not None:
         if isinstance(calibration, str | os.PathLike):
             return read_calibration(Path(calibration)), Path(calibration)
@@ -61,13 +61,8 @@ def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
             "The scale must be given, but is not: add --calibration FILE (made by `fingervision calibrate`) "
             "or --px-per-mm S."
         )
-    stated = number("px_per_mm", px_per_mm)
-    try:
-        bare = BareScale(stated)
-    except ValueError as error:
-        raise UsageError(f"--px-per-mm must be positive, but is {stated:g}.") from error
-    check_px_per_mm(stated)
-    return bare, None
+    u = None if u_px_per_mm is None else number("u_px_per_mm", u_px_per_mm)
+    return stated_scale(number("px_per_mm", px_per_mm), u), None
 
 
 def measuring_task(
@@ -167,6 +162,8 @@ def _drive(drive: Any, columns: Path | None) -> DriveHistory:
     if isinstance(drive, DriveHistory):
         return drive
     if isinstance(drive, str | os.PathLike):
+        from fingervision.tables.read import read_drive  # slow to import, needed with a drive only
+
         return read_drive(Path(drive), columns)
     from fingervision.interface.column_tables import drive_from_columns
 

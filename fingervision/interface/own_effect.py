@@ -30,7 +30,7 @@ def effect(
     after: str | None = None,
     **needs: Any,
 ) -> Callable[[Callable[..., Any]], Effect]:
-    """Turn a function into an effect of one's own, and add it to the catalogue of this process.
+    """Turn a function into a user-defined effect, and add it to the catalogue of this process.
 
     The first sentence of the function's docstring describes the effect; any further text is its formula.
 
@@ -122,7 +122,7 @@ def effect(
 
 @contextmanager
 def added(effects: Iterable[Effect]) -> Iterator[None]:
-    """Add effects to the catalogue while a `with` block lasts; effects that were there before stay."""
+    """Add effects to the catalogue for the duration of a `with` block; effects already in the catalogue stay."""
     known = catalogue()
     new = [each for each in effects if not (each.name in known and _registered.get(each.name) is each)]
     try:
@@ -146,7 +146,7 @@ def _order(stage: Stage, after: str | None) -> float:
 
 
 def _sentences(function: Callable[..., Any]) -> tuple[str, str]:
-    """Description and formula from a docstring."""
+    """Description and formula of an effect from a docstring."""
     text = inspect.getdoc(function) or ""
     first, _, rest = text.partition("\n\n")
     words = " ".join(first.split()).rstrip(".")

@@ -1,4 +1,4 @@
-"""The camera response used for calibration pictures, and how far another response would move their edges."""
+"""The camera response assumed for calibration pictures, and how far another response would move their edges."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ class PictureResponse:
     def of(cls, words: str, files: Sequence[Path]) -> "PictureResponse":
         """Choose the response by the option --response.
 
-        `auto` takes the first picture's own tag, or linear where it has none.
+        `auto` takes the tag in the first picture, or a linear response if the picture has no tag.
         """
         from calib.camera_response import standard_response
         from fingervision.frames.transfer_tag import transfer_tag
@@ -62,7 +62,7 @@ class PictureResponse:
         edges: Sequence["ParallelEdges"],
         region: tuple[int, int, int, int] | None,
     ) -> float:
-        """How much wider a light gap is read with this response than with the other, mean of the pictures (pixels)."""
+        """Mean width (px) by which a light gap appears wider with this response than with the alternative response."""
         from calib.errors import CalibrationError
         from calib.parallel_edges import measure_parallel_edges
 

@@ -130,7 +130,7 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
 
 
 def files_of(sources: Sequence[Any]) -> list[Path]:
-    """Return those of the pictures that are files."""
+    """Return those of the given pictures that are files."""
     return [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
 
 

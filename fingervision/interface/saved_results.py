@@ -20,13 +20,13 @@ class Results(Protocol):
 
     @property
     def measured(self) -> Path:
-        """File of the measured table, or a name for a table in memory."""
+        """Path of the measured table, or a name for a table in memory."""
 
     def figure(self) -> "Figure":
         """Draw the residuals."""
 
     def write(self, out: Path) -> object:
-        """Write the files into an existing folder."""
+        """Write the result's files into an existing folder."""
 
 
 @speaks_python

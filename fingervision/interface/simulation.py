@@ -85,7 +85,7 @@ class Simulation:
 
     @property
     def force_n(self) -> NDArray[np.float64] | None:
-        """Force at the drive, shape (n,); None where the model predicts none."""
+        """Force at the drive, shape (n,) (N); None if the model predicts no force."""
         return self.response.force_n
 
     def columns(self) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class Simulation:
         return pd.DataFrame(self.columns())
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
-        """Draw the gap over time, or over the input where there are no times.
+        """Draw the gap over time, or over the input if there are no times.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Simulation:
     def save(self, path: "str | os.PathLike[str]") -> Path:
         """Save the columns as CSV.
 
-        The file can be read as a measured table, or as a simulation table.
+        The saved file can be read as a measured table, or as a simulation table.
 
         Raises
         ------

@@ -206,7 +206,7 @@ def models_given(model: Any, kind: str, columns: Any = None) -> dict[str, Given]
 
 
 def told_apart(paths: list[Path]) -> list[str]:
-    """Name models by their files, with as much of the folder's name as distinguishes them.
+    """Name models by their files, with as much of the folder's name as is needed to distinguish them.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def told_apart(paths: list[Path]) -> list[str]:
 
 
 def effect_names(argument: str, names: Any) -> frozenset[str]:
-    """Check the names of effects.
+    """Check that names are those of effects in the catalogue.
 
     Raises
     ------
@@ -241,9 +241,9 @@ def effect_names(argument: str, names: Any) -> frozenset[str]:
 
 
 def own_base(model: CorrectedModel, out: Path) -> CorrectedModel:
-    """Save a simulation table that is in memory as a file, to which a corrected model can refer.
+    """Save a simulation table that is in memory to a file, to which a corrected model can refer.
 
-    Other models are returned unchanged.
+    Models of other kinds are returned unchanged.
 
     Raises
     ------

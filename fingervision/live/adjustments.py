@@ -22,7 +22,7 @@ class _Wanted:
 
 
 class Adjustments:
-    """Changes of camera settings: any thread may request them, and the reading thread applies them between frames."""
+    """Requested changes of camera settings: any thread may request, the reading thread applies them between frames."""
 
     def __init__(self) -> None:
         self.controls: tuple[CameraControl, ...] = ()
@@ -58,7 +58,7 @@ class Adjustments:
         return wanted.found
 
     def begin(self, source: object) -> list[str]:
-        """Use a source that was opened (again), and apply the settings that were chosen before.
+        """Begin to use a newly (or again) opened source, and apply the settings that were chosen before.
 
         Returns
         -------
@@ -80,7 +80,7 @@ class Adjustments:
         return said
 
     def act(self, source: object) -> None:
-        """Apply the requested changes; called between two frames by the thread that reads the source."""
+        """Apply the requested changes; the thread that reads the source calls this between two frames."""
         while True:
             try:
                 wanted = self._wanted.get_nowait()

@@ -1,4 +1,4 @@
-"""Additions to a live measurement: a test bed, a log of the drive, a model, gauges."""
+"""Additional parts of a live measurement: a test bed, a log of the drive, a model, gauges."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from fingervision.testbed.run.run_metadata import SIMULATION, write_expected
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """Options for the additions to the measurement.
+    """Options for the additional parts of a live measurement.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ FORGIVEN_SHARE = 0.02
 
 
 class Cadence:
-    """Statistics of frame times; one thread adds times, and any thread may read the statistics."""
+    """Statistics of frame times; one thread adds times, and any thread may read the result."""
 
     def __init__(self) -> None:
         self._lock = RLock()
@@ -42,7 +42,7 @@ class Cadence:
             self._due_s = None
 
     def add(self, time_s: float) -> None:
-        """Add the time of a frame."""
+        """Add the time of a frame to the statistics."""
         with self._lock:
             self._add(time_s)
 

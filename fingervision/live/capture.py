@@ -1,4 +1,4 @@
-"""Capture of frames for the measurement without loss; an interrupted source is opened again."""
+"""Capture every frame for the measurement; an interrupted source is opened again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -82,7 +82,7 @@ class Capture:
         self._thread = Thread(target=self._read, name="capture", daemon=True)
 
     def start(self) -> None:
-        """Begin to read frames, even if not used yet, because queued frames would arrive late and all at once."""
+        """Begin to read frames although none is used yet, because queued frames would arrive late and all at once."""
         if self._again is not None:
             self._thread.start()
 

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import DataError, UsageError
+from fingervision.domain.errors import UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
-from fingervision.measuring.scale import Scale
+from fingervision.measuring.scale import Scale, scale_for_frames
 from fingervision.measuring.task import Task
 
 MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
@@ -18,7 +18,7 @@ ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region 
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """Scale, height, direction and region of the measurement; zero and tolerance of the display.
+    """Settings of a live view: scale, height, direction and region of the measurement, zero and tolerance shown.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ class Choices:
             fingers_are_dark=self.fingers_are_dark,
         )
 
-    def check(self, description: Description) -> None:
-        """Refuse settings that are impossible for these frames.
+    def for_frames(self, description: Description) -> "Choices":
+        """Refuse settings that are impossible for frames of this size; complete the scale by the frames' size.
 
         Raises
         ------
@@ -100,17 +100,14 @@ class Choices:
                 f"The region must lie inside the frame of {width_px}x{height_px} pixels, but is "
                 f"{box.x_px},{box.y_px},{box.width_px},{box.height_px} (first column, row, width, height)."
             )
-        if self.scale is not None:
-            try:
-                self.scale.check_frame_size(width_px, height_px)
-            except ValueError as error:
-                raise DataError(str(error)) from error
+        scale = None if self.scale is None else scale_for_frames(self.scale, (width_px, height_px))
         limits = (self.least_mm, self.greatest_mm)
         if None not in limits and self.least_mm >= self.greatest_mm:  # type: ignore[operator]
             raise UsageError(
                 f"The lower limit must be below the upper one, but they are {self.least_mm:g} and "
                 f"{self.greatest_mm:g} mm."
             )
+        return replace(self, scale=scale)
 
     def verdict(self, gap_mm: float | None, u_mm: float | None) -> str:
         """State whether a gap is within the limits, taking its uncertainty into account (ISO 14253-1).

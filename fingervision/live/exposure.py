@@ -26,7 +26,7 @@ class Exposure:
         self.words = ""
 
     def add(self, frame: Frame) -> None:
-        """Add a frame; afterwards `words` states the problem, or is empty."""
+        """Add a frame to the check; afterwards `words` states the problem, or is empty."""
         sparse: Any = np.ascontiguousarray(frame.pixels[::STEP_PX, ::STEP_PX])
         grey = to_grey(sparse)
         scale = full_scale(grey)

@@ -1,4 +1,4 @@
-"""Time for which the disk space suffices for a recording at its present data rate."""
+"""Time for which the disk space suffices for a recording at its present data rate (minutes)."""
 
 import shutil
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Access control of the page's server: it admits only pages of this server that have a token (and any password)."""
+"""Access control of the web server: it admits only browser pages that have a token (and any password)."""
 
 import asyncio
 import base64
@@ -38,7 +38,7 @@ GUESS_COSTS_S = 1.0
 
 
 class Guard:
-    """Lets allowed requests through, and adds headers that isolate the page from other sites.
+    """Lets allowed requests through, and adds headers that isolate the browser page from other sites.
 
     The header Host must be a name of this server (so that another site cannot redirect its own name to this server),
     the header Origin must be the same (so that no other page can open a socket), and the address must contain a token.

@@ -1,4 +1,4 @@
-"""Limits for idle connections: few at a time from one address, each for a short time only."""
+"""Limits for idle network connections: few at a time from one address, each for a short time only."""
 
 import asyncio
 from collections import defaultdict
@@ -32,7 +32,7 @@ class PatientProtocol(H11Protocol):
             oldest.heard()
 
     def handle_events(self) -> None:
-        """End the time limit once there is a request."""
+        """End the time limit of a connection once a request has arrived."""
         super().handle_events()
         if self.cycle is not None:
             self.heard()
@@ -43,12 +43,12 @@ class PatientProtocol(H11Protocol):
         super().handle_websocket_upgrade(event)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Remove a closed connection from the list."""
+        """Remove a closed connection from the list of connections."""
         self.heard()
         super().connection_lost(exc)
 
     def heard(self) -> None:
-        """End the time limit, because a request has arrived."""
+        """End the time limit of a connection, because a request has arrived."""
         waiting = self.half_open[self._address]
         timer = waiting.pop(self, None)
         if timer is not None:

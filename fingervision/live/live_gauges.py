@@ -29,8 +29,8 @@ class LiveGauges:
     """Measures the gauges of a gauge board in the measuring thread.
 
     An unchanged gauge continues from its present position; a new or changed gauge starts in the next frame at the
-    position at which it was drawn. If the measurement lags behind, some frames are measured without gauges, and the
-    page states their number.
+    position at which it was drawn. If the measurement is too slow, some frames are measured without gauges, and the
+    browser page states their number.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class LiveGauges:
         return ""
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Readings in a frame of a given version of the gauges; None if unknown."""
+        """Readings in one frame for a given version of the gauges; None if there are none."""
         found = self._read.get(frame)
         return found[1] if found is not None and found[0] == version else None
 

@@ -23,8 +23,8 @@ def opened(name: str, wish: Wish) -> Capture:
     """
     if wish.camera != CameraWish() and not camera.accepts(name):
         raise UsageError(
-            "--format, --exposure-ms, --gain, --focus and --white-balance-k are for cameras of this machine, but "
-            f"{without_password(name)} is none: leave them out."
+            "--format, --exposure-ms, --gain, --focus and --white-balance-k are for cameras of this computer, but "
+            f"{without_password(name)} is not one: leave them out."
         )
     source = open_source(name, wish)
     if not hasattr(source, "received"):

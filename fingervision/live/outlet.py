@@ -1,4 +1,4 @@
-"""Printing in a separate thread, so that a slow or missing reader delays neither measurement nor recording."""
+"""Print in a separate thread, so that a slow or missing reader delays neither measurement nor recording."""
 
 import os
 from contextlib import suppress
@@ -13,7 +13,7 @@ PATIENCE_S = 2.0
 
 
 class Outlet:
-    """Prints text to one stream.
+    """Prints text to one output stream in a separate thread.
 
     Parameters
     ----------

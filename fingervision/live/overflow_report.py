@@ -24,7 +24,7 @@ class OverflowReport:
         self._told, self._told_at_s = 0, float("-inf")
 
     def say(self) -> None:
-        """Report lost frames, if there are any and the last report is long enough ago."""
+        """Report lost frames, if frames were lost and the last report is long enough ago."""
         lost, now_s = self._capture.overflowed, monotonic()
         if lost > self._told and now_s - self._told_at_s >= SAID_EVERY_S:
             self._told_at_s = now_s

@@ -1,6 +1,6 @@
-"""WebSocket of one browser page: a new state is sent once the page has received the previous state.
+"""WebSocket of one browser page: it sends a new state once the page has received the previous state.
 
-Requests from the page are checked and counted.
+Requests from the browser page are checked and counted.
 """
 
 import asyncio
@@ -151,7 +151,7 @@ class PageSocket:
 
 
 def known_by(page: WebSocket) -> Known:
-    """Numbers of rows and messages that a reconnecting page already has; invalid numbers count as zero."""
+    """Numbers of the rows and messages that a reconnecting page already has; an invalid number counts as zero."""
     asked = page.query_params
     numbers = [asked.get(name, "") for name in ("rows", "messages")]
     if not all(number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS for number in numbers):

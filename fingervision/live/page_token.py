@@ -1,4 +1,4 @@
-"""Token in the page's address, stored in the output folder so that a page can reconnect after a restart."""
+"""Token in the address of the browser page, stored in the output folder for reconnecting after a restart."""
 
 import os
 import re
@@ -13,7 +13,7 @@ BYTES = 18
 
 
 def kept_token(out: Path, file_name: str = FILE) -> str:
-    """Read the token of a folder, or create a token file that only this user can read.
+    """Read the token from a folder, or create a token file that only this user can read.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Write access to the live view: one page at a time has it, and other pages only watch until they take it over."""
+"""Write access to the live view: one browser page at a time has it; other pages watch until one takes it over."""
 
 from fingervision.domain.errors import StateError
 
@@ -6,20 +6,20 @@ HELD = "Another page works this live view: press Take over to work it here."
 
 
 class Pen:
-    """Administers which page may change settings; used only by the thread of the server.
+    """Administers which browser page may change settings; only the thread of the server uses it.
 
-    The first page that sends a request has write access, until it closes or another page takes over.
+    The first browser page that sends a request has write access, until it closes or another page takes over.
     """
 
     def __init__(self) -> None:
         self._holder: object = None
 
     def may_write(self, page: object) -> bool:
-        """Whether a page may change settings now."""
+        """Whether a browser page may change settings now."""
         return self._holder is None or self._holder is page
 
     def write(self, page: object) -> None:
-        """Take write access if no other page has it.
+        """Take the write access if no other browser page has it.
 
         Raises
         ------
@@ -31,10 +31,10 @@ class Pen:
         self._holder = page
 
     def take(self, page: object) -> None:
-        """Take write access from whichever page has it."""
+        """Take the write access from whichever browser page has it."""
         self._holder = page
 
     def let_go(self, page: object) -> None:
-        """Release the write access of a page."""
+        """Release the write access of a browser page."""
         if self._holder is page:
             self._holder = None

@@ -1,4 +1,4 @@
-"""Notification of new pictures, with a single check of the view for all pages."""
+"""Notification of new pictures, with a single check of the view for all browser pages."""
 
 import asyncio
 
@@ -11,7 +11,7 @@ LOOK_EVERY_S = 0.01
 
 
 class PictureWatch:
-    """Renders each new picture once, and wakes all pages that wait for it; used within one event loop.
+    """Encodes each new picture once, and wakes all browser pages that wait for it; used within one event loop.
 
     Parameters
     ----------

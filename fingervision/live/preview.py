@@ -30,7 +30,7 @@ _NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What a page has received so far: identity of the view, and numbers of rows and messages.
+    """What a browser page has received so far: identity of the view, and numbers of rows and messages.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """A message, and the data that the page has after receiving this message."""
+    """A message to a browser page, and what the page has received after this message."""
 
     content: bytes
     known: Known
@@ -89,7 +89,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
         "messages": [[each.number, each.name, each.words] for each in said],
     }
     words = json.dumps(head, ensure_ascii=False).encode()
-    picture = b"" if seen is None else _PICTURES.of(seen, view.choices.zero_mm)
+    picture = b"" if seen is None else _PICTURES.of(seen)
     content = struct.pack(">I", len(words)) + words + picture
     newest = max([known.messages if is_same else 0, *(each.number for each in said)])
     return Next(content, Known(identity, last, newest))
@@ -117,7 +117,7 @@ def _u_mm(row: GapRow) -> float | None:
 
 
 def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
-    """Measured values of the picture's row."""
+    """Measured values of the row that belongs to the displayed picture."""
     choices = view.choices
     if seen is None or seen.row is None:
         return None
@@ -135,25 +135,18 @@ def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
     }
 
 
-def _picture(seen: Seen, zero_mm: float) -> bytes:
-    if seen.outcome is None:
-        drawn = draw_overlay(seen.frame, _NOTHING, _NOTHING.words)
-    else:
-        row = seen.row
-        words = f"{seen.frame.index}"
-        if row is not None:
-            less = f" less zero {zero_mm:.4f}" if zero_mm else ""
-            words += f"  {row.status.value}" if row.gap_mm is None else f"  gap {row.gap_mm - zero_mm:.4f} mm{less}"
-        drawn = draw_overlay(seen.frame, seen.outcome, words)
+def _picture(seen: Seen) -> bytes:
+    """The picture with the measured points; the page itself says frame and value, in letters of its own size."""
+    drawn = draw_overlay(seen.frame, _NOTHING if seen.outcome is None else seen.outcome, "")
     # OpenCV would want blue first: to turn a whole picture's colours round takes twice as long as to code it.
     return bytes(simplejpeg.encode_jpeg(drawn, JPEG_QUALITY, "RGB", "420"))
 
 
 def draw_beforehand(view: View) -> None:
-    """Render in advance the picture for the next messages, unless the measurement lags behind."""
+    """Render the picture for the next messages in advance, unless the measurement is too slow."""
     seen = view.seen
     if seen is not None and not view.in_a_hurry:
-        _PICTURES.of(seen, view.choices.zero_mm)
+        _PICTURES.of(seen)
 
 
 def is_short(view: View, known: Known) -> bool:
@@ -171,22 +164,22 @@ def state_has_changed() -> None:
 
 
 class _Pictures:
-    """The newest picture, rendered only once for all pages."""
+    """The newest picture, encoded only once for all browser pages."""
 
     def __init__(self) -> None:
         self._lock = Lock()
         self._seen: Seen | None = None
-        self._zero_mm, self._coded = 0.0, b""
+        self._coded = b""
 
-    def of(self, seen: Seen, zero_mm: float) -> bytes:
+    def of(self, seen: Seen) -> bytes:
         with self._lock:
-            if self._seen is not seen or self._zero_mm != zero_mm:
-                self._seen, self._zero_mm, self._coded = seen, zero_mm, _picture(seen, zero_mm)
+            if self._seen is not seen:
+                self._seen, self._coded = seen, _picture(seen)
             return self._coded
 
 
 class _States:
-    """State of a view, composed once for all pages that need it at about the same time."""
+    """State of a view, composed once for all browser pages that need it at about the same time."""
 
     def __init__(self) -> None:
         self._lock = Lock()

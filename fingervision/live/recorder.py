@@ -40,7 +40,7 @@ class Recorder:
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether writing to the disk lags behind."""
+        """Whether writing to the disk is slower than the arrival of frames."""
         return self._waiting.qsize() > FRAMES_UNTIL_HURRY
 
     def add(self, what: RecordedFrame | tuple[str, str]) -> None:
@@ -76,7 +76,7 @@ class Recorder:
         )
 
     def _look_at_the_disk(self) -> None:
-        """Check whether the folder was deleted (writing does not report this), and how long disk space suffices."""
+        """Check whether the folder was deleted (writing does not report this), and how long the disk space suffices."""
         if monotonic() - self._looked_s < DISK_EVERY_S:
             return
         self._looked_s = monotonic()

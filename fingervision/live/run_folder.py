@@ -1,4 +1,4 @@
-"""Folder of a recorded run: video, gaps, events and settings, valid whenever the program ends."""
+"""Folder of a recorded run: video, gaps, events and settings, which are valid even if the program is killed."""
 
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace

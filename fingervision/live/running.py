@@ -28,7 +28,7 @@ from fingervision.live.terminal import JsonLines, StatusLine, told
 
 @dataclass(frozen=True, slots=True)
 class Showing:
-    """Output of the live view.
+    """Output of the live view: browser page or terminal.
 
     Parameters
     ----------

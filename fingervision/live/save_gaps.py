@@ -11,7 +11,7 @@ SAVED_GAPS = "live_gaps.csv"
 
 
 def save_gaps(view: View) -> Path:
-    """Save the stored gaps in the format of gaps.csv; for a recording, save the table that `measure` wrote.
+    """Save the gaps in memory in the format of gaps.csv; for a recording, save the table that `measure` wrote.
 
     Raises
     ------

@@ -118,7 +118,7 @@ class Page:
         )
 
     def door(self) -> Path:
-        """Write a local page that redirects to the address, readable only by this user."""
+        """Write a local HTML file that redirects to the address with its token, readable only by this user."""
         path = self._view.out.resolve() / DOOR
         with out_folder(self._view.out):
             path.unlink(missing_ok=True)
@@ -128,7 +128,7 @@ class Page:
         return path
 
     def serve(self, until: Event) -> None:
-        """Serve pages until the event `until` is set."""
+        """Serve browser pages until the event `until` is set."""
         thread = Thread(target=self._run, name="page", daemon=True)
         thread.start()
         while not until.wait(0.2) and thread.is_alive():

@@ -1,4 +1,4 @@
-"""The live measurement: every frame is measured on arrival, and the results are kept for browser pages."""
+"""The live measurement: every frame is measured on arrival, and the results are kept for the browser pages."""
 
 import secrets
 from collections import Counter, deque
@@ -59,8 +59,7 @@ class Session:
     def __init__(self, capture: Capture, choices: Choices, out: Path) -> None:
         self.capture, self.out = capture, out
         self.description = capture.source.description
-        choices.check(self.description)
-        self.choices = choices
+        self.choices = choices.for_frames(self.description)
         self.identity = secrets.token_hex(4)
         self.features: dict[str, Any] = {}
         self.history = History()
@@ -126,7 +125,7 @@ class Session:
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row that is sent to a new page: the row of two minutes ago."""
+        """Number of the first row that is sent to a newly opened browser page: the row of two minutes ago."""
         return max(self.oldest_row, self.history.count - ROWS_SHOWN)
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
@@ -161,8 +160,7 @@ class Session:
                     "The settings of the measurement cannot be changed while a run is recorded: stop recording first."
                 )
             chosen, unzeroed = self.choices.changed(**changes)
-            chosen.check(self.description)
-            self.choices = chosen
+            self.choices = chosen.for_frames(self.description)
         if unzeroed:
             self.say("zero", ZERO_IS_OFF)
 
@@ -179,11 +177,11 @@ class Session:
         with self._lock:
             task = self.choices.task
             if self.ended.is_set():
-                raise StateError("The source has ended, so nothing can be recorded: start again.")
+                raise StateError("The source has ended, so nothing can be recorded: start the live view again.")
             if self._recorder is not None:
                 raise StateError(f"A run is being recorded already, in {self._recorder.run.path}.")
             if self._beginning:
-                raise StateError("A recording is being begun already.")
+                raise StateError("A recording is already being started.")
             if task is None:
                 raise StateError("The scale is not known: give the scale before recording, so that the run has gaps.")
             if not self.description.has_times:
@@ -231,7 +229,7 @@ class Session:
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether measurement or disk lags behind, so that previews should not be rendered."""
+        """Whether measurement or disk is too slow, so that previews should not be rendered."""
         recorder = self._recorder
         lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
         return lags or (recorder is not None and recorder.in_a_hurry)

@@ -77,6 +77,6 @@ class StatusLine:
 
 
 def told(message: Message, outlet: Outlet, *, in_place: bool) -> None:
-    """Print a message of the live measurement."""
+    """Print a message of the live measurement on the terminal."""
     # What stands in place, and the ^C of whoever ends it, gives way.
     outlet.put(f"{CLEARED if in_place else ''}fingervision: {message.words}\n")

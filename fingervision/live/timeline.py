@@ -21,11 +21,11 @@ class Timeline:
         self._last: tuple[float, float, float] | None = None  # on the source's clock, on the host's, as given
 
     def cut(self) -> None:
-        """Record an interruption of the source, after which the clock of the source may start again."""
+        """Record an interruption of the source, after which the source's clock may start again."""
         self._offset_s = None
 
     def at(self, source_s: float, arrived_s: float) -> tuple[float, float]:
-        """Compute the time of a frame in the live view.
+        """Time of a frame since the start of the live view (s).
 
         Parameters
         ----------
@@ -56,5 +56,5 @@ class Timeline:
         return time_s, jump_s
 
     def on_this(self, source_s: float) -> float:
-        """Convert another time of the source, such as that of a packet, to the time of the live view."""
+        """Convert another time of the source, such as that of a packet, to the time since the live view's start."""
         return round((source_s + (self._offset_s or 0.0)) * TICKS_PER_S) / TICKS_PER_S

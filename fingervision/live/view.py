@@ -41,7 +41,7 @@ class View(Protocol):
 
     @property
     def seen(self) -> Seen | None:
-        """The displayed frame with its result."""
+        """The displayed frame with its measurement."""
         ...
 
     @property
@@ -51,7 +51,7 @@ class View(Protocol):
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether the measurement lags behind, so that previews should not be rendered."""
+        """Whether the measurement is too slow, so that previews should not be rendered."""
         ...
 
     @property
@@ -71,7 +71,7 @@ class View(Protocol):
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row that is sent to a new page."""
+        """Number of the first row that is sent to a newly opened browser page."""
         ...
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:

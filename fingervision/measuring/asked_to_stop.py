@@ -11,7 +11,7 @@ from types import FrameType
 def asked_to_stop() -> Iterator[threading.Event]:
     """Record a first Ctrl-C or SIGTERM instead of raising it; a second one is raised as usual.
 
-    Signals are not recorded outside the main thread, or in a worker process that leaves them to its parent process.
+    Signals are not recorded outside the main thread, nor in a worker process, whose parent process handles them.
 
     Yields
     ------

@@ -1,8 +1,8 @@
 """Detect blocks with wrong content in a decoded picture, caused by damage of the stream that the decoder missed.
 
 JPEG and H.264 code the picture in squares of 8 or 16 pixels. Damage puts wrong content into whole squares. The picture
-then has steps along the borders of squares, ending at their corners, where the previous picture has none. Motion of
-objects does not follow this grid, and optics never change an edge within a single pixel.
+then has steps of the grey level along the borders of squares, ending at their corners, where the previous picture has
+none. Motion of objects does not follow this grid, and optics never change an edge within a single pixel.
 
 Method: steps across the borders of blocks are compared with steps inside them, as in measures of blocking artefacts (Z.
 Wang, H. R. Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP
@@ -69,12 +69,12 @@ def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: fl
 
 
 def _levelled(levels: Levels) -> Levels:
-    """Absolute value of the mean step between columns over each block's height, shape (block rows, width - 1)."""
+    """Absolute value of the mean level step between columns over each block's height, shape (block rows, width - 1)."""
     rows = levels.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, levels.shape[1]).mean(axis=1)
     return np.asarray(np.abs(np.diff(rows, axis=1)))
 
 
 def _sized(levels: Levels) -> Levels:
-    """Mean of the absolute steps between columns over each block's height, shape (block rows, width - 1)."""
+    """Mean of the absolute level steps between columns over each block's height, shape (block rows, width - 1)."""
     steps = np.abs(np.diff(levels, axis=1))
     return np.asarray(steps.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, -1).mean(axis=1))

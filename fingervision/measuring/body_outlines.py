@@ -1,4 +1,4 @@
-"""Outlines of a drawing's bodies, divided into chunks, and the placement of the drawing in the picture."""
+"""Outlines of a drawing's bodies, divided into short pieces, and the placement of the drawing in the picture."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -139,14 +139,14 @@ def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
 
 
 def silhouette(mechanism: Mechanism, place: Placement, width_px: int, height_px: int, step_px: int) -> Array:
-    """Mask (0 or 1) of the drawing in the picture, one value every `step_px`; (height / step, width / step)."""
+    """Mask (0 or 1) of the drawing in the picture, one value every `step_px`; shape (height / step, width / step)."""
     x, y = np.meshgrid(np.arange(0, width_px, step_px), np.arange(0, height_px, step_px))
     points = place.to_mm(np.stack([x.ravel(), y.ravel()]).astype(float))
     return np.asarray(mechanism.region.holds(points).reshape(x.shape), dtype=np.float64)
 
 
 def in_sight(chunks: Sequence[Chunks], width_px: int, height_px: int, flat: FlatMap | None = None) -> list[float]:
-    """Fraction of each body's chunks that lie in the picture."""
+    """Fraction of each body's outline pieces that lie in the picture."""
     shares = []
     for each in chunks:
         x, y = each.middles if flat is None else flat.to_picture(each.middles)

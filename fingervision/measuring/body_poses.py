@@ -52,7 +52,7 @@ LAID_BY_ALL = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesMeasured:
-    """Result of following the bodies of a recording.
+    """Result of measuring the poses of the bodies in a recording.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class BodyTracker:
         return [*bodies, *(flexure.name for flexure in self.mechanism.flexures)]
 
     def _view(self, picture: Picture) -> EdgeView:
-        """How edges appear: the edge bias widens a dark body by half of the bias on each side."""
+        """How edges appear in the picture: the edge bias widens a dark body by half of the bias on each side."""
         dark = self.placed is None or self.placed.body_is_dark
         outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
         flat, shared_pixels = flat_map_of(self.scale), picture.shared_pixels
@@ -151,7 +151,7 @@ class BodyTracker:
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
-                f"The edges of {self.mechanism.name} must be visible where it was placed on frame {index}, "
+                f"The edges of {self.mechanism.name} must be visible where the drawing was placed on frame {index}, "
                 "but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )
@@ -201,7 +201,7 @@ class BodyTracker:
         self.placed = replace(self.placed, notes=(*self.placed.notes, words))
 
     def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
-        """Fit a body's motion from its pose in the last frame, or else by a search from farther away."""
+        """Fit a body's motion from its pose in the last frame, or else by a search over a larger distance."""
         dark = self.placed is not None and self.placed.body_is_dark
         chunks, about, last = self._chunks[number], self._about[number], self._last[number]
         found = fit_rigid(grey, chunks, about, dark, last, view)

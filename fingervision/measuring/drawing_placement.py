@@ -42,7 +42,7 @@ in some hundred."""
 
 @dataclass(frozen=True, slots=True)
 class GivenPoint:
-    """A point given in the picture and in the drawing.
+    """A point whose position is known in the picture and in the drawing.
 
     Parameters
     ----------
@@ -121,8 +121,8 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
     scale = float(np.sqrt(np.sum(here**2))) / size
     if abs(scale / px_per_mm - 1.0) > OTHER_SCALE:
         raise UsageError(
-            f"The points of --at must be as far apart as the scale of {px_per_mm:g} px/mm says, but they say "
-            f"{scale:.4g} px/mm: check the points, the drawing's lengths and the calibration."
+            f"The distances between the points of --at must agree with the scale of {px_per_mm:g} px/mm, but "
+            f"correspond to {scale:.4g} px/mm: check the points, the drawing's lengths and the calibration."
         )
     found = []
     for is_mirrored in (False, True) if len(points) > 2 else (False,):
@@ -197,7 +197,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Laid:
-    """A drawing placed by a fit of its edges.
+    """A drawing whose placement was fitted to its edges.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def refined(
 ) -> Laid | None:
     """Refine the placement by the edges of the fixed bodies, or of all bodies if no fixed body is in view.
 
-    None is returned if too few edges are found.
+    The function returns None if too few edges are found.
     """
     height, width = grey.shape
     cut = [outline.chunks(place) for outline in outlines]
@@ -241,7 +241,7 @@ def refined(
 
 
 def together(parts: Sequence[Chunks]) -> Chunks:
-    """Join the chunks of several bodies into one body."""
+    """Join the outline pieces of several bodies into one body."""
     return Chunks(
         np.concatenate([part.middles for part in parts], axis=1),
         np.concatenate([part.normals for part in parts], axis=1),
@@ -297,7 +297,7 @@ def _wrapped(angle: float) -> float:
 def _climbed(
     mask: NDArray[np.bool_], mechanism: Mechanism, place: Placement, size: tuple[int, int, int], overlap: float
 ) -> tuple[float, Placement]:
-    """Rotate and shift a drawing as long as its overlap with the mask grows, with steps that are halved."""
+    """Rotate and shift a drawing in steps that are halved, as long as its overlap with the mask grows."""
     width, height, step = size
     turn, shift = np.pi / TURNS, 6.0 * step
     while shift > 0.5 * step:

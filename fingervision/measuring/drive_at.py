@@ -1,4 +1,4 @@
-"""State of the drive at the time of a frame."""
+"""State of the drive (input, run, force) at the time of a frame."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,8 @@ class DriveState:
 def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
     """Interpolate the drive linearly between the two samples that bracket an instant.
 
-    Nothing is extrapolated: before the first sample, after the last, and between two runs there is no input.
+    Nothing is extrapolated: before the first sample, after the last sample, and between two runs the function returns
+    no input.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ SeeItem = Callable[[Frame | LostFrame, Result], None]
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A recording with the settings of its measurement, each completed by information from the other.
+    """A recording and the settings of its measurement, where each is completed by information from the other.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _outcomes(
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
-    """Attach to losslessly stored frames the coding of the pictures from which they were made."""
+    """Attach to losslessly stored frames the compression of the pictures from which they were made."""
     for item in frames:
         if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
             yield replace(item, coding=coding)

@@ -140,7 +140,7 @@ def _pieces(series: GapSeries) -> list[slice]:
 
 
 def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats, series: GapSeries, *, named: bool) -> None:
-    """Plot one stretch; only the first stretch is named in the legend."""
+    """Plot one stretch of frames; only the first stretch is named in the legend."""
     band_words = "U = 2 u" if series.has_budget else "U = 2 u (from frame to frame)"
     gap_label, band_label = ("gap", band_words) if named else (None, None)
     low, high = gap_mm - expanded_mm, gap_mm + expanded_mm

@@ -15,7 +15,7 @@ from fingervision.measuring.frame_loop import Prepared, Progress, measure_frames
 from fingervision.measuring.outcome import Clock, clock_for, summary_of, undriven
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
-from fingervision.measuring.task import Task, check_task
+from fingervision.measuring.task import Task, task_for_frames
 from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
 from fingervision.storage.gauges_csv import GaugeRow, GaugeRows
 
@@ -85,7 +85,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
     DataError, InputFileError, OutputError
         The scale is for other frames, or a gauge lies outside of them.
     """
-    check_task(task, source.description)
+    task = task_for_frames(task, source.description)
     how = prepared(source.description, task)
     series = GapSeries()
     rows: list[GapRow] = []

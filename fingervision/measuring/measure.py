@@ -21,7 +21,7 @@ from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
-from fingervision.measuring.task import Task, check_task
+from fingervision.measuring.task import Task, task_for_frames
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.storage.summary_json import write_summary
 
@@ -85,7 +85,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
         The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
     """
     refuse_camera(source)
-    check_task(task, source.description)
+    task = task_for_frames(task, source.description)
     with held(out):
         return _measured(source, task, out, on_progress)
 
@@ -146,7 +146,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
 
 
 def refuse_camera(source: FrameSource) -> None:
-    """Refuse a source without an end.
+    """Refuse a source that has no end, such as a camera.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Steps after the last frame: find the drive's clock, write the summary, and explain frames without an input."""
+"""Work after the last frame: find the drive's clock, write the summary, and explain frames without an input."""
 
 from collections.abc import Set
 from dataclasses import replace
@@ -38,7 +38,7 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
 
 
 def undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[bool], where: str) -> DataError | None:
-    """Error that explains why the drive gave no frame an input; None if it gave some, or there is no drive.
+    """Error that explains why no frame has an input; None if a frame has one, or if there is no drive.
 
     Parameters
     ----------

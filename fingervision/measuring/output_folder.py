@@ -18,7 +18,7 @@ GAUGES = "gauges.csv"
 
 @dataclass(frozen=True, slots=True)
 class OutputFolder:
-    """Paths of the files of one measurement."""
+    """Paths of the files that one measurement writes."""
 
     path: Path
 
@@ -113,7 +113,7 @@ def held(out: Path) -> Iterator[None]:
 
 
 def usual_folder(recording: str) -> Path:
-    """Return measured/<file or folder>; for a glob its folder's name; with more of the path if the name is in use."""
+    """Return measured/NAME, with NAME from the file or folder (for a glob, its folder), made unique by its path."""
     path = Path(recording)
     named = path.resolve() if path.exists() else path.parent.resolve()
     parts = [part for part in named.parts if part != named.anchor] or ["images"]

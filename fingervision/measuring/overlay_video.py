@@ -24,7 +24,7 @@ OPTIONS = {"crf": "20", "preset": "veryfast"}
 
 
 class OverlayVideo:
-    """Writes the overlay frame by frame.
+    """Writes the overlay video frame by frame.
 
     Frames that could not be decoded are left out, and so are frames whose time is not later than that of the frame
     before.

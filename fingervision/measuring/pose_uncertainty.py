@@ -1,6 +1,6 @@
-"""Uncertainty of a body's pose: from its own edges in each frame, and from errors common to all frames.
+"""Uncertainty of a body's pose: from its own edges in each frame, and from errors that all frames share.
 
-Common errors are those of the drawing's placement in the picture (itself a fit), the scale, the edge bias, lens and
+Shared errors are those of the drawing's placement in the picture (itself a fit), the scale, the edge bias, lens and
 plane. A pose is measured relative to the drawing, so that the effect of a scale error grows with the distance from the
 edges by which the drawing was placed.
 """
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """Errors of poses that are common to all frames.
+    """Errors of poses that all frames share.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class SharedErrors:
         return max(self.plane.relative_u(at, 0.0), self.plane.relative_u(at, 0.5 * pi), self.size_error)
 
     def of_pose(self, fit: RigidFit, about_px: Array, in_picture: Array) -> "SharedPose":
-        """Compute the effect of the common errors on one pose.
+        """Compute the effect of the shared errors on one pose.
 
         Parameters
         ----------
@@ -83,7 +83,7 @@ class SharedErrors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedPose:
-    """Effect of the common errors on one pose, in pixels and rad.
+    """Effect of the shared errors on one pose, in pixels and rad.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class SharedPose:
 
     @property
     def covariance(self) -> Array:
-        """Covariance of all common errors together, shape (3, 3)."""
+        """Covariance of all shared errors together, shape (3, 3)."""
         own = (
             self.placed
             + self.by_shadows
@@ -116,7 +116,7 @@ class SharedPose:
         return own
 
     def u_turn_against(self, other: "SharedPose") -> float:
-        """Standard uncertainty, common to all frames, of the angle between two bodies (rad).
+        """Standard uncertainty (rad) that all frames share, of the angle between two bodies.
 
         The error of the drawing's placement cancels in this angle.
         """

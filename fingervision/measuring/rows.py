@@ -34,7 +34,7 @@ class Result:
 
 
 def result_of(item: Frame | LostFrame, outcome: GapMeasurement | NoGap | LostFrame) -> Result:
-    """Keep what the table needs from a frame and its result, without the picture."""
+    """Keep from a frame and its result what the table needs, without the picture."""
     return Result(item.index, item.time_s, outcome)
 
 

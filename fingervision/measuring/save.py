@@ -48,7 +48,10 @@ def save_measured(
     description, task, series = found.source.description, found.task, found.series
     first, last = (found.rows[0].frame, found.rows[-1].frame) if found.rows else (0, -1)
     if steps_frame is not None and not first <= steps_frame <= last:
-        raise UsageError(f"--steps must be the number of a frame, {first} to {last}, but is {steps_frame}.")
+        raise UsageError(
+            f"--steps (pictures of the processing steps) must be the number of a frame, {first} to {last}, but "
+            f"is {steps_frame}."
+        )
     refuse_other_recording(out, description.name)
     with held(out):
         folder = claimed(out, description.files)
@@ -62,7 +65,9 @@ def save_measured(
         if steps_frame is not None:
             wanted = next((item for item in again if item.index == steps_frame), None)
             if not isinstance(wanted, Frame):
-                raise UsageError(f"--steps must be a frame that can be read, but {steps_frame} cannot.")
+                raise UsageError(
+                    f"--steps must be the number of a frame that can be read, but frame {steps_frame} cannot."
+                )
             write_steps(wanted, found.how.settings, folder.steps)
         draw_gap(folder.figure, series, task.drive, clock_drawn(found.clock, task))
         write_summary(folder.summary, found.summary)

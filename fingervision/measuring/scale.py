@@ -5,8 +5,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.calibration import BareScale
 from calib.distances import Distances
-from fingervision.domain.errors import UsageError
+from calib.stated_scale import StatedScale
+from fingervision.domain.errors import DataError, UsageError
 
 # From a picture of a street to one through a microscope; what lies beyond is a slip, and overflows later.
 LEAST_PX_PER_MM, MOST_PX_PER_MM = 1e-3, 1e6
@@ -29,6 +31,47 @@ def check_px_per_mm(px_per_mm: float) -> None:
         )
 
 
+def stated_scale(px_per_mm: float, u_px_per_mm: float | None = None) -> BareScale:
+    """Return a scale that the user states, with its standard uncertainty if this is stated too.
+
+    Raises
+    ------
+    UsageError
+        The scale is not positive or outside the range of real cameras, or its uncertainty is not positive or not
+        smaller than the scale.
+    """
+    if not px_per_mm > 0.0:
+        raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.")
+    check_px_per_mm(px_per_mm)
+    if u_px_per_mm is None:
+        return BareScale(px_per_mm)
+    if not 0.0 < u_px_per_mm < px_per_mm:
+        raise UsageError(
+            f"--u-px-per-mm must be positive and smaller than --px-per-mm ({px_per_mm:g}), but is {u_px_per_mm:g}: "
+            "state the standard uncertainty of the scale in pixels per millimetre, or leave it out."
+        )
+    return StatedScale(px_per_mm, u_px_per_mm)
+
+
+def check_one_scale(calibration: object, px_per_mm: object, u_px_per_mm: object) -> None:
+    """Refuse two scales at once, and an uncertainty that is stated without its scale.
+
+    Raises
+    ------
+    UsageError
+        Both a calibration and a scale are given, or the uncertainty of a scale that is not.
+    """
+    if calibration is not None and px_per_mm is not None:
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
+    if u_px_per_mm is not None and calibration is not None:
+        raise UsageError(
+            "--u-px-per-mm belongs to --px-per-mm, but --calibration is given, which has its own uncertainty: "
+            "leave one out."
+        )
+    if u_px_per_mm is not None and px_per_mm is None:
+        raise UsageError("--u-px-per-mm needs the scale whose uncertainty it is, but there is none: add --px-per-mm S.")
+
+
 class Scale(Protocol):
     """Conversion from pixels to millimetres; see `calib.calibration.BareScale` for shapes and units."""
 
@@ -39,7 +82,7 @@ class Scale(Protocol):
 
     @property
     def edge_bias_px(self) -> float:
-        """Edge bias b of the calibration: loss of width of a light gap between straight dark edges (pixels)."""
+        """Edge bias b of the calibration (px): loss of width of a light gap between straight dark edges."""
         ...
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
@@ -55,3 +98,25 @@ class Scale(Protocol):
     def check_frame_size(self, width_px: int, height_px: int) -> None:
         """Refuse frames of another size than those of the calibration."""
         ...
+
+
+def scale_for_frames(scale: Scale, frame_size_px: tuple[int, int]) -> Scale:
+    """Return the scale for frames of a given size; a stated uncertainty becomes an uncertainty budget.
+
+    Parameters
+    ----------
+    scale : Scale
+        The scale as it was given; only one that was stated with its uncertainty is changed.
+    frame_size_px : (int, int)
+        Width and height of the frames.
+
+    Raises
+    ------
+    DataError
+        The scale is for other frames.
+    """
+    try:
+        scale.check_frame_size(*frame_size_px)
+    except ValueError as error:
+        raise DataError(str(error)) from error
+    return scale.for_frames(frame_size_px) if isinstance(scale, StatedScale) else scale

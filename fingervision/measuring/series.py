@@ -1,4 +1,4 @@
-"""Series of gaps over time, with a few numbers per frame, so that an hour of video needs a few megabytes."""
+"""Series of gaps over time, with few numbers per frame, so that an hour of video needs only some megabytes."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ class GapSeries:
 
     @property
     def response_px(self) -> NDArray[np.float64]:
-        """Change of each gap (pixels) if the camera response were the other possible one.
+        """Change of each gap (px) if the camera response were the alternative one.
 
         It is 0 if the response is known.
         """

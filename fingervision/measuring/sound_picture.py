@@ -38,7 +38,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sound:
-    """The last frame accepted as undamaged, with its result and its number."""
+    """The last frame that was accepted as undamaged, with its result and its number."""
 
     frame: Frame
     outcome: GapMeasurement
@@ -106,7 +106,7 @@ def _points(outcome: GapMeasurement) -> tuple[Points, Points]:
 
 
 def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> bool:
-    """Whether the picture shows codec squares that are missing in the last undamaged picture, shifted or not."""
+    """Whether the picture shows squares of the codec's grid that the last undamaged picture lacks, shifted or not."""
     if frame.pixels.shape != last.frame.pixels.shape:
         return False
     rows, columns = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)

@@ -14,7 +14,7 @@ from fingervision.vision.pipeline import Settings, steps
 def write_steps(
     frame: Frame, settings: Settings, folder: Path, more: Sequence[tuple[str, Pixels]] = ()
 ) -> tuple[Path, ...]:
-    """Write every step of one frame as `01_grey.png`, `02_...` and so on.
+    """Write the picture of every processing step of one frame as `01_grey.png`, `02_...` and so on.
 
     Parameters
     ----------

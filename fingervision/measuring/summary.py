@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.measured_scale import Calibration
+from calib.stated_scale import is_stated
 from fingervision import __version__
 from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
@@ -42,8 +43,9 @@ BESIDE = {
     "shorter exposure removes it.",
     "sharpening": "the camera sharpens its pictures; what that moves the edges by is taken off, and what is not sure "
     "of it is in u_shift_px. Switch sharpening off in the camera's settings.",
-    "roughness": "the edges stray from a mean line more than their noise (rough, printed, or with a texture): the mean "
-    "line is measured, with the scatter in the uncertainty. A contact is made by the crests, farther out.",
+    "roughness": "the edges stray from a mean line more than their noise (rough, printed, textured, or by a lossy "
+    "codec): the mean line is measured, with the scatter in the uncertainty. A rough finger's contact is made by its "
+    "crests, farther out.",
     "interlaced": "even and odd rows were seen at two times (interlaced): the gap is that of the middle. Record "
     "progressive pictures.",
 }
@@ -194,7 +196,7 @@ def _scale(scale: Scale, file: Path | None) -> dict[str, Any]:
     if not isinstance(scale, Calibration):
         return {"kind": "stated", "px_per_mm": scale.px_per_mm, "u_px_per_mm": None}
     return {
-        "kind": "calibration",
+        "kind": "stated" if is_stated(scale) else "calibration",
         "file": None if file is None else str(file),
         "sha256": None if file is None else _sha256((file,)),
         "px_per_mm": scale.px_per_mm,
@@ -218,7 +220,7 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
     )
     never = [
         "movement during the exposure",
-        "change of the bench since the calibration (focus, camera, light)",
+        "change of the set-up since the calibration (focus, camera, light)",
         "a finger's outline that is not the edge seen from above (thickness, burr)",
     ]
     if not isinstance(scale, Calibration):
@@ -240,7 +242,10 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
         "expanded": "U = k u_gap_mm with k = 2 (JCGM 100); about 95 %.",
         "covers": [
             random,
-            "scale and edge bias with their covariance, from the calibration",
+            f"the scale as stated, {scale.px_per_mm:g} px/mm with u = {scale.u_px_per_mm:g} px/mm (k = 1), and an "
+            f"unknown edge bias within +-{scale.limits.edge_bias_px:g} px"
+            if is_stated(scale)
+            else "scale and edge bias with their covariance, from the calibration",
             "what the edges show of a bright rim, a wall or a shadow, or of light just beyond the end of the scale",
             *([response] if is_assumed else []),
             *(
@@ -261,7 +266,7 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
 def _sha256(files: tuple[Path, ...]) -> str | None:
     """Hash of one file's bytes; for several files, the hash of their names and hashes in order.
 
-    None is returned for a live source.
+    The function returns None for a live source.
     """
     if not files:
         return None

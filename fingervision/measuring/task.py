@@ -1,6 +1,6 @@
 """Settings of a measurement of a recording or of a live view."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -8,12 +8,12 @@ from typing import Any
 from calib.camera_response import CameraResponse
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import DataError, UsageError
+from fingervision.domain.errors import UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
 from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.measuring.response_budget import choose_response
-from fingervision.measuring.scale import Scale
+from fingervision.measuring.scale import Scale, scale_for_frames
 from fingervision.vision.pipeline import Settings
 
 
@@ -77,7 +77,10 @@ class Task:
         if self.drive_offset_s is not None and not isfinite(self.drive_offset_s):
             raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
         if self.steps_frame is not None and self.steps_frame < 0:
-            raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
+            raise UsageError(
+                f"--steps (pictures of the processing steps) must be the number of a frame, from 0, but is "
+                f"{self.steps_frame}."
+            )
         if self.frames is not None and not 0 <= self.frames[0] <= self.frames[1]:
             raise UsageError(
                 f"--frames must be FIRST:LAST, from 0 and rising, but is {self.frames[0]}:{self.frames[1]}."
@@ -85,7 +88,7 @@ class Task:
 
     @property
     def settings(self) -> Settings:
-        """Settings for the image processing, as far as they do not depend on the recording."""
+        """Settings for the image processing that do not depend on the recording."""
         return self.settings_for(())[0]
 
     def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
@@ -106,14 +109,14 @@ class Task:
 
     @property
     def drive_columns(self) -> tuple[str, ...]:
-        """Columns that the drive adds to the table."""
+        """Names of the columns that the drive adds to the table."""
         if self.drive is None:
             return ()
         return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
 
 
-def check_task(task: Task, description: Description) -> None:
-    """Refuse settings that are impossible for the given frames.
+def task_for_frames(task: Task, description: Description) -> Task:
+    """Refuse settings that are impossible for frames of a given size; complete the scale by the frames' size.
 
     Parameters
     ----------
@@ -121,6 +124,11 @@ def check_task(task: Task, description: Description) -> None:
         Settings of the measurement.
     description : Description
         Known properties of the frames.
+
+    Returns
+    -------
+    Task
+        The settings for these frames.
 
     Raises
     ------
@@ -143,20 +151,24 @@ def check_task(task: Task, description: Description) -> None:
             f"--roi must lie inside the frame of {width_px}x{height_px} pixels, but is "
             f"{region.x_px},{region.y_px},{region.width_px},{region.height_px} (first column, row, width, height)."
         )
+    below_px = task.below_tip_mm * task.scale.px_per_mm
+    if below_px >= max(width_px, height_px):
+        raise UsageError(
+            f"--below-tip-mm must lie within the picture of {width_px}x{height_px} pixels, but "
+            f"{task.below_tip_mm:g} mm are {below_px:.0f} px at {task.scale.px_per_mm:g} px/mm: state a smaller "
+            "height, or the right scale."
+        )
     if task.drive is not None and not description.has_times:
         raise UsageError(
             f"--drive needs a recording with times, but {description.name} has none: "
             "give --rate-hz, or a times.csv beside the images."
         )
     check_gauges(task.gauges, width_px, height_px)
-    try:
-        task.scale.check_frame_size(width_px, height_px)
-    except ValueError as error:
-        raise DataError(str(error)) from error
+    return replace(task, scale=scale_for_frames(task.scale, (width_px, height_px)))
 
 
 def in_words(task: Task, settings: Settings) -> dict[str, Any]:
-    """The settings in the form in which the summary lists them."""
+    """The settings in the form in which summary.json lists them."""
     region = task.region
     return {
         "below_tip_mm": task.below_tip_mm,

@@ -1,7 +1,7 @@
-"""Effect of the edge bias on a gap below round tips, which is smaller than at the calibration's straight edges.
+"""Uncertainty of a gap below round tips because the edge bias also shifts the tips, unlike at straight edges.
 
 The edge bias b moves the whole outline inwards by b / 2, including the tip. The measuring point lies at a fixed
-distance below the tip, and moves down with it. At an edge of slope m (movement into the gap per pixel towards the root)
+distance below the tip, and moves with the tip. At an edge of slope m (movement into the gap per pixel towards the root)
 the measured edge moves by (b / 2) (sqrt(1 + m^2) - m) instead of b / 2. The gap is corrected by the calibration's
 formula for straight edges; the difference is added to its uncertainty.
 """
@@ -15,7 +15,7 @@ from fingervision.domain.gap import GapMeasurement
 
 
 def u_tip_bias_mm(measured: Sequence[GapMeasurement], edge_bias_px: float, px_per_mm: float) -> NDArray[np.float64]:
-    """Standard uncertainty (mm), shape (n,), of each gap because the shift of the tips compensates part of the bias.
+    """Standard uncertainty (mm) of each gap, because the shift of the tips compensates part of the bias; shape (n,).
 
     Parameters
     ----------

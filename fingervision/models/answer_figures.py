@@ -23,7 +23,7 @@ class PeakStress:
 
 @dataclass(frozen=True, slots=True)
 class LoadedState:
-    """State of one model at one input, with all the physics that the model includes.
+    """State of one model at one input, with all the physics (large rotation, contact) that the model includes.
 
     Parameters
     ----------

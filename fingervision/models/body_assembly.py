@@ -27,7 +27,7 @@ _OVER = 1.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyAssembly:
-    """The meshed and condensed bodies, and which motions of their frames are fixed or driven.
+    """The meshed and condensed bodies, and which motions of their coordinate frames are fixed or driven.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ class BodyAssembly:
         Indices of the two frames that each flexure joins.
     held : tuple of int
         Indices of the frame motions that supports fix; frame i has the motions 3 i to 3 i + 2.
-    by_input : dict of int to float
-        Frame motions that the drive prescribes, per 1 mm of input.
+    by_drive : tuple of dict of int to float
+        Frame motions that every drive prescribes, per 1 mm of its own motion.
     """
 
     plate: PlaneStressPlate
@@ -54,7 +54,7 @@ class BodyAssembly:
     turning: tuple[CorotationalBody, ...]
     ends: tuple[tuple[int, int], ...]
     held: tuple[int, ...]
-    by_input: dict[int, float]
+    by_drive: tuple[dict[int, float], ...]
 
     def field(self, moved: Array) -> tuple[Array, csr_matrix]:
         """Displacement of every node of the bodies in the deformed shape; its derivative by the frames' motions."""
@@ -79,7 +79,7 @@ class BodyAssembly:
         return field, csr_matrix(slopes)
 
     def motion_mm(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
-        """Displacement of a point of the nearest body, from the frames' motions."""
+        """Displacement of a point of the nearest body, from the coordinate frames' motions (mm)."""
         plate = self.plate
         nodes, weights = element_weights(plate.nodes_mm, plate.nodes_of_triangles, point)
         number = int(self.piece[nodes[0]])
@@ -95,7 +95,7 @@ class BodyAssembly:
 
 
 class _Frames:
-    """Collect the coordinate frames of all bodies, the body of each frame, and the fixed and driven motions."""
+    """Collects the coordinate frames of all bodies, the body of each frame, and the fixed and driven motions."""
 
     def __init__(self, plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> None:
         self.plate, self.mechanism, self.size_mm = plate, mechanism, size_mm
@@ -103,11 +103,11 @@ class _Frames:
         self.found: list[Frame] = []
         self.owner: list[int] = []
         self.held: list[int] = []
-        self.by_input: dict[int, float] = {}
+        self.by_drive: list[dict[int, float]] = []
         self._taken: set[int] = set()
 
     def add(self, frame: Frame, body: int) -> int:
-        """Add a frame to those of a body; return the index of the first of the frame's three motions."""
+        """Add a coordinate frame to those of a body; return the index of the first of its three motions."""
         self.found.append(frame)
         self.owner.append(body)
         return 3 * len(self.found) - 3
@@ -115,7 +115,8 @@ class _Frames:
     def face(self, nodes: Indices, tied: tuple[str, ...]) -> list[tuple[int, bool]]:
         """Add the coordinate frames of a face, one for each body that the face touches.
 
-        Return, for each frame, the index of its first motion and whether the face's tied components prevent rotation.
+        Return, for each coordinate frame, the index of its first motion and whether the face's tied components prevent
+        rotation.
         """
         added = []
         for body in np.unique(self.piece[nodes]).tolist():
@@ -130,11 +131,14 @@ class _Frames:
         for nodes in supports.fixed:
             for at, turns in self.face(nodes, ("x", "y")):
                 self.held += [at, at + 1] + [at + 2] * turns
-        kept = driven_components(mechanism)
-        in_the_mean = len(kept) == 1 and turns_with(self.plate, supports.driven, kept[0])
-        for at, turns in self.face(supports.driven, () if in_the_mean else kept):
-            self.by_input |= {at + "xy".index(c): mechanism.drive.direction["xy".index(c)] for c in kept}
-            self.by_input |= {at + 2: 0.0} if turns else {}
+        for drive, nodes in zip(mechanism.drives, supports.driven, strict=True):
+            kept = driven_components(drive)
+            own: dict[int, float] = {}
+            in_the_mean = len(kept) == 1 and turns_with(self.plate, nodes, kept[0])
+            for at, turns in self.face(nodes, () if in_the_mean else kept):
+                own |= {at + "xy".index(c): drive.direction["xy".index(c)] for c in kept}
+                own |= {at + 2: 0.0} if turns else {}
+            self.by_drive.append(own)
         for nodes, component in supports.slides:
             for at, turns in self.face(nodes, (component,)):
                 self.held += [at + "xy".index(component)] + [at + 2] * turns
@@ -185,4 +189,4 @@ def assemble_bodies(
     turning = [CorotationalBody(np.array([frames.found[i].at_mm for i in body.frames]), body.stiffness_n_mm)
                for body in bodies]  # fmt: skip
     return BodyAssembly(plate, piece, tuple(frames.found), tuple(bodies), tuple(turning), ends, tuple(frames.held),
-                        frames.by_input)  # fmt: skip
+                        tuple(frames.by_drive))  # fmt: skip

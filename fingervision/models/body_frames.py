@@ -52,7 +52,7 @@ def pieces_of(plate: PlaneStressPlate) -> Indices:
 
 
 def nodes_of(plate: PlaneStressPlate, frame: Frame) -> Indices:
-    """Return the nodes whose displacements are coupled to a frame."""
+    """Return the nodes whose displacements are coupled to a coordinate frame."""
     place_of = np.empty(plate.unknowns, dtype=np.int64)
     place_of[plate.x_dofs] = place_of[plate.y_dofs] = np.arange(plate.x_dofs.size)
     return np.asarray(place_of[np.unique(frame.rows.nonzero()[1])])
@@ -61,8 +61,8 @@ def nodes_of(plate: PlaneStressPlate, frame: Frame) -> Indices:
 def section_frame(plate: PlaneStressPlate, at_mm: Array, axis: Array, height_mm: float, near_mm: float) -> Frame:
     """Coordinate frame of a section cut perpendicular to an axis.
 
-    The frame's motion is the mean of the section's displacements, weighted by the stresses of a beam: uniform for
-    tension, linear for bending and parabolic for shear over the height.
+    The motion of this coordinate frame is the mean of the section's displacements, weighted by the stresses of a beam:
+    uniform for tension, linear for bending and parabolic for shear over the height.
 
     Parameters
     ----------

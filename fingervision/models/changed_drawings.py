@@ -16,7 +16,7 @@ describe different things, such as a stress peak at another place."""
 
 
 def ratios(own: Figures, bars: Figures) -> dict[str, float]:
-    """Ratio of each figure of the model to that of the bar model, for the unchanged drawing; 1 where none is usable."""
+    """Ratio of each figure of the model to the bar model's figure, for the unchanged drawing; 1 if not usable."""
     return {name: _ratio(own[name], value) for name, value in bars.items()}
 
 

@@ -25,7 +25,7 @@ class ComplianceChain:
 
     @cached_property
     def _global(self) -> list[Array]:
-        """Compliance of every member at its end, in global axes: equation (5) of Hricko and Havlik (2015)."""
+        """Compliance of every member at its end, in global axes, by equation (5) of Hricko and Havlik (2015)."""
         turned_all = []
         for member in self.skeleton.members:
             angle = np.arctan2(member.end_mm[1] - member.start_mm[1], member.end_mm[0] - member.start_mm[0])
@@ -43,7 +43,7 @@ class ComplianceChain:
 
     @cached_property
     def _whole(self) -> Array:
-        """Motion of each member's end under loads at each member's end, in 6 by 6 blocks, shape (6 n, 6 n)."""
+        """Motion of each member's end under loads at each member's end, in 6 by 6 blocks; shape (6 n, 6 n)."""
         members = self.skeleton.members
         paths = [set(self.path(place)) for place in range(len(members))]
         total = np.zeros((6 * len(members), 6 * len(members)))
@@ -58,7 +58,7 @@ class ComplianceChain:
         return total
 
     def flexibility(self, moved: int, loaded: int) -> Array:
-        """Motion of one member's end under a load at another's: sum (12) over the members common to both paths.
+        """Motion of one member's end under a load at another's: the sum (12) over the members of both load paths.
 
         Returns
         -------

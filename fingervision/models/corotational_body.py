@@ -37,7 +37,7 @@ class CorotationalBody:
     stiffness_n_mm: Array
 
     def strained(self, moved: Array) -> Array:
-        """Motions of the frames relative to the first one, shape (3 m,), from their absolute motions."""
+        """Motions of the coordinate frames relative to the first one, shape (3 m,), from their absolute motions."""
         local = moved.reshape(-1, 3)
         at_rest = self.places_mm - self.places_mm[0]
         drift = local[:, :2] - local[0, :2]
@@ -65,7 +65,7 @@ class CorotationalBody:
         return found.reshape(local.size, local.size)
 
     def forces_n(self, moved: Array) -> tuple[Array, Array]:
-        """Tangent stiffness, shape (3 m, 3 m), and forces, shape (3 m,), for given motions of the frames."""
+        """Tangent stiffness, shape (3 m, 3 m), and forces, shape (3 m,), for given motions of the coordinate frames."""
         local = moved.reshape(-1, 3)
         loads = self.stiffness_n_mm @ self.strained(moved)
         slope = self.slope(moved)

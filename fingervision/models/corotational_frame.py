@@ -1,8 +1,8 @@
 """A plane frame of two-node corotational elements: large rotations, small strains.
 
-Each element has a linear law between its elongation, the rotations of its ends from its chord, and the forces; the
-chord may rotate by any angle. Source: Crisfield, Non-linear Finite Element Analysis of Solids and Structures, volume 1,
-section 7.3.
+Each element has a linear law that relates its elongation and the rotations of its ends from its chord to the forces;
+the chord may rotate by any angle. Source: Crisfield, Non-linear Finite Element Analysis of Solids and Structures,
+volume 1, section 7.3.
 """
 
 from dataclasses import dataclass
@@ -87,7 +87,7 @@ class CorotationalFrame:
         return np.asarray(np.einsum("mij,mj->mi", self._natural, self._deformation(displacement)[0]))
 
     def _deformation(self, displacement: Array) -> tuple[Array, Array, Array, Array]:
-        """Elongation and end rotations relative to the chord, shape (m, 3); chord's cosine, sine and length."""
+        """Elongation and end rotations relative to the chord, shape (m, 3), with the chord's cosine, sine, length."""
         local = displacement[self._dofs]
         at_rest = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
         drift = local[:, 3:5] - local[:, 0:2]

@@ -22,11 +22,11 @@ GAP = "gap"
 
 @runtime_checkable
 class DrawnMechanism(Protocol):
-    """A model whose drawing names its hinges, links and bodies."""
+    """Protocol of a model whose drawing names its hinges, links and bodies."""
 
     @property
     def places(self) -> PlaceAnswers:
-        """Predictions of the gap with a hinge, link or body of the drawing changed."""
+        """Object that predicts the gap with one hinge, link or body of the drawing changed."""
         ...
 
 
@@ -87,5 +87,5 @@ class MechanismModelOfGap:
 
     @cached_property
     def places(self) -> PlaceAnswers:
-        """Predictions of the gap with a hinge, link or body of the drawing changed."""
+        """Object that predicts the gap with one hinge, link or body of the drawing changed."""
         return PlaceAnswers(self.mechanism, self._model if isinstance(self._model, MechanismFrame) else None)

@@ -65,7 +65,7 @@ class BlockShape:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """All dimensions as one row of numbers."""
+        """All dimensions of the block as one row of numbers."""
         return (self.half_width, self.low, self.high, *self.start, *self.end, self.face_half, self.poisson)
 
     @property

@@ -136,9 +136,9 @@ class DrivenBody:
 
     @cached_property
     def face_displacement_mm(self) -> Array:
-        """Small displacements of the body with the drive fixed, under a unit force on one face point after another.
+        """Small displacements of the body with fixed drive under a unit force on one face point, for each face point.
 
-        There is one column for each face point.
+        The result has one column for each face point.
         """
         loads = np.zeros((self.unknowns, self.face.size))
         loads[self.face, np.arange(self.face.size)] = 1.0

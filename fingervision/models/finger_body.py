@@ -132,7 +132,7 @@ def is_of_finger(name: str) -> bool:
 def _unit_body(
     body: Body, hinge: Hinge, lever: Lever, links: Links, poisson: float, stations: tuple[_Station, ...]
 ) -> tuple[Indices, Array, Array]:
-    """Order of the stations; stiffness and mass for unit modulus, density (kg/m^3) and plate thickness."""
+    """Order of the kept nodes; stiffness and mass for unit modulus, density (kg/m^3) and plate thickness."""
     gripper = Gripper(Material("unit", 1.0, poisson, 1.0, 1.0), body, hinge, lever, links)
     mechanism = half_mechanism(gripper)
     spans = _spans(hinge, lever, links)
@@ -198,7 +198,7 @@ def _frames(
     stations: tuple[_Station, ...],
     size_mm: float,
 ) -> tuple[list[Frame], list[int]]:
-    """Frames of the kept stations (two cuts, the face, patches in between), and the stations' indices."""
+    """Coordinate frames of the kept nodes (two cuts, the face, patches in between), and the indices of these nodes."""
     names = [station.name for station in stations]
     cuts = [0, len(names) - 1 - names[::-1].index("stub")]
     face = names.index("measuring point")
@@ -227,7 +227,7 @@ def _frames(
 
 
 def _moved(frame: Frame, to_mm: PointMm) -> Frame:
-    """Express a frame by the motion of another point of the same rigid section."""
+    """Express a coordinate frame by the motion of another point of the same rigid section."""
     arm = frame.at_mm - np.array(to_mm)
     carried = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])
     return Frame(np.array(to_mm), frame.rows, frame.motion @ carried)
@@ -257,7 +257,7 @@ def _tie(
     kept: list[int],
     place: int,
 ) -> Array:
-    """Matrix from the motions of the kept stations to the motion of a following node, shape (3, 3 k)."""
+    """Matrix from the motions of the kept nodes to the motion of a node that follows them, shape (3, 3 k)."""
     station = stations[place]
     tie = np.zeros((3, shapes_mm.shape[1]))
     if station.name in _ON_FACE:

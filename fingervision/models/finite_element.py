@@ -146,7 +146,7 @@ class FiniteElementGripper:
         return out_of_plane(half_mechanism(self.gripper))
 
     def figures(self) -> ModelFigures:
-        """Characteristic numbers of the model for the comparison table."""
+        """Characteristic numbers (slope, stiffness, stress, frequencies) of the model for the comparison table."""
         return ModelFigures(
             gap_per_input(self.half),
             self.half.equilibrium(1.0).force_n,

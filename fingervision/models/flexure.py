@@ -72,7 +72,7 @@ class Flexure:
         return Polygon(tuple(self.point_mm(a, b) for a, b in places))
 
     def steps(self) -> list[tuple[bool, Shape]]:
-        """Shapes that the flexure adds to the region or removes from it."""
+        """Shapes that the flexure adds to the drawing's region or removes from it."""
         half = 0.5 * self.thickness_mm
         if self.kind == "leaf":
             ends = (*self.point_mm(-self.half_length_mm, 0.0), *self.point_mm(self.half_length_mm, 0.0))
@@ -139,7 +139,7 @@ class Flexure:
         return 0.5 * (swayed - bent)
 
     def zone(self, plate_mm: float) -> ConstrainedZone:
-        """Zone in which the plate's width restrains the flexure, and how strongly, in the way that it is used."""
+        """Zone in which the plate's width restrains the flexure, with the degree of restraint that the models use."""
         share = self.width_share(plate_mm)
         if self.used is not None:
             stretched = stretched_share(plate_mm / self.bent_mm, _POISSON)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fingervision.domain.gripper import Material
 from fingervision.models.flexure import Flexure
 from fingervision.models.hinge_compliance import beam_compliance
-from fingervision.models.hinge_correction import HingeTheory, hinge_ratio
+from fingervision.models.hinge_correction import SWAY_SHEAR, HingeTheory, hinge_ratio, sway_shear
 from fingervision.models.notch import Notch
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon
@@ -107,8 +107,14 @@ class FlexureSpan:
             notch = self.notch(plate_mm)
             wide = notch if width_effect else replace(notch, plate_mm=_NARROW * notch.thickness_mm)
             root = np.sqrt(hinge_ratio(wide, material, theory)[[0, 1, 5]])
-            parts = [beam_compliance(notch, material, span)[_PLANAR] for span in spans]
-            return np.asarray(root[:, None] * np.array(parts) * root)
+            parts = np.array([beam_compliance(notch, material, span)[_PLANAR] for span in spans])
+            found = root[:, None] * parts * root
+            if corrected:
+                # Sections of a notch are not sheared as a straight beam's are, and bending does not make them yield.
+                beam = _SHEAR * material.youngs_modulus_mpa / material.shear_modulus_mpa
+                shear = sway_shear(notch) - SWAY_SHEAR + root[1] ** 2 * (SWAY_SHEAR - beam)
+                found[:, 1, 1] += shear * parts[:, 0, 0]
+            return np.asarray(found)
         shares = (0.0, 0.0)
         if corrected and width_effect:
             ratio = plate_mm / self.flexure.bent_mm
@@ -122,7 +128,8 @@ def _segment(
 ) -> Array:
     """Compliance of a Timoshenko beam of varying height between two positions along the flexure's axis.
 
-    `bent` and `stretched` are its compliances over those of a strip that no width holds back.
+    `bent` and `stretched` are the ratios of the flexure's compliances to those of a strip that is not restrained by its
+    width.
     """
     nodes, weights = _GAUSS
     half = 0.5 * (span[1] - span[0])
@@ -157,7 +164,7 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
 
 
 def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:
-    """Whether, at each position, the material across the axis is that of the flexure only."""
+    """Whether, at each position along the axis, the material across the axis is that of the flexure only."""
     half = 0.5 * flexure.height_mm(stations)
     apart = _BESIDE * flexure.thickness_mm
     found = np.ones(stations.size, dtype=bool)

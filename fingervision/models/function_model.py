@@ -82,7 +82,7 @@ class FunctionModel:
         else:
             raise ModelError(
                 f"The gap of {self.path} must come to rest at a held input, but still moves after {HOLDS_S[-1]:g} s: "
-                "give a model that is stable, or a table of its static answer."
+                "give a model that is stable, or a table of its static response."
             )
         last = answer.at(np.arange(3, 3 * places.size + 1, 3))
 

@@ -1,7 +1,7 @@
 """Time integration of a body in large rotation and contact: the generalised-alpha method.
 
-The method is second-order accurate in the time step, with adjustable damping of frequencies too high for the step.
-Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371.
+The method is second-order accurate in the time step, with adjustable damping of frequencies that the step does not
+resolve. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371.
 """
 
 from collections.abc import Callable
@@ -135,7 +135,7 @@ class _Factor:
 
 
 def _at_first(mass: csr_matrix, free: NDArray[np.int64], right: Array) -> Array:
-    """Accelerations at the start; zero for unknowns without mass."""
+    """Accelerations at the start of the motion; zero for unknowns without mass."""
     part = mass[free][:, free].tocsc()
     if np.all(part.diagonal()):
         return np.asarray(splu(part).solve(right))

@@ -83,7 +83,7 @@ def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
 def mechanical_advantage(body: DrivenBody) -> float | None:
     """Increase of each finger's gripping force per increase of drive force, once the fingers touch each other.
 
-    The rest of the drive's work bends hinges and fingers. None is returned for fingers that do not close.
+    The remaining work of the drive bends hinges and fingers. The function returns None for fingers that do not close.
     """
     touch = body.first_touch_mm()
     if touch is None:

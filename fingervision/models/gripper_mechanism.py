@@ -14,7 +14,8 @@ _FAR = 3.0
 def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mechanism:
     """Describe the right half as a mechanism that slides along the symmetry axis; its tip may touch that axis.
 
-    The gap is twice the distance of the probe `tip` from the axis, and the force of both halves is twice the drive's.
+    The gap is twice the distance of the probe `tip` from the axis, and the force of the whole gripper is twice the
+    half's force at the drive.
     """
     x0, x1, low, high = _drive_box(gripper)
     top = gripper.links.drive_block_mm[3]
@@ -29,7 +30,7 @@ def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mecha
         flexures=_flexures(gripper, 1.0, ""),
         fixed=(_foot(gripper, 1.0, "clamp"),),
         slides=((Face("symmetry axis", (0.0, 0.0, low, top)), "x"),),
-        drive=Drive(Face("drive", (max(x0, 0.0), x1, low, high)), (0.0, 1.0), "free"),
+        drives=(Drive(Face("drive", (max(x0, 0.0), x1, low, high)), (0.0, 1.0), "free"),),
         probes={"tip": gripper.measuring_point_mm},
         pairs={},
         contacts=(Contact("tip", Face("tip", face), None, ((0.0, -reach), (0.0, reach))),),
@@ -68,7 +69,7 @@ def whole_mechanism(left: Gripper, right: Gripper, name: str) -> Mechanism:
         flexures=tuple(flexures),
         fixed=(_foot(left, -1.0, "left clamp"), _foot(right, 1.0, "right clamp")),
         slides=(),
-        drive=Drive(Face("drive", (x0, x1, low, high)), (0.0, 1.0), "held"),
+        drives=(Drive(Face("drive", (x0, x1, low, high)), (0.0, 1.0), "held"),),
         probes=probes,
         pairs={"gap": ("left tip", "right tip")},
         contacts=(Contact("tips", faces[0], faces[1]),),

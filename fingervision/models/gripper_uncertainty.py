@@ -34,8 +34,8 @@ def gripper_uncertainty(
     The numbers of drawings with changed dimensions come from the lumped model (out of the plane from the stiffness
     matrix), for small displacements, and with contact if the physics includes it; they are scaled from those of the
     given drawing by ratios that a bar model computes (`changed_drawings`). Finite elements for every changed drawing
-    would take minutes, and an uncertainty needs two digits only. The same uncertainty is stated for the other kinds of
-    model.
+    would take minutes, whereas an uncertainty needs only two digits. The same uncertainty is stated for the other kinds
+    of model.
 
     Parameters
     ----------

@@ -2,10 +2,10 @@
 
 The load acts at the right end of the notch, x = R; the left end is fixed. The components are ordered as displacements
 along x, y, z, then rotations about x, y, z, with x along the hinge, y across the hinge in the plane, and z out of the
-plane. The circular case is that of Paros and Weisbord (1965) and Wu and Zhou (Rev. Sci. Instrum. 73 (2002) 3101), which
-this reproduces to ten digits. Beam theory is too stiff, the more so the thicker the hinge: compared with a
-finite-element model at t / R = 0.25, by 5 % in bending and 7 % in tension; in torsion it is 28 % too soft.
-`corrected_compliance` corrects these errors.
+plane. The circular case is that of Paros and Weisbord (1965) and Wu and Zhou (Rev. Sci. The quadrature reproduces these
+formulas to ten digits. Beam theory is too stiff, the more so the thicker the hinge: compared with a finite-element
+model at t / R = 0.25, by 5 % in bending and 7 % in tension; in torsion it is 28 % too soft. `corrected_compliance`
+corrects these errors.
 """
 
 import numpy as np

@@ -1,13 +1,13 @@
 """Beam theory of the notch hinge corrected by finite elements: the default of the models.
 
 The compliance in each direction is multiplied by ratios that `tests/benchmarks/models_hinge_table.py` prints for nu =
-0.34. The first ratio is that of the compliance in plane stress between rigid end planes to beam theory. The second is
-the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third, for a hinge in a
-body, is the ratio of the compliance between elastic blocks to that between rigid planes, because the blocks yield where
-the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam theory in
-bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of the table,
-ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant, except in
-torsion, where the ratio continues to fall with (t / b)^2.
+0.34. The first ratio is that of the compliance in plane stress, between rigid end planes, to that by beam theory. The
+second ratio is the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third ratio,
+for a hinge in a body, is that of the compliance between elastic blocks to that between rigid planes, because the blocks
+yield where the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam
+theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of
+the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant,
+except in torsion, where the ratio continues to fall with (t / b)^2.
 """
 
 from enum import StrEnum
@@ -127,6 +127,30 @@ _BLOCKS_OVER_PLANES = (
     (1.2326, 1.0857),
     (1.3083, 1.2094),
 )
+
+
+_SWAY = (1.4026, 1.3674, 1.3122, 1.2233, 1.0407, 0.8454, 0.6979)
+"""By t / R up to 0.8: ratio of the shear compliance that makes a notch as compliant to forces across it, with ends that
+stay parallel, as plane-stress elements find it between elastic blocks (`tests/benchmarks/models_sway_table.py`), to
+that of a Timoshenko beam. Its sections are not sheared as a straight beam's are, because they widen quickly."""
+
+
+def sway_shear(notch: Notch) -> float:
+    """Shear compliance of a notch in a body, as a multiple of the integral of 1 / (E b h) over its length.
+
+    In plane stress it does not depend on Poisson's ratio: stresses under given loads do not (Michell's theorem).
+    """
+    return SWAY_SHEAR * _sway_ratio(notch.curvature_ratio)
+
+
+SWAY_SHEAR = 6.0 / 5.0 * 2.0 * (1.0 + _POISSON)
+"""The same for a Timoshenko beam of the material of the tables."""
+
+
+@lru_cache(maxsize=512)
+def _sway_ratio(t_over_r: float) -> float:
+    at = np.log(_T_OVER_R[: len(_SWAY)])
+    return float(PchipInterpolator(at, _SWAY)(np.clip(np.log(t_over_r), at[0], at[-1])))
 
 
 @lru_cache(maxsize=1)

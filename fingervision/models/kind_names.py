@@ -23,5 +23,5 @@ def built_in_kinds() -> tuple[str, ...]:
 
 
 def kind_names() -> tuple[str, ...]:
-    """List the names of all kinds of model, built in and installed."""
+    """List the names of all kinds of model, both built in and installed."""
     return tuple(dict.fromkeys((*built_in_kinds(), *(point.name for point in entry_points(group=GROUP)))))

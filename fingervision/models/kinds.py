@@ -52,7 +52,7 @@ class GripperModel(Model, Protocol):
 
 
 class Kind(Protocol):
-    """A module, or another object, that builds a model.
+    """Protocol of a kind of model: a module, or another object, that builds a model of a gripper.
 
     Optional attributes are `SMALL_DISPLACEMENTS_ALONE` (True for a model without large rotation and contact) and
     `TRUST`, a number (finite elements of the outline 3, bars in the plane 2, bars at small displacements 1; default 0).
@@ -87,7 +87,7 @@ REGISTRY: Registry[Kind] = Registry(
 
 
 def kinds() -> tuple[str, ...]:
-    """List the kinds of model: built in and sorted, then installed."""
+    """List the kinds of model: the built-in ones sorted by name, then the installed ones."""
     return REGISTRY.names()
 
 
@@ -102,7 +102,7 @@ def by_trust(names: Iterable[str]) -> list[str]:
 
 
 def trust(kind: str) -> int:
-    """Number by which a kind is trusted relative to others: the larger, the more of the outline it models."""
+    """Rank by which a kind of model is trusted: the larger, the more of the drawing's outline the kind represents."""
     return int(getattr(REGISTRY.get(kind).value, "TRUST", 0)) if kind in kinds() else 0
 
 
@@ -146,7 +146,7 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
 def _tried(
     kind: str, origin: Origin, builder: Kind, gripper: Gripper, physics: Physics, theory: HingeTheory
 ) -> GripperModel:
-    """Build a model from outside the package, and check one response."""
+    """Build a model from outside the package, and check its response at one input."""
     who = f"The model {kind} of {origin}"
     try:
         model = builder.build(gripper, physics, theory)

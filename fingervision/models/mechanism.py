@@ -13,6 +13,8 @@ from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape
 from fingervision.models.width_effect import force_uncertainty
 
+_SIZES_MM = (0.3, 5000.0)
+"""Sizes of flexure mechanisms, from etched silicon to large machines: drawings in metres or micrometres lie outside."""
 _SAME_AREA = 1e-2
 """Relative difference below which two areas count as equal: areas of regions with arcs are computed from polygons, with
 an error of 1e-3."""
@@ -28,7 +30,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A face that moves by the input.
+    """A driven face, which moves by the input times `per_input`.
 
     Parameters
     ----------
@@ -39,11 +41,14 @@ class Drive:
     across : str
         Motion across `direction`: `held` for a face guided as by a stage; `free` for a face that may slide (only with a
         direction along x or y).
+    per_input : float
+        Motion of the face along `direction` per 1 mm of input; 0 for a drive that stands still.
     """
 
     face: Face
     direction: PointMm
     across: Literal["held", "free"]
+    per_input: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +93,8 @@ class Mechanism:
         Faces that do not move.
     slides : tuple of (Face, str)
         Faces on a line of symmetry, each with the component (x or y) that is fixed there.
-    drive : Drive
-        The driven face.
+    drives : tuple of Drive
+        The driven faces, one or more; all follow one input.
     probes : dict of str to (float, float)
         Points whose displacements are computed.
     pairs : dict of str to (str, str)
@@ -107,7 +112,7 @@ class Mechanism:
     flexures: tuple[Flexure, ...]
     fixed: tuple[Face, ...]
     slides: tuple[tuple[Face, str], ...]
-    drive: Drive
+    drives: tuple[Drive, ...]
     probes: dict[str, PointMm]
     pairs: dict[str, tuple[str, str]]
     contacts: tuple[Contact, ...] = ()
@@ -123,7 +128,7 @@ class Mechanism:
     def region(self) -> PlanarRegion:
         """The body: shapes and flexures, with corners where faces begin and end."""
         steps = (*self.bodies, *(step for flexure in self.flexures for step in flexure.steps()))
-        faces = [*self.fixed, *(face for face, _ in self.slides), self.drive.face]
+        faces = [*self.fixed, *(face for face, _ in self.slides), *(drive.face for drive in self.drives)]
         faces += [face for contact in self.contacts for face in (contact.face, contact.other) if face is not None]
         marks = tuple((x, y) for face in faces for x in face.box_mm[:2] for y in face.box_mm[2:])
         return PlanarRegion(steps, marks)
@@ -149,6 +154,11 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             "overlap, and let no cut separate them."
         )
     size = region.size_mm
+    if not _SIZES_MM[0] <= size <= _SIZES_MM[1]:
+        raise DataError(
+            f"{name} must be {_SIZES_MM[0]:g} to {_SIZES_MM[1]:g} mm large, but is {size:.3g} mm; check whether all "
+            "lengths are millimetres."
+        )
     uncut = PlanarRegion(mechanism.bodies)
     for flexure in mechanism.flexures:
         t = flexure.thickness_mm
@@ -182,9 +192,9 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
         if not region.holds(ring).any():
             raise DataError(f"probe {probe} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside it.")
-    for face in (*mechanism.fixed, mechanism.drive.face):
+    for face in (*mechanism.fixed, *(drive.face for drive in mechanism.drives)):
         if hypot(*face.box_mm) > 1e6:
-            raise DataError(f"face {face.name} of {name} must have a box of finite size.")
+            raise DataError(f"face {face.name} of {name} must have a box_mm with finite limits.")
 
 
 def _is_hole(area_mm2: float, flexure: Flexure) -> bool:

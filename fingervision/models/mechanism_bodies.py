@@ -89,7 +89,7 @@ def plate_poses(
 ) -> dict[str, BodyPose]:
     """Pose of every moving body, from the displacements of a mesh.
 
-    The midside nodes each represent a third of their triangles, which integrates the quadratic displacements of a
+    Each midside node represents a third of each of its triangles, which integrates the quadratic displacements of a
     triangle exactly.
 
     Parameters
@@ -133,10 +133,10 @@ def column_name(name: str) -> str:
 
 
 def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
-    """Name every piece by the first named shape that has more than half of its area in it.
+    """Name every piece by the first named shape that contains more than half of the piece's area.
 
-    A piece without one is named by a shape that has no larger part elsewhere, such as a bar that a notch halves; what
-    is left is numbered.
+    A piece without such a shape is named by a shape that has no larger part elsewhere, such as a bar that a notch
+    halves; other pieces are numbered.
     """
     names: dict[int, str] = {}
     halved: dict[int, str] = {}

@@ -2,7 +2,8 @@
 
 The model applies equations (5) to (15) of Hricko & Havlik (2015), in the plane, to any chain from a fixed body to the
 driven one: the compliance at the drive is C = sum T C_i T', and the stiffness is that in the directions which the drive
-and its guides constrain. For a closed loop of bodies such a sum does not exist; it is refused.
+and its guides constrain. If there are several drives, they are loads at several bodies of such a tree. For a closed
+loop of bodies such a sum does not exist; it is refused.
 """
 
 from dataclasses import replace
@@ -17,9 +18,9 @@ from fingervision.models.flexure_stress import nominal_stress_mpa
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Face, Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
-from fingervision.models.mechanism_faces import driven_components
+from fingervision.models.mechanism_faces import driven_components, per_input_of
 from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
+from fingervision.models.mechanism_state import MechanismState, named_forces_n, pair_distances_mm
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.rigid_motion import MRAD, BodyPose
 
@@ -62,8 +63,14 @@ class MechanismChain:
         self.spans = [span if span.flexure.is_notch else replace(span, cut_mm=span.free_mm) for span in spans]
         self._joins = [self._joined(span) for span in spans]
         self._ground = {body for face in mechanism.fixed for body in self._touching(face)}
-        self._path = self._path_from(self._ground, self._only(mechanism.drive.face))
-        self._support()
+        bodies = [self._only(drive.face) for drive in mechanism.drives]
+        if len(set(bodies)) < len(bodies):
+            raise ModelError(
+                f"The stiffness-matrix model allows one driven face per body, but {mechanism.name} drives one body "
+                "at several faces; take --kind lumped or finite_element."
+            )
+        self._paths = [self._path_from(self._ground, body) for body in bodies]
+        self._support(bodies)
 
     def _body_of(self, point: Array, what: str) -> int:
         for number, loop in enumerate(self._bodies):
@@ -98,15 +105,15 @@ class MechanismChain:
     def _path_from(self, ground: set[int], driven: int) -> list[int]:
         """List the flexures on the path from the fixed body (ground) to the driven body, in order.
 
-        In a chain the number of flexures is one less than the number of bodies, the ground included.
+        In a chain, the number of flexures is one less than the number of bodies, including the fixed one.
         """
         name = self.mechanism.name
         merged = [tuple(-1 if body in ground else body for body in join) for join in self._joins]
         bodies = {body for join in merged for body in join}
         if len(merged) != len(bodies) - 1 or any(first == last for first, last in merged):
             raise ModelError(
-                f"The stiffness matrix is that of a chain, but the flexures of {name} form a loop; take --kind lumped "
-                "or finite_element."
+                f"The stiffness-matrix model needs bodies in a chain, but the flexures of {name} form a loop; take "
+                "--kind lumped or finite_element."
             )
         reached: dict[int, list[int]] = {-1: []}
         while driven not in reached:
@@ -117,37 +124,46 @@ class MechanismChain:
                         reached[other], grown = [*reached[known], place], True
             if not grown:
                 raise ModelError(
-                    f"The stiffness matrix is that of a chain from a fixed face to the drive, but {name} has none; "
-                    "take --kind lumped or finite_element."
+                    f"The stiffness-matrix model needs bodies in a chain from a fixed face to the drive, but {name} "
+                    "has none; take --kind lumped or finite_element."
                 )
         self._reached = reached
         return reached[driven]
 
-    def _support(self) -> None:
-        """Find the directions (x, y, rotation) at the drive's centre that the drive and its body's guides constrain."""
+    def _support(self, bodies: list[int]) -> None:
+        """Find what drives and their bodies' guides hold (x, y, rotation), and the loads there per 1 mm of each."""
         mechanism = self.mechanism
-        driven = self._only(mechanism.drive.face)
-        held = {"x": False, "y": False, "turn": False}
-        faces = [(mechanism.drive.face, component) for component in driven_components(mechanism)]
+        drives = mechanism.drives
+        held = [self._held_by(drive.face, driven_components(drive)) for drive in drives]
         for face, component in mechanism.slides:
-            if self._touching(face) != {driven}:
+            touching = self._touching(face)
+            if len(touching) != 1 or not touching <= set(bodies):
                 raise ModelError(
-                    f"The stiffness matrix is that of a chain, but {mechanism.name} is held at {face.name} too; take "
-                    "--kind lumped or finite_element."
+                    f"The stiffness-matrix model needs bodies in a chain that is fixed at one end, but "
+                    f"{mechanism.name} is held at {face.name} too; take --kind lumped or finite_element."
                 )
-            faces.append((face, component))
-        for face, component in faces:
-            x0, x1, y0, y1 = face.box_mm
-            held[component] = True
-            # A flat face square to the component keeps the body from turning.
-            held["turn"] |= (y1 - y0 if component == "x" else x1 - x0) > _ON * self._size_mm
-        self._held = [i for i, name in enumerate(("x", "y", "turn")) if held[name]]
-        x0, x1, y0, y1 = mechanism.drive.face.box_mm
-        self._at = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
-        compliance = self.compliance_at(self._at, self._path)
-        motion = np.array([*mechanism.drive.direction, 0.0])[self._held]
-        self._load = np.zeros(3)
-        self._load[self._held] = np.linalg.solve(compliance[np.ix_(self._held, self._held)], motion)
+            held[bodies.index(touching.pop())] |= self._held_by(face, (component,))
+        boxes = np.array([drive.face.box_mm for drive in drives])
+        self._at = 0.5 * (boxes[:, ::2] + boxes[:, 1::2])
+        kept = [3 * place + i for place, own in enumerate(held) for i in sorted(own)]
+        motions = np.zeros((3 * len(drives), len(drives)))
+        for place, drive in enumerate(drives):
+            motions[3 * place : 3 * place + 2, place] = drive.direction
+        ends = list(zip(self._at, self._paths, strict=True))
+        compliance = np.block([
+            [self.compliance_at(to, [p for p in own if p in theirs], at) for at, theirs in ends] for to, own in ends
+        ])  # fmt: skip
+        self._by_drive = np.zeros((3 * len(drives), len(drives)))
+        self._by_drive[kept] = np.linalg.solve(compliance[np.ix_(kept, kept)], motions[kept])
+        self._motions = motions
+        self._load = self._by_drive @ per_input_of(mechanism)
+
+    def _held_by(self, face: Face, components: tuple[str, ...]) -> set[int]:
+        """Which of x, y and rotation (0, 1, 2) a face takes from a rigid body; turning if it is wide across them."""
+        x0, x1, y0, y1 = face.box_mm
+        wide = {"x": y1 - y0, "y": x1 - x0}
+        turns = {2} if any(wide[component] > _ON * self._size_mm for component in components) else set()
+        return {"xy".index(component) for component in components} | turns
 
     def compliance_at(self, point: Array, path: list[int], loaded: Array | None = None) -> Array:
         """Motion (x, y, rotation) of one point under a load at another point of the chain, shape (3, 3).
@@ -178,7 +194,7 @@ class MechanismChain:
     @property
     def stiffness_n_mm(self) -> float:
         """Force at the drive per 1 mm of input (N/mm)."""
-        return float(self._load[:2] @ self.mechanism.drive.direction)
+        return float(per_input_of(self.mechanism) @ self._motions.T @ self._load)
 
     @property
     def force_error(self) -> float:
@@ -198,7 +214,7 @@ class MechanismChain:
         return force + elastic.force_error, stress + elastic.stress_error
 
     def touch_input_mm(self) -> dict[str, float]:
-        """Return no contacts, because this model does not include contact."""
+        """Return no contact inputs, because this model does not include contact."""
         return {}
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
@@ -219,26 +235,39 @@ class MechanismChain:
                 "The stiffness matrix handles small displacements without contact only; take --kind lumped or "
                 "finite_element."
             )
-        mechanism, load = self.mechanism, input_mm * self._load
+        return self._seen(input_mm, input_mm * self._load, per_input_of(self.mechanism))
+
+    def drive_states(self) -> tuple[MechanismState, ...]:
+        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        alone = np.eye(len(self.mechanism.drives))
+        return tuple(self._seen(1.0, load, own) for load, own in zip(self._by_drive.T, alone, strict=True))
+
+    def _seen(self, input_mm: float, load: Array, per_input: Array) -> MechanismState:
+        mechanism = self.mechanism
         probes = {}
         for name, point in mechanism.probes.items():
             own = self._reached_by(self._body_of(np.array(point) + self._inward(point), f"probe {name}"))
-            shared = [place for place in self._path if place in own]
-            moved = self.compliance_at(np.array(point), shared, self._at) @ load
+            moved = self._moved(np.array(point), own, load)
             probes[name] = (float(moved[0]), float(moved[1]))
-        stress = max(self._stress_mpa(self.spans[place], load) for place in self._path)
+        stress = max(self._stress_mpa(place, load) for place in {place for path in self._paths for place in path})
         pairs = pair_distances_mm(mechanism, probes, large=False)
-        return MechanismState(input_mm, float(load[:2] @ mechanism.drive.direction), probes, pairs, stress, load, {},
-                              self._poses(load))  # fmt: skip
+        forces = self._motions.T @ load
+        return MechanismState(input_mm, float(per_input @ forces), probes, pairs, stress, load, {}, self._poses(load),
+                              named_forces_n(mechanism, forces))  # fmt: skip
+
+    def _moved(self, point: Array, own: list[int], load: Array) -> Array:
+        """Motion (x, y, rotation) of a point beyond the flexures `own`, under the loads at all drives."""
+        return np.asarray(sum(
+            self.compliance_at(point, [place for place in path if place in own], at) @ part
+            for at, path, part in zip(self._at, self._paths, load.reshape(-1, 3), strict=True)
+        ))  # fmt: skip
 
     def _poses(self, load: Array) -> dict[str, BodyPose]:
-        """Motions of the rigid bodies under a load at the drive."""
+        """Motions of the rigid bodies under loads at the drives."""
         found = {}
         for number, body in enumerate(self.bodies):
             if not body.is_fixed:
-                own = self._reached_by(number)
-                shared = [place for place in self._path if place in own]
-                x, y, angle = self.compliance_at(body.centroid_mm, shared, self._at) @ load
+                x, y, angle = self._moved(body.centroid_mm, self._reached_by(number), load)
                 found[body.name] = BodyPose(float(x), float(y), MRAD * float(angle))
         return found
 
@@ -265,12 +294,17 @@ class MechanismChain:
                 return way
         return np.zeros(2)
 
-    def _stress_mpa(self, span: FlexureSpan, load: Array) -> float:
+    def _stress_mpa(self, place: int, load: Array) -> float:
+        """Largest stress in one flexure (MPa), under the loads of those drives that the flexure carries."""
+        span = self.spans[place]
         stations = span.stations_mm(self.mechanism.plate_mm)
         angle = np.radians(span.flexure.axis_deg)
-        tension = float(load[0] * np.cos(angle) + load[1] * np.sin(angle))
         x, y = (np.array(part) for part in span.flexure.point_mm(stations, 0.0))
-        moment = load[2] + (self._at[0] - x) * load[1] - (self._at[1] - y) * load[0]
+        tension, moment = 0.0, np.zeros(stations.size)
+        for at, path, (pull, push, turn) in zip(self._at, self._paths, load.reshape(-1, 3), strict=True):
+            if place in path:
+                tension += float(pull * np.cos(angle) + push * np.sin(angle))
+                moment = moment + turn + (at[0] - x) * push - (at[1] - y) * pull
         rows = np.column_stack([np.full(stations.size - 1, tension), -moment[:-1], moment[1:]])
         return nominal_stress_mpa(span, rows, self.mechanism, self.theory)
 

@@ -31,24 +31,30 @@ _MOST_MOTION = 1e6
 """Motion in millimetres per 1 mm of input above which the mechanism counts as not supported; no real mechanism
 amplifies as much."""
 _STILL = 1e-9
+_STRAINLESS = 1e-8
+"""Strain energy of all drives together, as a share of that of each alone, below which the body moves as a rigid one:
+rounding leaves 1e-11."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MechanismEquilibrium:
-    """State of a mechanism at one input.
+    """State of a driven mechanism at one input: displacements, forces and contact.
 
     Parameters
     ----------
     displacement : ndarray of float, shape (unknowns,)
         Displacements in mm, and rotations in rad where the model has them.
     force_n : float
-        Force at the drive, along its direction.
+        Force that does the work of the input: the sum of the drives' forces, each times its `per_input`.
+    drives_n : ndarray of float, shape (drives,)
+        Force at every driven face, along its direction.
     pressed_n : tuple of ndarray of float
         Force on each node of every contact pair; empty if contact is not included.
     """
 
     displacement: Array
     force_n: float
+    drives_n: Array
     pressed_n: tuple[Array, ...]
 
 
@@ -67,8 +73,10 @@ class DrivenMechanism:
     motions : sparse matrix, shape (unknowns, n)
         Basis of the free motions: the displacements are this matrix times the n unknowns solved for, plus the input
         times `by_input`.
-    by_input : ndarray of float, shape (unknowns,)
-        Prescribed motion per 1 mm of input.
+    by_drive : ndarray of float, shape (unknowns, drives)
+        Prescribed motion per 1 mm of every driven face.
+    per_input : ndarray of float, shape (drives,)
+        Motion of every driven face per 1 mm of input.
     gaps : tuple of callable
         For every contact pair, a function that maps displacements to the gaps of its nodes (infinite for a node that
         faces nothing) and their derivatives.
@@ -78,8 +86,14 @@ class DrivenMechanism:
     tangent: Callable[[Array], tuple[csr_matrix, Array]]
     internal: Callable[[Array], Array]
     motions: csr_matrix
-    by_input: Array
+    by_drive: Array
+    per_input: Array
     gaps: Pairs = ()
+
+    @cached_property
+    def by_input(self) -> Array:
+        """Prescribed motion per 1 mm of input, shape (unknowns,)."""
+        return np.asarray(self.by_drive @ self.per_input)
 
     @cached_property
     def stiffness_n_mm(self) -> csr_matrix:
@@ -97,16 +111,40 @@ class DrivenMechanism:
         Raises
         ------
         ModelError
+            If the supports allow the mechanism to move freely, or the drives move it without deforming it.
+        """
+        moved = self.unit_by_drive @ self.per_input
+        if self.per_input.size > 1:
+            each = np.diag(self.drive_stiffness_n_mm) @ self.per_input**2
+            if moved @ (self.stiffness_n_mm @ moved) <= _STRAINLESS * each:
+                raise ModelError(
+                    f"The drives of {self.name} must deform it, but move it as one rigid body; change per_input or "
+                    "direction of one of them."
+                )
+        return np.asarray(moved)
+
+    @cached_property
+    def unit_by_drive(self) -> Array:
+        """Small displacements per 1 mm of one driven face after another, the others at rest, shape (unknowns, drives).
+
+        Raises
+        ------
+        ModelError
             If the supports allow the mechanism to move freely.
         """
         try:
-            load = self.motions.T @ (self.stiffness_n_mm @ self.by_input)
-            moved = self.by_input - self.motions @ self._solver.solve(load)
+            load = self.motions.T @ (self.stiffness_n_mm @ self.by_drive)
+            moved = self.by_drive - self.motions @ self._solver.solve(np.ascontiguousarray(load))
         except RuntimeError:  # exactly singular
-            moved = np.full(self.by_input.size, np.inf)
+            moved = np.full(self.by_drive.shape, np.inf)
         if not np.all(np.isfinite(moved)) or np.abs(moved).max() > _MOST_MOTION:
             raise ModelError(f"{self.name} must be held by its fixed faces, but can move freely.")
         return np.asarray(moved)
+
+    @cached_property
+    def drive_stiffness_n_mm(self) -> Array:
+        """Force at every driven face (row) per 1 mm of every driven face (column), at rest (N/mm)."""
+        return np.asarray(self.unit_by_drive.T @ (self.stiffness_n_mm @ self.unit_by_drive))
 
     @cached_property
     def input_stiffness_n_mm(self) -> float:
@@ -114,14 +152,21 @@ class DrivenMechanism:
         moved = self.unit_displacement
         return float(moved @ (self.stiffness_n_mm @ moved))
 
+    def by_one_drive(self) -> tuple[MechanismEquilibrium, ...]:
+        """Small displacements per 1 mm of one driven face after another, with the others at rest, without contact."""
+        pairs = zip(self.unit_by_drive.T, self.drive_stiffness_n_mm.T, strict=True)
+        return tuple(
+            MechanismEquilibrium(moved, float(forces[i]), forces, ()) for i, (moved, forces) in enumerate(pairs)
+        )
+
     def under_load(self, load_n: Array) -> Array:
         """Small displacements under loads, one or a column each, with the drive fixed."""
         return np.asarray(self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ load_n)))
 
     def touch_inputs_mm(self) -> list[float | None]:
-        """Input nearest to zero at which each contact pair first touches, for small displacements (mm).
+        """Input nearest to zero (mm) at which each contact pair first touches, for small displacements.
 
-        None is returned for a pair that never touches.
+        A pair that never touches has None.
         """
         found: list[float | None] = []
         for gaps in self.gaps:
@@ -145,7 +190,8 @@ class DrivenMechanism:
             return self._followed(input_mm, gaps)
         moved, pressed = input_mm * self.unit_displacement, ()
         if not gaps:
-            return MechanismEquilibrium(moved, self.input_stiffness_n_mm * input_mm, pressed)
+            drives = self.drive_stiffness_n_mm @ self.per_input * input_mm
+            return MechanismEquilibrium(moved, self.input_stiffness_n_mm * input_mm, drives, pressed)
         gap, slope, by_force = self._touching
         apart, facing = gap + slope @ moved, np.isfinite(gap)
         forces = np.zeros(gap.size)
@@ -153,8 +199,8 @@ class DrivenMechanism:
             compliance = (slope @ by_force)[np.ix_(facing, facing)]
             forces[facing] = contact_forces_n(0.5 * (compliance + compliance.T), apart[facing])
             moved = moved + by_force @ forces
-        force = float(self.by_input @ (self.stiffness_n_mm @ moved - slope.T @ forces))
-        return MechanismEquilibrium(moved, force, self._by_pair(forces))
+        drives = self.by_drive.T @ (self.stiffness_n_mm @ moved - slope.T @ forces)
+        return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, self._by_pair(forces))
 
     @cached_property
     def _touching(self) -> tuple[Array, Array, Array]:
@@ -181,7 +227,7 @@ class DrivenMechanism:
         return gap, slope, bend
 
     def _followed(self, input_mm: float, pairs: Pairs) -> MechanismEquilibrium:
-        """Follow the equilibria from rest, in steps that are enlarged after convergence and halved after a failure."""
+        """Follow the equilibria from rest, in steps that grow after convergence and are halved after a failure."""
         moved = np.zeros(self.by_input.size)
         path = [(0.0, moved)]
         touching = np.zeros(self._all_gaps(pairs, moved)[0].size, dtype=bool)
@@ -198,10 +244,12 @@ class DrivenMechanism:
             if step < _LEAST_STEP:
                 raise ModelError(
                     f"The equilibrium of {self.name} could be computed up to an input of "
-                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are asked for; take a smaller input."
+                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are requested; take a smaller input."
                 )
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
-        return MechanismEquilibrium(moved, float(self.by_input @ loads), self._by_pair(pressed) if pairs else ())
+        drives = np.asarray(self.by_drive.T @ loads)
+        by_pair = self._by_pair(pressed) if pairs else ()
+        return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, by_pair)
 
     def _predicted(self, path: list[tuple[float, Array]], input_mm: float) -> Array:
         """Extrapolate the path; from rest, use the small displacements.
@@ -220,7 +268,7 @@ class DrivenMechanism:
     def _settled(
         self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
     ) -> tuple[Array, Flags, Array] | None:
-        """Hold nodes that would penetrate and release nodes under tension, repeatedly, until there are none."""
+        """Hold nodes that would penetrate and release nodes under tension, until no such nodes are left."""
         for _ in range(_SET_CHANGES):
             found = self._newton(moved, touching, pressed, input_mm, pairs)
             if found is None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
-from fingervision.models.mechanism import Face, Mechanism
+from fingervision.models.mechanism import Drive, Face, Mechanism
 from fingervision.models.plane_stress import PlaneStressPlate
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
 
 
 def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
-    """Whether a face is parallel to x or y (`component`), so that prescribing that component leaves it free to rotate.
+    """Whether a face is parallel to x or y (`component`), so that prescribing that component lets it rotate.
 
     A face at another angle is driven by its mean motion: with the component prescribed at every node it would have to
     stretch in order to rotate.
@@ -64,11 +64,16 @@ def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
     return bool(spread[1 if component == "x" else 0] < _LEVER * np.hypot(*spread))
 
 
-def driven_components(mechanism: Mechanism) -> tuple[str, ...]:
-    """Components prescribed at every node of the drive's face: x and y if it is guided, else that of the drive."""
-    if mechanism.drive.across == "held":
+def driven_components(drive: Drive) -> tuple[str, ...]:
+    """Components prescribed at every node of a driven face: x and y if the face is guided, else that of the drive."""
+    if drive.across == "held":
         return "x", "y"
-    return ("x",) if mechanism.drive.direction[0] != 0.0 else ("y",)
+    return ("x",) if drive.direction[0] != 0.0 else ("y",)
+
+
+def per_input_of(mechanism: Mechanism) -> Array:
+    """Motion of every driven face per 1 mm of input, shape (drives,)."""
+    return np.array([drive.per_input for drive in mechanism.drives])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,13 +86,13 @@ class Supports:
         Nodes of every fixed face.
     slides : tuple of (ndarray of int, str)
         Nodes of every sliding face, with the component that is fixed.
-    driven : ndarray of int
-        Nodes of the drive's face.
+    driven : tuple of ndarray of int
+        Nodes of every driven face.
     """
 
     fixed: tuple[Indices, ...]
     slides: tuple[tuple[Indices, str], ...]
-    driven: Indices
+    driven: tuple[Indices, ...]
 
 
 def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> Supports:
@@ -96,22 +101,27 @@ def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -
     Raises
     ------
     DataError
-        If a face contains no node, the drive's face is fixed, or no face is fixed.
+        If a face contains no node, a driven face is fixed or shares nodes with another one, or no face is fixed.
     """
     fixed = tuple(nodes_on(plate, face, mechanism, size_mm) for face in mechanism.fixed)
     slides = tuple((nodes_on(plate, face, mechanism, size_mm), held) for face, held in mechanism.slides)
-    driven = nodes_on(plate, mechanism.drive.face, mechanism, size_mm)
-    if not fixed and not slides:
+    driven = tuple(nodes_on(plate, drive.face, mechanism, size_mm) for drive in mechanism.drives)
+    if not fixed and not slides and len(driven) == 1:
         raise DataError(f"{mechanism.name} must have a [[fixed]] face, but has none.")
-    moving = dict(zip("xy", mechanism.drive.direction, strict=True))
     held = {"x": list(fixed), "y": list(fixed)}
     for nodes, component in slides:
         held[component].append(nodes)
-    for component in driven_components(mechanism):
-        both = any(np.intersect1d(nodes, driven).size for nodes in held[component])
-        if both and moving[component] != 0.0:
-            raise DataError(
-                f"The drive of {mechanism.name} must be free to move, but its face {mechanism.drive.face.name} is "
-                "fixed too."
-            )
+    for place, (drive, own) in enumerate(zip(mechanism.drives, driven, strict=True)):
+        for component, share in zip("xy", drive.direction, strict=True):
+            both = component in driven_components(drive) and any(np.intersect1d(n, own).size for n in held[component])
+            if both and share * drive.per_input != 0.0:
+                raise DataError(
+                    f"The drive of {mechanism.name} must be free to move, but its face {drive.face.name} is fixed too."
+                )
+        for other, theirs in zip(mechanism.drives[:place], driven[:place], strict=True):
+            if np.intersect1d(own, theirs).size:
+                raise DataError(
+                    f"Driven faces {other.face.name} and {drive.face.name} of {mechanism.name} must be apart, but "
+                    "share a part of the outline; shorten one of their boxes, or leave one of them out."
+                )
     return Supports(fixed, slides, driven)

@@ -12,7 +12,7 @@ MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     """Compute response per 1 mm of input, input range up to yield, inputs of first contact, natural frequencies.
 
-    Finite elements also have the effects of weight, warmth and a part held, and the motions out of the plane.
+    Finite elements also give the effects of weight, temperature and a gripped part, and the motions out of the plane.
 
     Parameters
     ----------
@@ -38,6 +38,8 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     for name, value in unit.pairs_mm.items():
         figures[f"{name}: at rest [mm]"] = rest.pairs_mm[name]
         figures[f"{name}: per input [mm/mm]"] = value - rest.pairs_mm[name]
+    if len(model.mechanism.drives) > 1:
+        figures |= _of_drives(model)
     for name, value in model.touch_input_mm().items():
         figures[f"{name}: input at contact [mm]"] = value
     for held, label in ((False, "drive_free"), (True, "drive_held")):
@@ -54,3 +56,16 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
         figures |= {f"{name}: sag out of the plane [mm]": value for name, value in across.sag_mm.items()}
         errors |= {"model_error_out_of_plane_percent": 100.0 * MODE_ERROR, "model_error_sag_percent": 100.0 * SAG_ERROR}
     return figures | errors
+
+
+def _of_drives(model: MechanismModel) -> dict[str, float]:
+    """Effects of each of several driven faces alone, with the others at rest, and each face's share of the force."""
+    together, rest = model.state(1.0), model.state(0.0)
+    figures = {f"{name}: force per input [N/mm]": force for name, force in together.drives_n.items()}
+    for name, alone in zip(together.drives_n, model.drive_states(), strict=True):
+        figures |= {f"{other}: force per mm of {name} [N/mm]": force for other, force in alone.drives_n.items()}
+        for probe, moved in alone.probes_mm.items():
+            figures |= {f"{probe}: {axis} per mm of {name} [mm/mm]": m for axis, m in zip("xy", moved, strict=True)}
+        for pair, length in alone.pairs_mm.items():
+            figures[f"{pair}: per mm of {name} [mm/mm]"] = length - rest.pairs_mm[pair]
+    return figures

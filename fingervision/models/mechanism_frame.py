@@ -13,23 +13,24 @@ from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.sparse import coo_matrix, csr_matrix, identity
 
 from fingervision.domain.errors import ModelError
 from fingervision.models.body_assembly import assemble_bodies
-from fingervision.models.condensed_bodies import own_modes
 from fingervision.models.contact_pairs import contact_pair
 from fingervision.models.corotational_body import turned_axes
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.flexure_energy import misused_energy
 from fingervision.models.flexure_span import span_of
 from fingervision.models.flexure_stress import nominal_stress_mpa
+from fingervision.models.frame_vibration import FrameVibration, SegmentMass, frame_vibration
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Contact, Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
-from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
-from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
+from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps, MechanismEquilibrium
+from fingervision.models.mechanism_faces import per_input_of
+from fingervision.models.mechanism_state import MechanismState, changes, named_forces_n, observables, pair_distances_mm
+from fingervision.models.modal_model import FreeModes, ModalModel
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.strip_energy import used_in_frame
@@ -41,13 +42,15 @@ _ACROSS, _BODY = 2.0, 0.05
 """Triangles across thin parts, and edge length over the body's size: the mesh is coarse because bodies deform little,
 and their stress is not computed."""
 _TINY = 1e-7
+_RIGID_MOTIONS, _SAME_PLACE = 3, 1e-6
+"""Rigid motions in the plane, and the share of the size below which a lever arm holds no rotation."""
 _FORCE_ERROR = 0.015
 """Relative error of the force from the tables of hinges between blocks, by comparison with finite elements
 (`tests/benchmarks/models_held_out.py`)."""
-_FORCE_MISUSED, _STRESS_ERROR, _STRESS_MISUSED = 0.06, 0.02, 0.3
-"""Relative errors of force and stress where a guided drive shears or stretches flexures rather than bending them: at t
-/ R of 0.2 to 0.8 forces are 6 % low to 5 % high, and stress is low by 0.3 sqrt(t / R), because its peak is no longer at
-the neck."""
+_FORCE_MISUSED, _STRESS_ERROR, _STRESS_MISUSED = 0.05, 0.02, 0.3
+"""Relative errors of force and stress where a guided drive shears or stretches flexures, not bends them: forces
+across a notch are within 1 % of plane stress, forces along one 4 % low to 4 % high (elliptic cuts, wide plates), and
+stress is low by 0.3 sqrt(t / R), because its peak is no longer at the neck."""
 _TINIEST = 1e-300
 
 
@@ -114,7 +117,8 @@ class MechanismFrame:
         ends: list[tuple[int, int]] = []
         compliances: list[Array] = []
         self.segments: list[range] = []
-        self._masses: list[tuple[tuple[int, int], float, float]] = []
+        self._masses: list[SegmentMass] = []
+        self._vibrating: tuple[int, FrameVibration] | None = None
         for span, (first, last) in zip(self.spans, assembly.ends, strict=True):
             stations = span.stations_mm(mechanism.plate_mm)
             nodes = [first, *range(len(places), len(places) + len(stations) - 2), last]
@@ -127,11 +131,13 @@ class MechanismFrame:
             weight = mechanism.material.density_t_mm3 * mechanism.plate_mm
             lengths = np.diff(stations)
             masses = weight * lengths * span.flexure.height_mm(0.5 * (stations[1:] + stations[:-1]))
-            self._masses += list(zip(own, masses.tolist(), lengths.tolist(), strict=True))
+            self._masses += list(map(SegmentMass, own, masses.tolist(), lengths.tolist()))
         self.frame = CorotationalFrame(np.array(places), np.array(ends), np.array(compliances))
-        prescribed = list(assembly.by_input)
-        self.by_input = np.zeros(self.frame.unknowns)
-        self.by_input[prescribed] = list(assembly.by_input.values())
+        prescribed = [place for moved in assembly.by_drive for place in moved]
+        self.by_drive = np.zeros((self.frame.unknowns, len(assembly.by_drive)))
+        for column, moved in enumerate(assembly.by_drive):
+            self.by_drive[list(moved), column] = list(moved.values())
+        self.by_input = self.by_drive @ per_input_of(mechanism)
         self.free = np.setdiff1d(np.arange(self.frame.unknowns), [*assembly.held, *prescribed])
 
     def _tangent(self, moved: Array) -> tuple[csr_matrix, Array]:
@@ -149,15 +155,27 @@ class MechanismFrame:
 
     @cached_property
     def driven(self) -> DrivenMechanism:
-        """The mechanism as a system whose equilibria can be computed."""
+        """The mechanism as a system whose equilibria can be computed.
+
+        Raises
+        ------
+        ModelError
+            If the supports allow the whole mechanism to move freely.
+        """
+        x, y = (self.frame.nodes_mm - self.frame.nodes_mm.mean(axis=0)).T / self._size_mm
+        zero, one = np.zeros_like(x), np.ones_like(x)
+        whole = np.stack([[one, zero, zero], [zero, one, zero], [-y, x, one / self._size_mm]]).transpose(0, 2, 1)
+        held = np.setdiff1d(np.arange(self.frame.unknowns), self.free)
+        if np.linalg.matrix_rank(whole.reshape(3, -1)[:, held], tol=_SAME_PLACE) < _RIGID_MOTIONS:
+            raise ModelError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
         every = identity(self.frame.unknowns, format="csc")
         return DrivenMechanism(
             self.mechanism.name, self._tangent, lambda moved: self._tangent(moved)[1], csr_matrix(every[:, self.free]),
-            self.by_input, tuple(map(self._gaps_of, self.mechanism.contacts)),
+            self.by_drive, per_input_of(self.mechanism), tuple(map(self._gaps_of, self.mechanism.contacts)),
         )  # fmt: skip
 
     def _gaps_of(self, contact: Contact) -> Callable[[Array], Gaps]:
-        """Function that gives the gaps of a contact at the two nodes of its face that are farthest apart."""
+        """Return a function that gives the gaps of a contact at the two nodes of its face that are farthest apart."""
         plate = self.plate
         pair = contact_pair(plate, contact, self.mechanism, self._size_mm)
         places = plate.nodes_mm[:, pair.nodes]
@@ -189,7 +207,7 @@ class MechanismFrame:
 
     @cached_property
     def _errors(self) -> tuple[float, float]:
-        """Relative errors of force and stress: those of bent flexures, larger where flexures are not bent."""
+        """Relative errors of force and stress: those of bent flexures, larger for other loads on the flexures."""
         loads, plate_mm = self._end_loads(self.driven.unit_displacement, large=False), self.mechanism.plate_mm
         misused, every, stress = 0.0, 0.0, 0.0
         for span, own in zip(self.spans, self.segments, strict=True):
@@ -222,9 +240,15 @@ class MechanismFrame:
 
     def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
         """Find the equilibrium at one input."""
-        mechanism = self.mechanism
         found = self.driven.equilibrium(input_mm, large_rotation=large_rotation, contact=contact)
-        moved = found.displacement
+        return self._seen(input_mm, found, large_rotation=large_rotation)
+
+    def drive_states(self) -> tuple[MechanismState, ...]:
+        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        return tuple(self._seen(1.0, found, large_rotation=False) for found in self.driven.by_one_drive())
+
+    def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:
+        mechanism, moved = self.mechanism, found.displacement
         probes = {name: self._motion(moved, point, large=large_rotation) for name, point in mechanism.probes.items()}
         loads = self._end_loads(moved, large=large_rotation)
         stress = max(nominal_stress_mpa(span, loads[list(own)], mechanism, self.theory,
@@ -233,7 +257,17 @@ class MechanismFrame:
         poses = plate_poses(self.plate, self.bodies, self._field(moved, large=large_rotation), large=large_rotation)
         pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
         pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
-        return MechanismState(input_mm, found.force_n, probes, pairs, stress, moved, pressed, poses)
+        return MechanismState(
+            input_mm,
+            found.force_n,
+            probes,
+            pairs,
+            stress,
+            moved,
+            pressed,
+            poses,
+            named_forces_n(mechanism, found.drives_n),
+        )
 
     @cached_property
     def bodies(self) -> tuple[LinkBody, ...]:
@@ -249,44 +283,79 @@ class MechanismFrame:
 
     def _motion(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
         """Displacement of a point of a body; a point on a flexure moves with the nearest section of it."""
+        node = self._section_at(point)
+        if node is None:
+            return self.assembly.motion_mm(moved, point, large=large)
+        x, y, angle = moved[3 * node : 3 * node + 3]
+        arm = np.array(point) - self.frame.nodes_mm[node]
+        turn = turned_axes(angle) - np.eye(2) if large else angle * np.array([[0.0, -1.0], [1.0, 0.0]])
+        way = np.array([x, y]) + turn @ arm
+        return float(way[0]), float(way[1])
+
+    def _section_at(self, point: tuple[float, float]) -> int | None:
+        """Node of the section of a flexure that is nearest to a point on the flexure; None for a point on a body."""
         for span, own in zip(self.spans, self.segments, strict=True):
             if span.slab.holds(np.array(point)[:, None])[0]:
                 nodes = np.unique(self.frame.ends[list(own)])
-                node = nodes[np.argmin(np.hypot(*(self.frame.nodes_mm[nodes] - point).T))]
-                x, y, angle = moved[3 * node : 3 * node + 3]
-                arm = np.array(point) - self.frame.nodes_mm[node]
-                turn = turned_axes(angle) - np.eye(2) if large else angle * np.array([[0.0, -1.0], [1.0, 0.0]])
-                way = np.array([x, y]) + turn @ arm
-                return float(way[0]), float(way[1])
-        return self.assembly.motion_mm(moved, point, large=large)
+                return int(nodes[np.argmin(np.hypot(*(self.frame.nodes_mm[nodes] - point).T))])
+        return None
+
+    def _vibration(self, count: int) -> FrameVibration:
+        """Mass and stiffness with `count` own modes of every body; the result for the latest count is cached."""
+        if self._vibrating is None or self._vibrating[0] != count:
+            stiffness = self.driven.stiffness_n_mm.toarray()
+            found = frame_vibration(self.assembly, stiffness, self._masses, self.free, self.by_input, count)
+            self._vibrating = count, found
+        return self._vibrating[1]
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
-        """First natural frequencies in the plane, with the drive fixed or free to move along its direction (Hz).
+        """First natural frequencies in the plane, with the drive fixed or free to move along its direction (Hz)."""
+        rad_s, _, _ = self._vibration(count).modes(drive_held=drive_held, count=count)
+        return tuple((rad_s / (2.0 * np.pi)).tolist())
 
-        The bodies' own vibration modes with fixed frames are added to the condensed motions (Craig and Bampton, AIAA
-        Journal 6 (1968) 1313).
+    def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
+        """First natural modes in the plane: angular frequencies in rad/s, and mode shapes of unit mass by column.
+
+        A mode shape contains the displacements of the bodies' nodes, followed by the motions of the coordinate frames.
         """
-        size = self.frame.unknowns
-        inner = [own_modes(self.plate, body, count) for body in self.assembly.bodies]
-        total = size + sum(len(modes.squared) for modes in inner)
-        mass, stiffness = np.zeros((total, total)), np.zeros((total, total))
-        stiffness[:size, :size] = self.driven.stiffness_n_mm.toarray()
-        at = size
-        for body, modes in zip(self.assembly.bodies, inner, strict=True):
-            dofs, own = body.unknowns, np.arange(at, at + len(modes.squared))
-            mass[np.ix_(dofs, dofs)] += body.mass_t
-            mass[own, own], stiffness[own, own] = 1.0, modes.squared
-            mass[np.ix_(dofs, own)], mass[np.ix_(own, dofs)] = modes.coupling_t, modes.coupling_t.T
-            at += own.size
-        for ends, weight, length_mm in self._masses:
-            for node in ends:
-                place = np.arange(3 * node, 3 * node + 3)
-                mass[place, place] += 0.5 * weight * np.array([1.0, 1.0, length_mm**2 / 12.0])
-        columns = np.eye(total)[:, np.concatenate([self.free, np.arange(size, total)])]
-        if not drive_held:
-            columns = np.column_stack([columns, np.append(self.by_input, np.zeros(total - size))])
-        K, M = columns.T @ stiffness @ columns, columns.T @ mass @ columns
-        # The reciprocal problem: masses may be zero, the stiffness is positive definite.
-        last = K.shape[0] - 1
-        inverse = eigh(M, K, eigvals_only=True, subset_by_index=(last + 1 - count, last))[::-1]
-        return tuple((1.0 / (2.0 * np.pi * np.sqrt(inverse))).tolist())
+        vibration = self._vibration(count)
+        rad_s, shapes, _ = vibration.modes(drive_held=drive_held, count=count)
+        return rad_s, np.vstack([vibration.field(shapes), shapes[: vibration.frames]])
+
+    def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
+        """Lines of the bodies' outlines and of the flexures' axes; see `mode_shapes.MovingMechanism`."""
+        lines, places = self.plate.outline_lines()
+        ends = self.frame.ends
+        own = self.plate.unknowns + 3 * ends[:, :, None] + np.arange(2)
+        return np.concatenate([lines, self.frame.nodes_mm[ends]]), np.concatenate([places, own])
+
+    def modal_model(self, count: int) -> ModalModel:
+        """Reduce the mechanism to its static shape and its modes with the drive fixed; see `MechanismPlate`."""
+        vibration = self._vibration(count)
+        rad_s, shapes, _ = vibration.modes(drive_held=True, count=count)
+        static = np.append(self.driven.unit_displacement, np.zeros(shapes.shape[0] - vibration.frames))
+        inertia = vibration.mass_t @ static
+        return ModalModel(
+            stiffness_n_mm=self.stiffness_n_mm,
+            mass_t=float(static @ inertia),
+            rad_s=rad_s,
+            participation=shapes.T @ inertia,
+            observed=observables(self.mechanism, self._probes_by(vibration, np.column_stack([static, shapes]))),
+        )
+
+    def free_modes(self, count: int) -> FreeModes:
+        """Return the modes with the drive free along its direction."""
+        vibration = self._vibration(count)
+        rad_s, shapes, drive = vibration.modes(drive_held=False, count=count)
+        return FreeModes(rad_s, drive, changes(self.mechanism, self._probes_by(vibration, shapes)))
+
+    def _probes_by(self, vibration: FrameVibration, shapes: Array) -> dict[str, Array]:
+        """Small motion of every probe caused by each column of displacements, shape (2, k)."""
+        fields, found = vibration.field(shapes), {}
+        for name, point in self.mechanism.probes.items():
+            if self._section_at(point) is None:
+                found[name] = self.plate.rows_at(point) @ fields
+            else:
+                by_column = (self._motion(column, point, large=False) for column in shapes[: vibration.frames].T)
+                found[name] = np.array(list(by_column)).T
+        return found

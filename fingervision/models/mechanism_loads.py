@@ -1,6 +1,7 @@
-"""Effects of weight, warmth and a part between two probes on a mechanism, for small displacements.
+"""Effects of weight, temperature and a part between two probes on a mechanism, for small displacements.
 
-All are by finite elements: frames of bars grow and hang where their axes meet, not where the drawing does.
+All effects are computed by finite elements: frames of bars expand and hang at the points where their axes meet, unlike
+the drawing.
 """
 
 from dataclasses import dataclass
@@ -22,7 +23,8 @@ _STILL = 1e-3
 def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
     """Compute mechanical advantage, and the effects of weight and warmth.
 
-    The drive stays where it is under weight and warmth, and so do the fixed faces and the sliding faces' own direction.
+    Under weight and temperature the drive keeps its position, and so do the fixed faces and the sliding faces in their
+    fixed direction.
 
     Parameters
     ----------
@@ -64,7 +66,7 @@ def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class PairGrip:
-    """A part between the two probes of a pair, at one input.
+    """State of a part gripped between the two probes of a pair, at one input.
 
     Parameters
     ----------
@@ -86,7 +88,8 @@ class PairGrip:
 class GrippedPair:
     """Two probes that press on a part between them, along the line that joins them.
 
-    The part touches at the probes, over a patch as large as the elements there; how it dents the body is not resolved.
+    The part touches at the probes, over a patch as large as the elements there; the indentation of the body is not
+    resolved.
 
     Parameters
     ----------
@@ -107,15 +110,16 @@ class GrippedPair:
 
     @property
     def mechanical_advantage(self) -> float:
-        """Grip on a rigid part over the force at the drive, beyond the touch; what is left bends the flexures.
+        """Gripping force on a rigid part per force at the drive, beyond the touch; the remainder bends the flexures.
 
-        By Betti's theorem the grip N pulls the drive with N times the pair's motion by unit input.
+        By Betti's theorem, the gripping force N acts on the drive with N times the motion of the pair per unit of
+        input.
         """
         grip = abs(self.per_input) / self.compliance_mm_n
         return grip / (self.model.stiffness_n_mm + grip * abs(self.per_input))
 
     def touch_input_mm(self, part: Part) -> float:
-        """Input at which the part is touched.
+        """Input at which the fingers first touch the part (mm).
 
         Raises
         ------
@@ -130,7 +134,7 @@ class GrippedPair:
         return (part.width_mm - self.rest_mm) / self.per_input
 
     def at(self, input_mm: float, part: Part) -> PairGrip:
-        """Find the equilibrium at one input."""
+        """Find the equilibrium with the gripped part at one input."""
         model = self.model
         free_mm = self.rest_mm + self.per_input * input_mm
         pressed_mm = max(part.width_mm - free_mm, 0.0)

@@ -13,10 +13,10 @@ from fingervision.models.contact_pairs import contact_pair
 from fingervision.models.driven_body import factorised
 from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
-from fingervision.models.mechanism_equilibrium import DrivenMechanism
-from fingervision.models.mechanism_faces import driven_components, mean_weights, supports_of, turns_with
-from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
-from fingervision.models.modal_model import FreeModes, ModalModel, Observable
+from fingervision.models.mechanism_equilibrium import DrivenMechanism, MechanismEquilibrium
+from fingervision.models.mechanism_faces import driven_components, mean_weights, per_input_of, supports_of, turns_with
+from fingervision.models.mechanism_state import MechanismState, changes, named_forces_n, observables, pair_distances_mm
+from fingervision.models.modal_model import FreeModes, ModalModel
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.strip_energy import used_in_plate
@@ -75,7 +75,7 @@ class MechanismPlate:
             self._hold_back(width_effect=True)
 
     def _hold_back(self, *, width_effect: bool) -> tuple[ConstrainedZone, ...]:
-        """Make the plate, whose flexures its width holds back."""
+        """Make the plate with its flexures stiffened by the restraint of its width."""
         mechanism = self.mechanism
         zones = tuple(flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures)
         used = zones if width_effect else ()
@@ -97,25 +97,27 @@ class MechanismPlate:
         dofs = {"x": plate.x_dofs, "y": plate.y_dofs}
         held = [dofs[component][nodes] for nodes in supports.fixed for component in "xy"]
         held += [dofs[component][nodes] for nodes, component in supports.slides]
-        driven = driven_components(mechanism)
-        self._by_input = np.zeros(plate.unknowns)
-        every = np.arange(plate.unknowns)
-        if len(driven) == 1 and turns_with(plate, supports.driven, driven[0]):
-            # The face lies along its drive: its mean is driven, by way of the unknown that weighs most.
-            own, weights = dofs[driven[0]][supports.driven], mean_weights(plate, supports.driven)
-            chief = int(np.argmax(weights))
-            self._by_input[own[chief]] = mechanism.drive.direction["xy".index(driven[0])] / weights[chief]
-            free = np.setdiff1d(every, np.concatenate([*held, own[[chief]]]))
-            motions = identity(plate.unknowns, format="lil")
-            motions[own[chief], own] = -weights / weights[chief]
-            self._motions = csr_matrix(motions.tocsc()[:, free])
-        else:
-            for component, share in zip("xy", mechanism.drive.direction, strict=True):
+        self._by_drive = np.zeros((plate.unknowns, len(mechanism.drives)))
+        motions = identity(plate.unknowns, format="csc")
+        for column, (drive, nodes) in zip(self._by_drive.T, zip(mechanism.drives, supports.driven, strict=True),
+                                          strict=True):  # fmt: skip
+            driven = driven_components(drive)
+            if len(driven) == 1 and turns_with(plate, nodes, driven[0]):
+                # The face lies along its drive: its mean is driven, by way of the unknown that weighs most.
+                own, weights = dofs[driven[0]][nodes], mean_weights(plate, nodes)
+                chief = int(np.argmax(weights))
+                column[own[chief]] = drive.direction["xy".index(driven[0])] / weights[chief]
+                motions = motions.tolil()
+                motions[own[chief], own] = -weights / weights[chief]
+                held.append(own[[chief]])
+                continue
+            for component, share in zip("xy", drive.direction, strict=True):
                 if component in driven:
-                    self._by_input[dofs[component][supports.driven]] = share
-            prescribed = [dofs[component][supports.driven] for component in driven]
-            free = np.setdiff1d(every, np.concatenate([*held, *prescribed]))
-            self._motions = csr_matrix(identity(plate.unknowns, format="csc")[:, free])
+                    column[dofs[component][nodes]] = share
+                    held.append(dofs[component][nodes])
+        self._by_input = self._by_drive @ per_input_of(mechanism)
+        free = np.setdiff1d(np.arange(plate.unknowns), np.concatenate(held))
+        self._motions = csr_matrix(motions.tocsc()[:, free])
 
     @cached_property
     def driven(self) -> DrivenMechanism:
@@ -131,12 +133,12 @@ class MechanismPlate:
         plate = self.plate
         pairs = [contact_pair(plate, contact, self.mechanism, self._size_mm) for contact in self.mechanism.contacts]
         return DrivenMechanism(
-            self.mechanism.name, plate.internal_force_n, plate.nodal_force_n, self._motions, self._by_input,
-            tuple(partial(pair.gaps_mm, plate) for pair in pairs),
+            self.mechanism.name, plate.internal_force_n, plate.nodal_force_n, self._motions, self._by_drive,
+            per_input_of(self.mechanism), tuple(partial(pair.gaps_mm, plate) for pair in pairs),
         )  # fmt: skip
 
     def _wanders(self) -> bool:
-        """Whether the supports allow a rigid motion of the whole body."""
+        """Whether the supports allow a rigid motion of the whole mechanism."""
         x, y = self.plate.nodes_mm
         whole = np.zeros((3, self.plate.unknowns))
         whole[0, self.plate.x_dofs], whole[1, self.plate.y_dofs] = 1.0, 1.0
@@ -179,15 +181,31 @@ class MechanismPlate:
 
     def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
         """Find the equilibrium at one input."""
-        mechanism = self.mechanism
         found = self.driven.equilibrium(input_mm, large_rotation=large_rotation, contact=contact)
-        moved = found.displacement
+        return self._seen(input_mm, found, large_rotation=large_rotation)
+
+    def drive_states(self) -> tuple[MechanismState, ...]:
+        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        return tuple(self._seen(1.0, found, large_rotation=False) for found in self.driven.by_one_drive())
+
+    def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:
+        mechanism, moved = self.mechanism, found.displacement
         probes = {name: (float(rows[0] @ moved), float(rows[1] @ moved)) for name, rows in self.probe_rows.items()}
         pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
         pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
         stress = self.stress_mpa(moved, large=large_rotation)
         poses = plate_poses(self.plate, self.bodies, moved, large=large_rotation)
-        return MechanismState(input_mm, found.force_n, probes, pairs, stress, moved, pressed, poses)
+        return MechanismState(
+            input_mm,
+            found.force_n,
+            probes,
+            pairs,
+            stress,
+            moved,
+            pressed,
+            poses,
+            named_forces_n(mechanism, found.drives_n),
+        )
 
     def stress_mpa(self, moved: Array, *, large: bool = False) -> float:
         """Largest von Mises stress in the flexures at given displacements (MPa)."""
@@ -195,12 +213,12 @@ class MechanismPlate:
 
     @cached_property
     def probe_rows(self) -> dict[str, Array]:
-        """Displacements to the motion along x and y of every probe, shape (2, unknowns) each."""
+        """Matrices that convert displacements to the motion of every probe along x and y, shape (2, unknowns) each."""
         return {name: self.plate.rows_at(point) for name, point in self.mechanism.probes.items()}
 
     @cached_property
     def pair_rows(self) -> dict[str, Array]:
-        """Small displacements to the change of every pair's distance, shape (unknowns,) each."""
+        """Vectors that convert small displacements to the change of each pair's distance, shape (unknowns,) each."""
         found = {}
         for name, (a, b) in self.mechanism.pairs.items():
             apart = np.array(self.mechanism.probes[b]) - self.mechanism.probes[a]
@@ -242,31 +260,23 @@ class MechanismPlate:
         rad_s, shapes = self.modes(drive_held=True, count=count)
         static = self.unit_displacement_mm
         inertia = self.plate.mass_t @ static
-        observed = {
-            name: Observable(rest, float(change[0]), change[1:])
-            for name, (rest, change) in self._observed(np.column_stack([static, shapes])).items()
-        }
         return ModalModel(
             stiffness_n_mm=self.stiffness_n_mm,
             mass_t=float(static @ inertia),
             rad_s=rad_s,
             participation=shapes.T @ inertia,
-            observed=observed,
+            observed=observables(self.mechanism, self._probes_by(np.column_stack([static, shapes]))),
         )
 
     def free_modes(self, count: int) -> FreeModes:
-        """Return the modes with the drive free along its direction."""
+        """Return the vibration modes with the drive free to move along its direction."""
         rad_s, shapes, drive = self._modes(drive_held=False, count=count)
-        return FreeModes(rad_s, drive, {name: change for name, (_, change) in self._observed(shapes).items()})
+        return FreeModes(rad_s, drive, changes(self.mechanism, self._probes_by(shapes)))
 
-    def _observed(self, columns: Array) -> dict[str, tuple[float, Array]]:
-        """Observables (pairs, then probes): value at rest, and its change by each column of displacements."""
-        mechanism = self.mechanism
-        observed = {}
-        for name, row in self.pair_rows.items():
-            a, b = (np.array(mechanism.probes[end]) for end in mechanism.pairs[name])
-            observed[f"{name}_mm"] = float(np.hypot(*(b - a))), row @ columns
-        for name, rows in self.probe_rows.items():
-            for axis, row in zip("xy", rows, strict=True):
-                observed[f"{name}_{axis}_mm"] = 0.0, row @ columns
-        return observed
+    def _probes_by(self, columns: Array) -> dict[str, Array]:
+        """Small motion of every probe caused by each column of displacements, shape (2, k)."""
+        return {name: rows @ columns for name, rows in self.probe_rows.items()}
+
+    def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
+        """Lines of the outline for plotting; see `mode_shapes.MovingMechanism`."""
+        return self.plate.outline_lines()

@@ -6,8 +6,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.models.mechanism import Mechanism
+from fingervision.models.modal_model import Observable
 from fingervision.models.rigid_motion import BodyPose
 
 
@@ -18,7 +20,8 @@ class MechanismState:
     Parameters
     ----------
     input_mm, force_n : float
-        Motion of the drive along its direction, and the drive's force in that direction.
+        Input, and the force that does its work: at a single driven face the force along its direction, with several
+        the sum of their forces, each times its motion per 1 mm of input.
     probes_mm : dict of str to (float, float)
         Displacements of the probes.
     pairs_mm : dict of str to float
@@ -32,6 +35,8 @@ class MechanismState:
         Force of every contact pair.
     bodies : mapping of str to BodyPose
         Poses of the bodies that move.
+    drives_n : mapping of str to float
+        Force at every driven face, along its direction.
     """
 
     input_mm: float
@@ -42,6 +47,12 @@ class MechanismState:
     displacement_mm: Any
     contact_n: dict[str, float]
     bodies: Mapping[str, BodyPose] = field(default_factory=lambda: MappingProxyType({}))
+    drives_n: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+
+def named_forces_n(mechanism: Mechanism, forces_n: NDArray[np.float64]) -> dict[str, float]:
+    """Forces of the driven faces (N), by the names of the faces."""
+    return {drive.face.name: float(force) for drive, force in zip(mechanism.drives, forces_n, strict=True)}
 
 
 def pair_distances_mm(
@@ -69,3 +80,39 @@ def pair_distances_mm(
         along = length + moved @ apart / length
         found[name] = float(np.copysign(np.hypot(*(apart + moved)), along) if large else along)
     return found
+
+
+def changes(mechanism: Mechanism, probes_by: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Small changes of every pair's distance and every probe's position, by column name.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    probes_by : mapping of str to ndarray of float, shape (2, k)
+        Small motion of every probe along x and y, in k cases.
+
+    Returns
+    -------
+    dict of str to ndarray of float, shape (k,)
+        `NAME_mm` of the pairs, then `NAME_x_mm` and `NAME_y_mm` of the probes.
+    """
+    found = {}
+    for name, (a, b) in mechanism.pairs.items():
+        apart = np.array(mechanism.probes[b]) - mechanism.probes[a]
+        found[f"{name}_mm"] = apart @ (probes_by[b] - probes_by[a]) / np.hypot(*apart)
+    for name, moved in probes_by.items():
+        found |= {f"{name}_{axis}_mm": row for axis, row in zip("xy", moved, strict=True)}
+    return found
+
+
+def observables(mechanism: Mechanism, probes_by: Mapping[str, NDArray[np.float64]]) -> dict[str, Observable]:
+    """Outputs of a modal model; the first of the k cases of `changes` is 1 mm of input, the others are its modes."""
+    rest_mm = {
+        f"{name}_mm": float(np.hypot(*(np.array(mechanism.probes[b]) - mechanism.probes[a])))
+        for name, (a, b) in mechanism.pairs.items()
+    }
+    return {
+        name: Observable(rest_mm.get(name, 0.0), float(change[0]), change[1:])
+        for name, change in changes(mechanism, probes_by).items()
+    }

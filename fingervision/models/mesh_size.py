@@ -66,7 +66,7 @@ class SizeField:
 
     @cached_property
     def _classes(self) -> list[tuple[cKDTree, Array]]:
-        """Group points by edge length, so that within a group only the nearest one limits the mesh size."""
+        """Group points by edge length, so that within a group only the nearest point limits the mesh size."""
         rank = np.floor(np.log(self.edge_mm / self.edge_mm.min()) / np.log(_CLASS)).astype(int)
         return [(cKDTree(self.points_mm[rank == r]), self.edge_mm[rank == r]) for r in np.unique(rank)]
 

@@ -1,6 +1,6 @@
 """A driven elastic body reduced to its static shape and its natural modes: the basis of all dynamic responses.
 
-The motion u of the drive is prescribed. The body follows u by its static shape s; each mode r of the body with fixed
+The motion u(t) of the drive is prescribed. The body follows u by its static shape s; each mode r of the body with fixed
 drive is excited by the inertia of the static shape (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface
 unknown):
 
@@ -8,8 +8,8 @@ unknown):
     force at the drive = k u + m u'' + sum_r L_r q_r''
 
 with L_r = phi_r' M s, k = s' K s and m = s' M s. Damping acts on the motion relative to the static shape. If the drive
-is free to move and pushed by a force f, other modes vibrate (those with free drive), with d_r their motion of the
-drive:
+is free to move and pushed by a force f, the modes with free drive vibrate instead; with d_r the motion of the drive in
+mode r:
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = d_r f
 """
@@ -89,7 +89,7 @@ class ModalModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeModes:
-    """Modes with the drive free along its direction.
+    """Vibration modes with the drive free to move along its direction.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class FreeModes:
 
 
 def described(damping: Damping, rad_s: Array) -> Array:
-    """Damping ratios of those lowest modes for which a damping law is valid.
+    """Damping ratios of the lowest modes, as far as a damping law is valid for them.
 
     If the ratio leaves the range that is possible for solids, as that of equation (4) does at a few times its reference
     frequency, the law is used for the modes below that frequency only.

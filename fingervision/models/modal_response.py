@@ -55,9 +55,9 @@ class Motion:
 
 
 def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None = None) -> Motion:
-    """Compute the motion over a drive history that is linear between samples; runs begin at rest at their first input.
+    """Compute the motion over a drive history that is linear between samples; runs start at rest, at their first input.
 
-    Every step uses the exact solution of the modes' equations, so that the result does not depend on the spacing of
+    For every time step the modes' equations are solved exactly, so that the result does not depend on the spacing of
     samples.
 
     Parameters
@@ -81,7 +81,7 @@ def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None
 
 
 def run_rows(drive: DriveHistory) -> list[slice]:
-    """Rows of each run, in order; a single slice if the drive history is not divided into runs."""
+    """Row numbers of each run, in order; a single slice if the drive history is not divided into runs."""
     if drive.run is None:
         return [slice(0, drive.time_s.size)]
     names = np.array(drive.run)

@@ -23,7 +23,7 @@ _FIRST = 4
 
 @dataclass(frozen=True, slots=True)
 class ModesWanted:
-    """Number of modes of each family, or the frequency up to which they are wanted (Hz)."""
+    """Number of natural modes of each family, or the frequency (Hz) up to which they are computed."""
 
     count: int | None = None
     highest_hz: float = inf
@@ -57,18 +57,20 @@ class ModeShape:
     swing: float = 1.0
 
 
-class MeshedMechanism(Protocol):
-    """A mechanism drawn by bodies."""
-
-    plate: PlaneStressPlate
+class MovingMechanism(Protocol):
+    """Protocol of a mechanism drawn by bodies whose vibration can be computed, because it has masses."""
 
     def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
-        """First natural modes in the plane."""
+        """First natural modes in the plane: angular frequencies (rad/s), and mode shapes by column."""
+        ...
+
+    def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
+        """Line pieces to plot, shape (n, 2, 2), and the indices of their ends' motions (x and y) in a mode shape."""
         ...
 
 
 def parse_modes(text: str) -> ModesWanted:
-    """Parse how many modes are wanted: `6`, or all up to a frequency, `500Hz`.
+    """Parse the number of modes, such as `6`, or the frequency up to which they are computed, such as `500Hz`.
 
     Raises
     ------
@@ -124,15 +126,15 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
     return found
 
 
-def mechanism_mode_shapes(model: MeshedMechanism, wanted: ModesWanted) -> list[ModeShape]:
+def mechanism_mode_shapes(model: MovingMechanism, wanted: ModesWanted) -> list[ModeShape]:
     """Modes of a mechanism drawn by bodies, with the drive free or fixed."""
-    lines, points = _lines_of_plate(model.plate)
+    lines, points = model.mode_lines()
     found = []
     for family, held in (("drive free", False), ("drive held", True)):
         rad_s, shapes = _wanted_modes(
             lambda count, held=held: model.modes(drive_held=held, count=count),  # type: ignore[misc]
             wanted,
-            model.plate.unknowns,
+            2 * MOST_MODES,
         )
         for number, (angular, shape) in enumerate(zip(rad_s, shapes.T, strict=True), 1):
             shift = _scaled(lines, shape[points], mirrored=False)
@@ -160,15 +162,10 @@ def _wanted_modes(solve: Solve, wanted: ModesWanted, unknowns: int) -> tuple[Arr
 def _lines_of_half(model: Any) -> tuple[Array, NDArray[np.int64]]:
     """Line pieces to plot, shape (n, 2, 2), and the indices of the unknowns (x, y) of their ends."""
     if hasattr(model, "plate"):
-        return _lines_of_plate(model.plate)
+        plate: PlaneStressPlate = model.plate
+        return plate.outline_lines()
     frame = model.frame
     return frame.nodes_mm[frame.ends], 3 * frame.ends[:, :, None] + np.arange(2)
-
-
-def _lines_of_plate(plate: PlaneStressPlate) -> tuple[Array, NDArray[np.int64]]:
-    a, b, middle = plate.outline_edges
-    ends = np.concatenate([np.stack([a, middle], axis=1), np.stack([middle, b], axis=1)])
-    return plate.nodes_mm.T[ends], np.stack([plate.x_dofs[ends], plate.y_dofs[ends]], axis=-1)
 
 
 def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
@@ -182,6 +179,6 @@ def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
 
 
 def _way_to_meeting(x: Array, across: Array) -> float:
-    """Largest scale at which no point of the half crosses the symmetry axis."""
+    """Largest scale factor of a mode shape at which no point of the half crosses the symmetry axis."""
     closing = (across < 0.0) & (x > 1e-9 * float(x.max()))
     return float(np.min(-x[closing] / across[closing], initial=np.inf))

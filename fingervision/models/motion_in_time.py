@@ -74,7 +74,7 @@ def gripper_motion(
     """Compute the motion over a drive history; each run begins at rest at its first input.
 
     With small displacements the modes' equations are solved exactly. With large rotation or contact, a frame of bars is
-    integrated step by step if that takes at most 20 000 steps. Otherwise the gripper follows its equilibria, and the
+    integrated in time steps if at most 20 000 steps are needed. Otherwise the gripper follows its equilibria, and the
     modes at rest vibrate about them while the fingers do not touch, which is valid for small vibrations.
 
     Parameters
@@ -125,6 +125,31 @@ def gripper_motion(
     return GripperMotion(
         motion, f"equilibria, and about them {small.modes_hz.size} modes at rest where the fingers do not touch"
     )
+
+
+def check_small_vibration(small: Motion, column: str, travel_mm: float) -> None:
+    """Refuse a drive that vibrates a length too strongly for the modes at rest to be superposed on the equilibria.
+
+    Parameters
+    ----------
+    small : Motion
+        Motion for small displacements.
+    column : str
+        Name of the length.
+    travel_mm : float
+        Range of the length's equilibria over the drive.
+
+    Raises
+    ------
+    ModelError
+        If the vibration exceeds a twentieth of the travel.
+    """
+    if (shaken_mm := small.vibration_mm(column)) > _FAST * travel_mm:
+        raise ModelError(
+            f"With large rotation or contact this drive must vibrate {column.removesuffix('_mm')} by at most {_FAST:g} "
+            f"of its travel of {travel_mm:.3g} mm, but vibrates it by {shaken_mm:.3g} mm; slow it down, or leave "
+            "--large-rotation and --contact off."
+        )
 
 
 def about_equilibria(

@@ -63,7 +63,7 @@ class Notch:
 
     @property
     def reach_mm(self) -> float:
-        """Extent of the notch along the bar from its middle (mm)."""
+        """Half of the length of the notch's arc along the bar (mm)."""
         share = 1.0 - 0.5 * (self.web_mm - self.thickness_mm) / self.depth_mm
         return self.half_length_mm * sqrt(1.0 - max(share, 0.0) ** 2)
 
@@ -117,7 +117,7 @@ def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:
 def masses_t(notch: Notch, material: Material, edges_mm: Array) -> Array:
     """Masses between positions along the notch, by equation (1) of Hricko & Havlik (2015): density x depth x area.
 
-    The integral of h has a closed form; int sqrt(1 - s^2) ds = (s sqrt(1 - s^2) + asin s) / 2.
+    The integral of the notch's height h(x) has a closed form; int sqrt(1 - s^2) ds = (s sqrt(1 - s^2) + asin s) / 2.
     """
     edges = np.clip(edges_mm / notch.half_length_mm, -1.0, 1.0)
     under_arc = 0.5 * (edges * np.sqrt(1.0 - edges**2) + np.arcsin(edges))

@@ -1,4 +1,4 @@
-"""Characteristic numbers for a designer: leverage, parasitic motion, effects of weight and temperature."""
+"""Characteristic numbers of a gripper in operation: leverage, parasitic motion, effects of weight and temperature."""
 
 from dataclasses import dataclass
 

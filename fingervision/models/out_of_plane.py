@@ -1,6 +1,6 @@
 """Out-of-plane motion of a mechanism with its drive fixed: natural modes, and the sag of a horizontal plate.
 
-Fixed faces and the drive's face are fixed in all directions. A sliding face is fixed in its constrained direction at
+Fixed faces and driven faces are fixed in all directions. A sliding face is fixed in its constrained direction at
 every depth, which on a plane of symmetry selects the symmetric modes.
 """
 
@@ -75,7 +75,7 @@ def out_of_plane(
     plate = DeepPlate(mesh, mechanism.material, mechanism.plate_mm, *(() if order is None else (order,)))
     held = [plate.coefficients(nodes, way) for nodes in supports.fixed for way in range(3)]
     held += [plate.coefficients(nodes, "xy".index(component)) for nodes, component in supports.slides]
-    held += [plate.coefficients(supports.driven, way) for way in range(3)]
+    held += [plate.coefficients(nodes, way) for nodes in supports.driven for way in range(3)]
     body = plate.supported(np.concatenate(held))
     moved = body.sag(STANDARD_GRAVITY_MM_S2)
     sag_mm = {name: plate.middle_mm(moved, point) for name, point in mechanism.probes.items()}

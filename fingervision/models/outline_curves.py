@@ -68,7 +68,7 @@ class Curve:
         return np.asarray(slope / np.hypot(*slope))
 
     def curvature_radius_mm(self, t: Array) -> Array:
-        """Radius of curvature; infinite where straight."""
+        """Radius of curvature (mm); infinite for a segment."""
         if self.v is None:
             return np.full(len(t), np.inf)
         first = np.outer(self.v, np.cos(t)) - np.outer(self.u, np.sin(t))
@@ -80,9 +80,9 @@ class Curve:
         return Curve(self.origin, self.u, self.v, t0, t1)
 
     def level(self, points: Array) -> Array:
-        """Signed distance measure of points from the extended curve (line or whole ellipse), zero on it, shape (n,).
+        """Signed distance of points from the extended curve (line or whole ellipse), zero on the curve; shape (n,).
 
-        For a line it is the distance in mm; for an ellipse, the squared relative radius minus 1.
+        For a line this is the distance in mm; for an ellipse, the squared relative radius minus 1.
         """
         apart = points - self.origin[:, None]
         if self.v is None:
@@ -103,7 +103,7 @@ class Curve:
 
 
 def crossings(curve: Curve, other: Curve) -> list[float]:
-    """Parameters of a curve, strictly between its ends, at which it meets another curve or the end of another."""
+    """Parameters of a curve, strictly between its ends, at which it meets another curve or the end of another curve."""
     found = _meetings(curve, other)
     for corner in (other.start_mm, other.end_mm):
         # Curves that lie on each other are divided at each other's ends.
@@ -114,7 +114,7 @@ def crossings(curve: Curve, other: Curve) -> list[float]:
 
 
 def other_holds(curve: Curve, other: Curve, t: float) -> bool:
-    """Whether the point at parameter t of one curve lies between the ends of another."""
+    """Whether the point at parameter t of one curve lies between the ends of another curve."""
     return other.holds(curve.at(np.array([t]))[:, 0])
 
 

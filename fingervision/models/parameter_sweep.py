@@ -1,4 +1,4 @@
-"""Sweep over a grid of dimensions: figures of the lumped model, scaled by ratios that a faster bar model computes."""
+"""Sweep over a grid of dimensions: figures of the lumped model, scaled by ratios from a faster bar model."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -134,7 +134,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
 
 def _figures(model: LumpedGripper) -> dict[str, float]:
-    """Figures of a drawing by the names in `COLUMNS`."""
+    """Results for one drawing, by the names in `COLUMNS`."""
     stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
     at_yield = model.gripper.material.yield_mpa / stress
     mode = model.modes_hz(drive_held=False, count=1)[0]

@@ -65,7 +65,7 @@ class PhysicalGripper:
 
     @cached_property
     def laws(self) -> Mapping[str, PhysicalLaw]:
-        """Laws of the catalogue's effects that this drawing determines, by name of effect."""
+        """Laws of the catalogue's effects that this drawing determines, by the name of the effect."""
         body = getattr(self._model, "half", None)
         if not isinstance(body, DrivenBody):  # a model of small displacements alone: the frame of the same members
             body = half_frame(self.gripper, skeleton_of(self.gripper, self.theory, 0))
@@ -80,7 +80,7 @@ class PhysicalGripper:
 
     @cached_property
     def places(self) -> PlaceAnswers:
-        """Predictions for changes of single hinges or links of both halves, by condensed bodies for every kind."""
+        """Object that predicts changes of single hinges or links of both halves, by condensed bodies."""
         return PlaceAnswers(whole_mechanism(self.gripper, self.gripper, "gripper"))
 
     @property
@@ -108,7 +108,7 @@ class PhysicalGripper:
     def drawn_anew(self, changes: Mapping[str, float]) -> "PhysicalGripper":
         """Return the gripper with changed dimensions, computed by this kind of model itself.
 
-        The scaled response of `redrawn` differs from this one by about 1e-4.
+        The scaled response of `redrawn` differs from the response computed here by about 1e-4 (relative).
         """
         if not changes:
             return self._with(self._drawn)

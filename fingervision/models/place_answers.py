@@ -1,6 +1,6 @@
 """Response of a mechanism with a local change: stiffness or position of a hinge, or slip in a pivot.
 
-Bodies keep their condensed stiffness; a displaced flexure is joined to them by a rigid arm, and a flexure of changed
+Bodies keep their condensed stiffness; a displaced flexure is connected to them by a rigid arm, and a flexure of changed
 thickness keeps its ends. A changed response then requires one small system of equations, which takes a thousandth of
 the time of a new mesh.
 """
@@ -36,7 +36,7 @@ drawn one."""
 
 @dataclass(frozen=True, slots=True)
 class PlaceChanges:
-    """Local changes of a mechanism relative to its drawing.
+    """Changes of single hinges or links of a mechanism relative to its drawing.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class PlaceAnswers:
             self._probe_of[name] = number, own
 
     def _turn_of(self, body: int) -> Array:
-        """Mean rotation of a body in rad, as a functional of the frames' motions."""
+        """Mean rotation of a body (rad), as a functional of the coordinate frames' motions."""
         assembly, plate = self.model.assembly, self.model.plate
         nodes = np.flatnonzero(assembly.piece == body)
         arm = plate.nodes_mm[:, nodes] - plate.nodes_mm[:, nodes].mean(axis=1)[:, None]
@@ -166,7 +166,7 @@ class PlaceAnswers:
 
     @cached_property
     def by_edges(self) -> Array:
-        """Extra change of each channel per 1 mm of input if poses are measured from edges, shape (channels,).
+        """Extra change of each channel per 1 mm of input if the poses are measured from edges, shape (channels,).
 
         If a body bends, the mean motion of its outline differs from that of its area. In a picture only the edges are
         seen: their pose is the rigid motion nearest to the displacements of the edges along their normals.
@@ -214,7 +214,7 @@ class PlaceAnswers:
         return self._probe_of[probe][0]
 
     def thickness_for(self, flexure: int, ratio: float) -> float:
-        """Thickness at which a flexure's bending stiffness is (1 + ratio) times the drawn one (mm)."""
+        """Thickness (mm) at which a flexure's bending stiffness is (1 + ratio) times that of the drawing."""
         drawn = self.mechanism.flexures[flexure].thickness_mm
         softness = self._bending_compliance(flexure, drawn) / (1.0 + ratio)
         return float(brentq(lambda t: np.log(self._bending_compliance(flexure, t) / softness),
@@ -231,7 +231,7 @@ class PlaceAnswers:
         return np.asarray(own)
 
     def answer(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
-        """Compute all outputs with the given local changes."""
+        """Compute all outputs of the mechanism with the given changes of hinges or links."""
         model, frame = self.model, self.model.frame
         size = frame.unknowns
         compliance = frame.end_compliance.copy()
@@ -268,7 +268,7 @@ class PlaceAnswers:
         return LinearAnswer(seen[:, 0], by_slip, load_by_input, slip_stiffness)
 
     def _slips(self, frame: CorotationalFrame) -> tuple[Array, Array]:
-        """Loads of a unit slip at the middle of every flexure, shape (unknowns, 2 n), and stiffness against slip."""
+        """Loads of a unit slip at the middle of each flexure, shape (unknowns, 2 n), and stiffness against the slip."""
         loads, own = [], []
         for segments in self.model.segments:
             element = segments[len(segments) // 2 - 1]
@@ -308,7 +308,11 @@ def attachments(answers: PlaceAnswers) -> Sequence[Mapping[str, PointMm]]:
         for body in answers.ends(number):
             found[body][flexure.name] = flexure.at_mm
     mechanism = answers.mechanism
-    for face in (*mechanism.fixed, *(face for face, _ in mechanism.slides), mechanism.drive.face):
+    for face in (
+        *mechanism.fixed,
+        *(face for face, _ in mechanism.slides),
+        *(drive.face for drive in mechanism.drives),
+    ):
         x0, x1, y0, y1 = face.box_mm
         middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         nodes = model.plate.nodes_mm

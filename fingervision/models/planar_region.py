@@ -44,7 +44,7 @@ class Loop:
     area_mm2: float
 
     def holds(self, point: Point) -> bool:
-        """Whether a point lies inside, with arcs replaced by their chords."""
+        """Whether a point lies inside the loop, with arcs replaced by their chords."""
         along = [curve.at(np.linspace(curve.t0, curve.t1, _CHORDS))[:, :-1] for curve in self.curves]
         corners = tuple((float(x), float(y)) for x, y in np.concatenate(along, axis=1).T)
         return bool(Polygon(corners).holds(np.array(point)[:, None])[0])
@@ -186,9 +186,9 @@ def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
 
 
 def _area_mm2(curves: tuple[Curve, ...]) -> float:
-    """Signed area by Green's formula along the curves.
+    """Signed area of a loop (mm^2), by Green's formula along its curves.
 
-    Accurate to 1e-4 on arcs, which suffices because only its sign is used.
+    The area is accurate to 1e-4 on arcs, which suffices because only its sign is used.
     """
     total = 0.0
     for curve in curves:

@@ -31,7 +31,7 @@ class Polygon:
         return [Curve(a, b - a, None, 0.0, 1.0) for a, b in pairs if np.hypot(*(b - a)) > 0.0]
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points, shape (2, n), lie inside, which holds if an odd number of sides is to their right."""
+        """Whether points, shape (2, n), lie inside: an odd number of the polygon's sides is then to their right."""
         x, y = points
         inside = np.zeros(x.shape, dtype=bool)
         corners = np.array(self.corners_mm)

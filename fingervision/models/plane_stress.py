@@ -24,7 +24,7 @@ _CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _stress(strain: Any, moduli: Any) -> Any:
-    """Stress in plane stress, where the thickness is free to change.
+    """Stress (MPa) in plane stress, where the thickness is free to change.
 
     Source: Timoshenko and Goodier, Theory of Elasticity, chapter 2.
     """
@@ -92,6 +92,12 @@ class PlaneStressPlate:
         left = (b - a)[0] * (inner - a)[1] - (b - a)[1] * (inner - a)[0] > 0.0
         return np.vstack([np.where(left, ends[::-1], ends), corners + facets])
 
+    def outline_lines(self) -> tuple[Array, Indices]:
+        """Straight pieces of the outline, shape (n, 2, 2), and the unknowns along x and y of their ends, same shape."""
+        a, b, middle = self.outline_edges
+        ends = np.concatenate([np.stack([a, middle], axis=1), np.stack([middle, b], axis=1)])
+        return self.nodes_mm.T[ends], np.stack([self.x_dofs[ends], self.y_dofs[ends]], axis=-1)
+
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
         """Derivatives of the six shape functions at quadrature points, shape (m, q, 2, 6); weights, shape (m, q)."""
@@ -105,7 +111,7 @@ class PlaneStressPlate:
         return np.vstack([self._mesh.t[:3], int(self._basis.nodal_dofs.shape[1]) + self._mesh.t2f])
 
     def rows_at(self, point: tuple[float, float]) -> Array:
-        """Displacements to the motion along x and y of a point of the body, shape (2, unknowns)."""
+        """Matrix that converts displacements to a body point's motion along x and y, shape (2, unknowns)."""
         nodes, weights = element_weights(self.nodes_mm, self.nodes_of_triangles, point)
         rows = np.zeros((2, self.unknowns))
         rows[0, self.x_dofs[nodes]] = rows[1, self.y_dofs[nodes]] = weights
@@ -201,7 +207,7 @@ class PlaneStressPlate:
         )
 
     def _assembled(self, elements: Array, *, at_rest: bool) -> csr_matrix:
-        """Sum of the triangles' matrices; the positions of their entries are computed once."""
+        """Sum of the triangles' matrices in one sparse matrix; the positions of the entries are computed once."""
         shape = (self.unknowns, self.unknowns)
         if at_rest:
             unknowns = self.unknowns_of_triangles

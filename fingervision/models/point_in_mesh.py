@@ -1,4 +1,4 @@
-"""Place of a point in a mesh of quadratic triangles, so that its motion is that of the element it lies in.
+"""Find the element of a mesh in which a point lies, so that the point moves with this element.
 
 A fit through the nearest nodes would mix the motions of two bodies on both sides of a narrow gap.
 """
@@ -14,7 +14,7 @@ _NEWTON = 5
 
 
 def element_weights(nodes_mm: Array, triangles: Indices, point: tuple[float, float]) -> tuple[Indices, Array]:
-    """Find the element that holds a point, or the nearest one, and the values of its shape functions there.
+    """Find the element that contains a point, or the nearest element, and the values of its shape functions there.
 
     Parameters
     ----------

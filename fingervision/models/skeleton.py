@@ -31,7 +31,7 @@ _LEAST_BAR = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Member:
-    """One member of the tree: its start is joined to its parent's end, its own end is loaded.
+    """One member of the tree: its start is joined to its parent's end, and its own end is loaded.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def _bending_out_of_plane(member: Member, gripper: Gripper) -> Member:
 
 
 def _yielding(member: Member, at_start: Array) -> Member:
-    """Add an elastic joint, given by its compliance (x, y, rotation) in global axes, at a rigid member's start."""
+    """Add an elastic joint, with a given compliance (x, y, rotation) in global axes, at the start of a rigid member."""
     way = np.subtract(member.end_mm, member.start_mm)
     c, s = way / np.hypot(*way)
     carried = np.array([[1.0, 0.0, -way[1]], [0.0, 1.0, way[0]], [0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Small-displacement response of a drawing's frame, reduced to three numbers: fast enough for many changed drawings."""
+"""Small-displacement response of a drawing, reduced to three numbers: fast enough for many changed drawings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -21,7 +21,7 @@ _SAMPLES_BEYOND_TOUCH = 200
 
 
 def symmetric_response(body: DrivenBody, physics: Physics, input_mm: Array) -> Response:
-    """Compute the static response at each input, with two identical halves.
+    """Compute the static response at each input, for two identical halves.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def symmetric_response(body: DrivenBody, physics: Physics, input_mm: Array) -> R
 
 
 def gap_per_input(body: DrivenBody) -> float:
-    """Millimetres of gap per millimetre of input, at zero input."""
+    """Ratio of gap to input (mm per mm), at zero input."""
     return 2.0 * (body.measured_mm(body.unit_displacement_mm) - body.measured_rest_mm)
 
 
@@ -68,7 +68,7 @@ def contact_onset_mm(body: DrivenBody, physics: Physics) -> float | None:
 
 
 def loaded_state(body: DrivenBody, state: Equilibrium, stress_mpa: float, place_mm: PointMm) -> LoadedState:
-    """Collect the figures of one equilibrium."""
+    """Collect gap, forces and stress of one equilibrium."""
     gap_mm = 2.0 * body.measured_mm(state.displacement_mm)
     return LoadedState(state.input_mm, gap_mm, state.force_n, float(state.contact_n.sum()), stress_mpa, place_mm)
 

@@ -81,9 +81,9 @@ def gap_and_force_by_strain(body: DrivenBody, drive_face_y_mm: float) -> tuple[f
     """Change of the gap (mm), and of the force at the fixed drive (N), for a thermal strain of one.
 
     Clamp and actuator stay in place, and the gripper expands between them. The actuator holds the drive's face; in a
-    model that is driven at a point above the face, that point moves by the expansion of the block in between. In a
-    frame of bars, the bars end where their axes meet, which causes an error of a few millimetres times the strain: use
-    finite elements for this result.
+    model that is driven at a point above the face, this point moves by the thermal expansion of the block in between.
+    In a frame of bars, the bars end where their axes meet, which causes an error of a few millimetres times the strain:
+    use finite elements for this result.
     """
     held = np.zeros(body.unknowns)
     height = np.zeros(body.unknowns)

@@ -31,7 +31,7 @@ kinks of the drive history, not by the mechanism."""
 
 
 def step_for(body: DrivenBody) -> float:
-    """Time step (s): a sixtieth of the period of the lowest mode with the drive fixed."""
+    """Time step (s): a sixtieth of the period of the lowest mode with fixed drive."""
     rad_s, _ = body.modes(drive_held=True, count=1)
     return float(2.0 * pi / rad_s[0] / _A_PERIOD)
 
@@ -105,9 +105,9 @@ def stepped_motion(
 def _drag(body: DrivenBody, damping: Damping) -> csr_matrix:
     """Damping matrix for motion relative to the static shape.
 
-    B = M Phi diag(2 zeta w) Phi' M for the modes that the law describes and the step resolves. The rest of the
-    stiffness is damped in proportion, so strongly that the other modes follow the drive without delay, as in
-    `modal_model`.
+    The matrix is B = M Phi diag(2 zeta w) Phi' M for the modes that the damping law describes and the time step
+    resolves. The remaining stiffness is damped in proportion, so strongly that the other modes follow the drive without
+    delay, as in `modal_model`.
     """
     model, ratios = gripper_modes(body, _RESOLVED_MODES).damped(damping)
     rad_s, shapes = body.modes(drive_held=True, count=_RESOLVED_MODES + 1)

@@ -2,7 +2,7 @@
 
 Corrections of the published equations, each with its reason:
 
-* (6) is a transform of six components and (3) a planar compliance of three; here all compliances are 6 by 6.
+* Equation (6) transforms six components, but (3) is a planar compliance of three; here all compliances are 6 by 6.
 * (10) gives 135.15 degrees and (13) 135 degrees for what one drawing must state once; the angles come from the drawing.
 * (12) uses T_12, which is never defined; it must carry the compliance from O1 to O2, as T_O2 does.
 * (14) has C_2A on both sides; the right-hand one must be C_12.
@@ -102,7 +102,7 @@ class StiffnessMatrixGripper:
 
     @cached_property
     def gap_per_input(self) -> float:
-        """Millimetres of gap per millimetre of input."""
+        """Ratio of gap to input (mm per mm)."""
         flexibility = self._chain.flexibility(self.skeleton.measured, self.skeleton.drive)
         return 2.0 * float((flexibility @ self._load_by_input)[_X])
 
@@ -112,7 +112,7 @@ class StiffnessMatrixGripper:
         return float(self.drive_stiffness[_Y, _Y])
 
     def _held_flexibility(self, moved: int, loaded: int, held: tuple[int, ...]) -> Array:
-        """Flexibility with some directions of the drive point fixed."""
+        """Flexibility with some directions of the drive point held fixed."""
         drive, chain, rows = self.skeleton.drive, self._chain, list(held)
         reaction = np.linalg.solve(self.drive_compliance[np.ix_(rows, rows)], chain.flexibility(drive, loaded)[rows])
         return chain.flexibility(moved, loaded) - chain.flexibility(moved, drive)[:, rows] @ reaction
@@ -212,7 +212,7 @@ class StiffnessMatrixGripper:
 
 
 def _lifted_mass(member: Member, plate_mm: float) -> Array:
-    """Mass of a member at its end, for motion along z and rotation about x and y.
+    """Mass matrix of a member at its end, for motion along z and rotation about x and y.
 
     The mass matrix of a bar is rotated to global axes and transferred to the member's end.
     """

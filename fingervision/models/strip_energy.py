@@ -1,8 +1,8 @@
-"""How a leaf or a straight neck is used: bent by ends that turn against each other, by ends that sway, or stretched.
+"""Load on a leaf or straight neck: bent by ends that rotate against each other, by ends that sway, or stretched.
 
-The plate's width holds the three back differently (`strip_width`). The strain energies of a bar whose ends move by
-rotations, a chord's rotation and an elongation are E I / 2 L times the squares below (Timoshenko, Strength of
-Materials); their shares are all that is needed, and they change little when the bar is held back.
+The plate's width restrains these three deformations differently (`strip_width`). The strain energies of a bar whose
+ends move by rotations, a chord's rotation and an elongation are E I / 2 L times the squares below (Timoshenko, Strength
+of Materials); only their shares are needed, which hardly change when the bar is restrained.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ _LEAST = 1e-3
 def used_in_plate(flexure: Flexure, plate: PlaneStressPlate, moved: Array, whole_n_mm: float) -> Flexure:
     """Give a strip the shares of its strain energy from the displacements of a meshed plate.
 
-    One with next to nothing of the whole energy is left as it is: its shares would be those of rounding.
+    A strip with a negligible part of the whole energy is left unchanged, because its shares would be those of rounding.
     """
     length, t = flexure.bent_mm, flexure.thickness_mm
     along, across = (np.subtract(flexure.point_mm(*way), flexure.at_mm) for way in ((1.0, 0.0), (0.0, 1.0)))

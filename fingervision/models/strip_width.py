@@ -48,9 +48,10 @@ def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]
 
 
 def stretched_share(width_over_length: float, poisson: float) -> float:
-    """Share of plane strain of a strip that its bodies stretch, and that may not narrow where it meets them.
+    """Share of plane strain of a strip that is stretched, and that cannot become narrower where it joins its bodies.
 
-    By Ritz's method for the strip in plane stress across its thickness; parameters as in `strip_share`.
+    The share is computed by Ritz's method for the strip in plane stress across its thickness; parameters as in
+    `strip_share`.
     """
     if poisson <= 0.0:
         return 0.0
@@ -92,7 +93,7 @@ def _stretched(log_width: float, poisson: float) -> float:
 
 @lru_cache(maxsize=512)
 def _shares(log_width: float, poisson: float) -> tuple[float, float]:
-    """Compute the two shares of `strip_share` for a strip of length 1, not narrow."""
+    """Compute the two shares of `strip_share` for a strip of unit length that is not narrow."""
     width = float(np.exp(log_width))
     x, x_weights = (0.5 * (part + 1.0) if i == 0 else 0.5 * part for i, part in enumerate(legendre.leggauss(24)))
     y, y_weights = legendre.leggauss(24)

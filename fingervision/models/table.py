@@ -56,7 +56,7 @@ class TableModel:
         column: NDArray[np.float64],
         beyond: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
     ) -> NDArray[np.float64]:
-        """Interpolate one column; `beyond` is how far the inputs lie below and above the table."""
+        """Interpolate one column of the table; `beyond` is how far the inputs lie below and above the table."""
         found = np.interp(input_mm, self.input_mm, column)
         if beyond is None:
             return found
@@ -65,7 +65,7 @@ class TableModel:
 
     @cached_property
     def _symmetric(self) -> bool:
-        """Whether the fingers are mirror images, which is assumed where the table has the gap only."""
+        """Whether the fingers are mirror images, which is assumed if the table has only the gap."""
         return bool(np.array_equal(self.left_mm, -self.right_mm))
 
     @cached_property

@@ -1,8 +1,8 @@
 """Uncertainty of computed quantities from the stated uncertainties of a drawing's dimensions.
 
-Linear propagation (JCGM 100:2008, 5.1), by central differences of one standard uncertainty in either direction. The
-second differences measure the nonlinearity. If the nonlinearity would shift the mean of a quantity, or widen its
-uncertainty, by more than a tenth of the uncertainty, the quantity is sampled instead at Sobol points (Monte Carlo
+The propagation is linear (JCGM 100:2008, 5.1), by central differences of one standard uncertainty in either direction.
+The second differences measure the nonlinearity. If the nonlinearity would shift the mean of a quantity, or widen its
+uncertainty, by more than a tenth of the uncertainty, this quantity is sampled instead at Sobol points (Monte Carlo
 method, JCGM 101:2008). The dimensions are assumed normal and independent of each other.
 """
 

@@ -15,7 +15,7 @@ _PLACES = 9
 
 
 class StressedModel(Protocol):
-    """A model that computes the stress in its hinges."""
+    """Protocol of a model that computes the stress in its hinges."""
 
     physics: Physics
 
@@ -24,7 +24,7 @@ class StressedModel(Protocol):
         ...
 
     def loaded(self, inputs_mm: Sequence[float]) -> list[LoadedState]:
-        """Gap, forces and largest stress at the given inputs."""
+        """Gap, forces and largest stress at the given inputs (mm)."""
         ...
 
 

@@ -19,7 +19,7 @@ class Entry(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A plug-in that cannot be used.
+    """A plug-in that cannot be used, with the reason.
 
     Parameters
     ----------

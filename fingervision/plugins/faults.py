@@ -28,7 +28,7 @@ class PluginVersionError(PluginError):
 
 
 class MisfitError(ValueError):
-    """A part is invalid; the message completes a sentence after the plug-in's name: `must ..., but ...`."""
+    """A part does not meet its requirements; the message follows the plug-in's name: `must ..., but ...`."""
 
 
 class PluginFileError(UsageError):

@@ -20,7 +20,7 @@ class Origin:
 
     @property
     def built_in(self) -> bool:
-        """Whether the part is built in."""
+        """Whether the part is built into fingervision."""
         return self is BUILT_IN
 
     def __str__(self) -> str:
@@ -32,10 +32,10 @@ SESSION = Origin("this session", "correct it where it is registered")
 
 
 def of_distribution(name: str, version: str) -> Origin:
-    """Return the origin of a part from an installed distribution."""
+    """Return the origin of a part that an installed distribution provides."""
     return Origin(f"{name} {version}", f"ask its author, or remove it with `pip uninstall {name}`")
 
 
 def of_file(path: str) -> Origin:
-    """Return the origin of a part from a file that the user named."""
+    """Return the origin of a part that is defined in a file named by the user."""
     return Origin(path, "correct the file, or leave it out")

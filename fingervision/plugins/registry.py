@@ -30,7 +30,7 @@ LOG = logging.getLogger("fingervision.plugins")
 
 
 class Registry(Generic[T]):
-    """The parts of one kind.
+    """The parts of one kind (such as all effects), built in or from plug-ins.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Registry(Generic[T]):
         return tuple(name for name in found if not any(name == refused for refused, _ in self._refused))
 
     def get(self, name: str) -> Entry[T]:
-        """Return one part; no other part is imported.
+        """Return one part by its name; no other part is imported.
 
         Raises
         ------
@@ -208,7 +208,7 @@ class Registry(Generic[T]):
         return _origin(self._points_of(name)[0])
 
     def _of_points(self, points: list[EntryPoint]) -> Entry[T] | None:
-        """Return the part to which the entry points of one name refer; None if it cannot be used."""
+        """Return the part to which the entry points with one name refer; None if it cannot be used."""
         name = points[0].name
         if name in self._loaded and not self._loaded[name].origin.built_in:
             return self._loaded[name]

@@ -11,9 +11,9 @@ SCRIPT = re.compile(r"(?m)^# /// script\s*$\s(?P<content>(?:^#(?:| .*)$\s)+?)^# 
 
 
 def unmet(requires: Iterable[str]) -> str | None:
-    """Return the first requirement on fingervision that this version does not meet, such as `>=0.9`.
+    """Return the first stated requirement that this version of fingervision does not meet, such as `>=0.9`.
 
-    Return None if all requirements are met.
+    The function returns None if all requirements are met.
 
     Parameters
     ----------

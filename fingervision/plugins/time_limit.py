@@ -23,7 +23,7 @@ class OutOfTimeError(Exception):
 
 
 class _EndNow(BaseException):
-    """Raised inside code beyond its time limit; not an `Exception`, so that `except Exception` does not catch it."""
+    """Raised inside code that exceeds its time limit; not an `Exception`, so that `except Exception` misses it."""
 
 
 def longest_s() -> float:

@@ -2,8 +2,8 @@
 
 Every rendered outline thus consists of lines and arcs, even an ellipse or the image of a line through a lens, so that
 parallel curves, intersections and areas have closed forms. Source: K. M. Bolton, Biarc curves, Computer-Aided Design
-7(2), 1975. The deviation from the curve falls with the third power of the spacing of the points, in proportion to the
-rate of change of the curvature.
+7(2), 1975. The deviation from the curve is proportional to the third power of the spacing of the points and to the rate
+of change of the curvature.
 """
 
 from itertools import pairwise
@@ -19,7 +19,7 @@ STRAIGHT_PX = 2e-8
 
 
 def biarcs(points: Points, tangents: Points) -> tuple[Piece, ...]:
-    """Pieces through the points with the given directions of travel.
+    """Lines and arcs through the points with the given directions of travel.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
         msg = f"A clip must have at least one frame, but {path.name} would have none."
         raise DataError(msg)
     try:
-        with av.open(path, "w", options=CONTAINERS[path.suffix]) as container:
+        with av.open(f"file:{path}", "w", options=CONTAINERS[path.suffix]) as container:
             _encode(container, first, source, codec)
     except OSError as error:
         msg = f"{path} must be a file that can be written, but it could not be: {error.strerror}."

@@ -70,7 +70,7 @@ class Light:
             raise DataError(msg)
 
     def field(self, width_px: int, height_px: int, blur_px: float) -> NDArray[np.float64] | float:
-        """Factor on each pixel's grey level; a single number if the light is uniform."""
+        """Factor by which the light changes each pixel's grey level; a single number if the light is uniform."""
         field: NDArray[np.float64] | float = self.exposure
         if self.slope_x:
             field = field * (1.0 + self.slope_x * (np.arange(width_px) - (width_px - 1) / 2) / width_px)

@@ -47,5 +47,5 @@ class Motion:
         return self.xx * self.yy - self.xy * self.yx < 0.0
 
     def place(self, x_px: float, y_px: float) -> tuple[float, float]:
-        """Image of a point under the motion."""
+        """Position of a point after the motion."""
         return (self.xx * x_px + self.xy * y_px + self.x_px, self.yx * x_px + self.yy * y_px + self.y_px)

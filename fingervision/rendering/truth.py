@@ -128,14 +128,14 @@ def _in_axes(piece: Piece, direction: Direction, t: ArrayLike) -> NDArray[np.flo
 
 
 def _along(point: tuple[float, float], direction: Direction) -> float:
-    """Coordinate of a point towards the root."""
+    """Coordinate of a point along the finger, growing towards the finger's root."""
     along = point[1] if direction.is_vertical else point[0]
     return along if direction in (Direction.UP, Direction.LEFT) else -along
 
 
 @dataclass(frozen=True, slots=True)
 class _Tip:
-    """Smallest coordinate towards the root, and the range across the finger over which a flat tip has it."""
+    """Smallest coordinate of a finger towards its root; the range across the finger over which a flat tip has it."""
 
     along_px: float
     first_px: float

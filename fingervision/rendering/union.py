@@ -122,7 +122,7 @@ def _line_line(a: Line, b: Line) -> list[float]:
 
 
 def _on(t: float, piece: Piece) -> bool:
-    """Whether a fraction lies on a piece, its ends included despite rounding, so that no crossing is missed."""
+    """Whether a fraction lies on a piece; its ends are included despite rounding, so that no crossing is missed."""
     margin = SAME_POINT_PX / piece.length_px
     return -margin <= t <= 1.0 + margin
 
@@ -155,7 +155,7 @@ def _circle_circle(a: Arc, b: Arc) -> list[tuple[float, float]]:
 
 
 def _fraction(piece: Piece, point: tuple[float, float]) -> float | None:
-    """Fraction of the piece at a point on its line or circle; None beyond its ends."""
+    """Fraction of the piece at which a point lies; None beyond the piece's ends."""
     x, y = point
     if isinstance(piece, Line):
         ux, uy = piece.x1_px - piece.x0_px, piece.y1_px - piece.y0_px

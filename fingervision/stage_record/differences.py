@@ -11,10 +11,11 @@ EVEN = 1e-6
 
 
 def differences(values: Array, time_s: Array, order: int) -> Array:
-    """Take differences of an order: zero for every polynomial in time of a lower degree.
+    """Take differences of a given order of a record: zero for every polynomial in time of a lower degree.
 
-    Divided differences (Newton), scaled to the noise gain of ordinary ones, binom(2k, k)^(1/2). With equal steps they
-    are the ordinary differences. Of rows that are missing, or late, ordinary differences show speed times delay.
+    These are divided differences (Newton), scaled to the noise gain of ordinary differences, binom(2k, k)^(1/2). With
+    equal steps they are equal to ordinary differences. For rows that are missing or late, ordinary differences would
+    contain speed times delay.
 
     Parameters
     ----------

@@ -140,7 +140,7 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
 
 
 def _equal_steps(input_mm: Array, snapped_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
-    """Whether the lines only reflect motion at constant speed, by the same number of lines from row to row.
+    """Whether values cluster only because the stage moves by the same number of encoder lines from row to row.
 
     For the true lines of an encoder, most changes of the value are jitter about one line, or the number of lines
     crossed from row to row varies by one.
@@ -154,7 +154,7 @@ def _equal_steps(input_mm: Array, snapped_mm: Array, runs: tuple[slice, ...], st
 
 
 def _characteristic(values: Array, frequency: Array) -> NDArray[np.complex128]:
-    """Mean of exp(2 pi i f x); shape of `frequency`, which must be evenly spaced.
+    """Characteristic function of the values, mean of exp(2 pi i f x), at evenly spaced frequencies; same shape.
 
     With f = a + b, the sum over x of exp(2 pi i a x) exp(2 pi i b x) is a product of two matrices: for k frequencies
     it takes 2 sqrt(k) exponentials of every value instead of k.
@@ -198,9 +198,9 @@ def _grid(input_mm: Array) -> float:
 
 
 def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
-    """Whether a motion was rounded to a grid: it pauses on grid values, or its speed varies by single steps.
+    """Whether a motion was rounded to a grid: it pauses on grid values, or its increments differ by single grid steps.
 
-    At a little less than one step per row, nearly all rows advance by one step, and only the pauses tell.
+    At a little less than one step per row, nearly all rows advance by one step, and only pauses reveal the grid.
 
     Set points in round numbers lie on a grid as well, but advance in equal steps.
     """

@@ -1,4 +1,4 @@
-"""Smooth the recorded input by local straight lines and parabolas, in windows as wide as the record allows."""
+"""Smooth the recorded input by local straight lines and parabolas, in windows as long as the motion allows."""
 
 import numpy as np
 

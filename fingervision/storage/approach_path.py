@@ -97,7 +97,7 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
 
 
 def _against(ordered: Sequence[Reading]) -> tuple[int, int]:
-    """Number of moves between targets that contradict the stated direction of approach, and number of all moves."""
+    """Number of moves between targets that contradict the stated direction of approach, and total number of moves."""
     moves = [(b.target_mm - a.target_mm) * b.side for a, b in pairwise(ordered) if a.run == b.run]
     return sum(move < 0.0 for move in moves), sum(move != 0.0 for move in moves)
 
@@ -112,7 +112,7 @@ def _travel(reading: Reading) -> tuple[int, int, float]:
 
 
 def _with_overshoots(ordered: Sequence[Reading], beyond: float, timed: bool) -> tuple[list[PathRow], list[float]]:
-    """Rows of a run with their times; the time of an added row is the mean of the neighbouring times."""
+    """Rows of a run with their times; an added overshoot has the mean time of its neighbouring rows."""
     path: list[PathRow] = []
     times: list[float] = []
     clock = [_time(reading) for reading in ordered]

@@ -54,7 +54,7 @@ def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers
 
 
 def channels_of(values: Mapping[str, Numbers], rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> dict[str, Channel]:
-    """Select given rows of channels in the given order; `u_` columns without valid uncertainties are omitted."""
+    """Select given rows of the channels in a given order; `u_` columns without valid uncertainties are omitted."""
     found = {}
     for name, numbers in values.items():
         if name.startswith("u_") or not numbers.present[rows].any():

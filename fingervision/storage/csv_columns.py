@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.storage.decimal_number import decimal_number
 from fingervision.storage.number_block import number_block
-from fingervision.storage.plain_file import why
+from fingervision.storage.plain_file import NotUtf8Error, text_of, why
 
 CHUNK_LINES = 1000
 """Number of lines that are split at a time, so that the cells fit into the cache; splitting all lines at once would
@@ -116,10 +116,10 @@ def _text(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return text_of(path)
     except FileNotFoundError:
         raise InputFileError(f"There is no table {path}.") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, NotUtf8Error) as error:
         raise unreadable(error)(f"{path} must be a CSV table in UTF-8, but could not be read: {why(error)}.") from error
 
 
@@ -144,6 +144,7 @@ def number(path: Path, name: str, row: int, cell: str) -> float | None:
         value = float("nan")
     if not isfinite(value):
         raise DataError(
-            f"{name} must be a finite number, but is {cell} in data row {row + 1} of {path}: leave it empty."
+            f"{name} must be a finite number, but is {cell} in data row {row + 1} of {path}: correct it, or "
+            "leave the cell empty."
         )
     return value

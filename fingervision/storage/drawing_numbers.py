@@ -101,7 +101,7 @@ def numbers_of(tables: Mapping[str, Any]) -> dict[str, float | str]:
 
 
 def _walk(tables: Mapping[str, Any]) -> Iterator[tuple[str, Path, Any]]:
-    """Iterate over all numbers, expressions and uncertain numbers, with dotted name, key path and content."""
+    """Iterate over all numbers, expressions and uncertain numbers of a drawing: dotted name, key path and content."""
     yield from _walk_in(tables, "", ())
 
 

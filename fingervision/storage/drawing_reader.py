@@ -37,7 +37,7 @@ class DrawingReader:
         return [as_table(table, f"[[{name}]] in {self.origin}") for table in raw]
 
     def known(self, table: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:
-        """Refuse a table with unknown keys."""
+        """Refuse a table of the drawing that has unknown keys."""
         for key in table:
             if key not in keys:
                 near = difflib.get_close_matches(key, keys, 1, cutoff=0.0)[0]
@@ -66,9 +66,9 @@ class DrawingReader:
         return tuple(number(part, self.lengths, f"{what}.{key} in {self.origin}") for part in raw)
 
     def grown(self, values: tuple[float, ...], what: str, *, flat: bool = False) -> tuple[float, float, float, float]:
-        """Check the limits (x from, x to, y from, y to) of an axis-parallel rectangle.
+        """Check a rectangle given by its limits (x from, x to, y from, y to).
 
-        With `flat`, width and height may be zero.
+        With `flat`, the width or the height of the rectangle may be zero.
         """
         x0, x1, y0, y1 = values
         fine = x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0

@@ -13,6 +13,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError, FingervisionError, InputFileError
 from fingervision.storage.csv_columns import read_block
 from fingervision.storage.decimal_number import are_decimal, decimal_number
+from fingervision.storage.plain_file import NotUtf8Error, text_of
 
 COLUMNS = ("time_s", "input_mm", "force_n")
 
@@ -100,13 +101,13 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     if path.exists() and not path.is_file():
         raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = text_of(path)
     except FileNotFoundError:
         raise InputFileError(f"There is no drive table {path}.") from None
     except OSError as error:
         raise InputFileError(f"The drive table {path} could not be read ({error.strerror}).") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path} must be a CSV table in UTF-8, but is not: {error.reason}.") from error
+    except NotUtf8Error as error:
+        raise DataError(f"{path} must be a CSV table in UTF-8, but is not: {error}.") from error
     kept = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)

@@ -1,4 +1,4 @@
-"""Check that a value in a document is a finite number."""
+"""Check that a value read from a document is a finite number."""
 
 from math import isfinite
 

@@ -149,7 +149,7 @@ class GapsCsv:
 
 
 class Driven(Protocol):
-    """State of the drive at a frame's time."""
+    """Input and force of the drive at a frame's time."""
 
     @property
     def run(self) -> str:

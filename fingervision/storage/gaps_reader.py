@@ -24,7 +24,7 @@ class GapsReader:
         self._columns: tuple[str, ...] = ()
 
     def fresh(self) -> list[GapRow]:
-        """Return the rows that were added since the last call.
+        """Return the rows that were added to the file since the last call.
 
         Raises
         ------

@@ -47,7 +47,7 @@ class GaugeRows(list[GaugeRow]):
         self.extend(rows)
 
     def close(self) -> None:
-        """Do nothing: there is no file."""
+        """Do nothing: rows in memory need no closing."""
 
 
 class GaugesCsv:

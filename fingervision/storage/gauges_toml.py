@@ -10,7 +10,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from fingervision.domain.errors import DataError, InputFileError, OutputError
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import NotUtf8Error, plain
+from fingervision.storage.plain_file import text_of as file_text
 
 HEAD = "# For `fingervision measure RECORDING --gauges FILE`; `fingervision gauge RECORDING` draws them.\n"
 
@@ -26,13 +27,13 @@ def text_of(path: Path) -> str | None:
         The file cannot be read.
     """
     try:
-        return plain(path).read_text(encoding="utf-8-sig")
+        return file_text(path)
     except FileNotFoundError:
         return None
     except OSError as error:
         raise InputFileError(f"The gauge file {path} could not be read ({error.strerror}).") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+    except NotUtf8Error as error:
+        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
 
 
 def gauges_text(tables: Tables, before: str | None, schema: int) -> str:

@@ -26,7 +26,8 @@ def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
     """Build a mechanism from a [gripper] section that names a gripper.toml and deviations of the left and right half.
 
     Keys of [gripper.left] and [gripper.right] are dotted names as in gripper.toml (`"lever.l2_mm"`), or hinge1 and
-    hinge2 with thickness_mm or radius_mm; the function `redrawn` defines which other dimensions change with a number.
+    hinge2 with thickness_mm or radius_mm; the function `redrawn` determines which dependent dimensions change with a
+    number.
 
     Raises
     ------

@@ -14,8 +14,9 @@ from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Mate
 from fingervision.models.gripper_outline import check_outline, check_stated_size
 from fingervision.models.plane_shapes import crosses_itself
 from fingervision.storage.finite import is_number
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import NotUtf8Error, text_of
 from fingervision.storage.sn_line_toml import check_below_yield, read_sn_line
+from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
@@ -61,17 +62,18 @@ def read_gripper(path: Path) -> Gripper:
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a gripper.
     """
     try:
-        text = plain(path).read_text(encoding="utf-8-sig")
+        text = text_of(path)
     except FileNotFoundError:
         raise InputFileError(f"There is no gripper {path}.") from None
     except OSError as error:
         raise InputFileError(f"The gripper {path} could not be read ({error.strerror}).") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+    except NotUtf8Error as error:
+        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
         raise DataError(f"{path} must be TOML, but is not: {error}.") from error
+    refuse_other_file(path, tables, "the drawing of a gripper or mechanism", DRAWINGS)
     return gripper_from_tables(tables, str(path))
 
 

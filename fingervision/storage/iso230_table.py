@@ -63,10 +63,10 @@ class Iso230Rows:
 def read_iso230_table(path: Path) -> Iso230Rows | None:
     """Read a table of targets, cycles and directions; None if the file is another kind of table.
 
-    The position, or target plus deviation, becomes the gap. Rows are sorted in the order of travel: by `time_s` if
-    every row has a time; otherwise cycle by cycle, first the targets approached from below in ascending order, then
-    those approached from above in descending order, with one reading every 30 s. If a target would not be reached from
-    its stated direction, a row without a gap is added beyond the target.
+    The measured position, or target plus deviation, is taken as the gap. Rows are sorted in the order of travel: by
+    `time_s` if every row has a time; otherwise cycle by cycle, first the targets approached from below in ascending
+    order, then those approached from above in descending order, with one reading every 30 s. If a target could not be
+    reached from its stated direction, a row without a gap is added beyond the target.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def iso230_rows(
 def _header(path: Path) -> list[str]:
     """Column names in the first line that is not a comment.
 
-    None if the file cannot be read (`read_columns` reports the error).
+    The function returns None if the file cannot be read (`read_columns` reports the error).
     """
     try:
         lines = plain(path).read_text(encoding="utf-8-sig").splitlines()
@@ -152,7 +152,7 @@ def _header(path: Path) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Cell:
-    """A cell with a reading: its row, column, word for the direction, and cycle ('' if given only by the order)."""
+    """A cell with a reading: its row, column, word for the direction, and cycle ('' if only the order states it)."""
 
     row: int
     column: str

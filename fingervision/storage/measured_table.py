@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
+from fingervision.storage.assumed_response import response_note_beside
 from fingervision.storage.channel_columns import channels_of, read_channels
 from fingervision.storage.csv_columns import read_block, read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
@@ -105,6 +106,7 @@ def measured_rows(
             f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {kept.size}: measure more."
         )
     column = {name: each.value[kept] for name, each in values.items() if each.present[kept].all()}
+    _check_uncertainties(column, kept, path)
     names = [run_cells[row] for row in kept.tolist()] if run_cells is not None else [""] * kept.size
     count = len(set(names))
     if count > MOST_RUNS:
@@ -135,7 +137,10 @@ def measured_rows(
                 f"{label} must change, but is {signal[0]:g} in every row of {path}: record a run that moves."
             )
     if len(runs) == 1:
-        notes.append("there is one run only: it cannot tell a re-zeroing of the bench from an offset.")
+        notes.append(
+            "there is only one run, in which a re-zeroing of the stage cannot be distinguished from an offset."
+        )
+    notes += response_note_beside(path)
     return MeasuredTable(
         input_mm=column["input_mm"],
         gap_mm=gap,
@@ -151,6 +156,17 @@ def measured_rows(
         u_clock_s=u_clock_beside(path),
         channels=channels_of(channels, kept[order]),
     )
+
+
+def _check_uncertainties(column: Mapping[str, NDArray[np.float64]], rows: NDArray[np.intp], path: Path) -> None:
+    """Refuse negative standard uncertainties."""
+    for name, value in column.items():
+        if name.startswith("u_") and value.min() < 0.0:
+            row = int(np.argmin(value))
+            raise DataError(
+                f"{name} is a standard uncertainty and must not be negative, but is {value[row]:g} in data row "
+                f"{rows[row] + 1} of {path}: correct it, or leave the column out."
+            )
 
 
 def _left_out(total: int, kept: int, besides: int) -> list[str]:
@@ -176,7 +192,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
 
 
 def _by_run(names: Sequence[str], key: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
-    """Indices of the rows of each run, sorted by a key; runs are in order of their first appearance."""
+    """Row numbers of each run, sorted by a key; runs are in order of their first appearance."""
     number: dict[str, int] = {}
     codes = np.array([number.setdefault(name, len(number)) for name in names], dtype=np.intp)
     order = np.lexsort((key, codes))
@@ -191,7 +207,7 @@ def _path(
     names: Sequence[str],
     run_names: tuple[str, ...],
 ) -> RecordedPath:
-    """Sort all rows with an input in the same way as the rows with a gap; runs without any gap are omitted."""
+    """Sort all rows with an input in the same way as the rows with a gap; runs without a gap are omitted."""
     of_run = _by_run(names, values["time_s"].value[on_path])
     rows = np.concatenate([on_path[of_run[name]] for name in run_names])
     ends = np.cumsum([of_run[name].size for name in run_names])

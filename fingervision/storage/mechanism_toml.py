@@ -19,7 +19,8 @@ from fingervision.storage.drawing_numbers import bare_tables, changed_tables, nu
 from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import text_of
+from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
 
 _TOP = (
     "schema",
@@ -48,7 +49,7 @@ _FLEXURES = {
 def is_mechanism(path: Path) -> bool:
     """Whether a TOML file is a mechanism.toml (bodies or a template), not a gripper.toml."""
     try:
-        tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
+        tables = tomllib.loads(text_of(path))
     except (OSError, ValueError):
         return False
     return isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
@@ -108,11 +109,12 @@ def read_drawing(path: Path) -> MechanismDrawing:
         The file cannot be read, or states an uncertainty that is none.
     """
     try:
-        tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
+        tables = tomllib.loads(text_of(path))
     except FileNotFoundError:
         raise InputFileError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError, RecursionError) as error:
         raise unreadable(error)(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+    refuse_other_file(path, tables, "the drawing of a mechanism or gripper", DRAWINGS)
     return MechanismDrawing(path, *bare_tables(tables, str(path)))
 
 
@@ -150,7 +152,7 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         flexures=tuple(reader.flexure(t, i) for i, t in enumerate(reader.sections(tables, "flexure", least=0), 1)),
         fixed=tuple(reader.face(t, f"fixed {i}") for i, t in enumerate(reader.sections(tables, "fixed", least=0), 1)),
         slides=tuple(reader.slide(t, i) for i, t in enumerate(reader.sections(tables, "slide", least=0), 1)),
-        drive=reader.drive(tables),
+        drives=reader.drives(tables),
         probes={name: p for t in reader.sections(tables, "probe", least=0) for name, p in [reader.probe(t)]},
         pairs={},
         body_names=tuple(str(table.get("name", "")) for table in reader.sections(tables, "body")),
@@ -252,19 +254,42 @@ class _Reader(DrawingReader):
         box_mm = self.grown(self.numbers(table, "against_box_mm", 4, what), f"{what}.against_box_mm", flat=True)
         return Contact(name, face, Face(f"{name}, other face", box_mm))
 
-    def drive(self, tables: Mapping[str, Any]) -> Drive:
-        table = as_table(tables.get("drive", None), f"[drive] in {self.origin}")
-        self.known(table, ("name", "box_mm", "direction", "across"), "drive")
-        x, y = self.numbers(table, "direction", 2, "drive")
+    def drives(self, tables: Mapping[str, Any]) -> tuple[Drive, ...]:
+        """Read [drive], or several [[drive]] sections."""
+        raw = tables.get("drive")
+        if raw is None:
+            raise DataError(f"{self.origin} must have a driven face, [drive] or several [[drive]], but has none.")
+        if not isinstance(raw, list):
+            return (self.drive(as_table(raw, f"[drive] in {self.origin}"), "drive"),)
+        found = tuple(
+            self.drive({"name": f"drive {place}", **table}, f"drive {table.get('name', place)}")
+            for place, table in enumerate(self.sections(tables, "drive"), 1)
+        )
+        names = [drive.face.name for drive in found]
+        for name in names:
+            if names.count(name) > 1:
+                raise DataError(
+                    f"The drives of {self.origin} must have different names, but {names.count(name)} are called {name}."
+                )
+        if not any(drive.per_input for drive in found):
+            raise DataError(
+                f"One drive at least of {self.origin} must move with the input, but per_input of all of them is 0."
+            )
+        return found
+
+    def drive(self, table: Mapping[str, Any], what: str) -> Drive:
+        self.known(table, ("name", "box_mm", "direction", "across", "per_input"), what)
+        x, y = self.numbers(table, "direction", 2, what)
         across = table.get("across", "held")
         if hypot(x, y) == 0.0:
-            raise DataError(f"drive.direction in {self.origin} must be a direction, but is [0, 0].")
+            raise DataError(f"{what}.direction in {self.origin} must be a vector such as [1, 0], but is [0, 0].")
         if across not in ("held", "free") or (across == "free" and x * y != 0.0):
             raise DataError(
-                f"drive.across in {self.origin} must be held, or free where drive.direction is along x or y, "
-                f"but is {across!r}."
+                f"{what}.across in {self.origin} must be 'held', or 'free' if {what}.direction is along x or "
+                f"y, but is {across!r}."
             )
-        return Drive(self.face(table, "drive"), (x / hypot(x, y), y / hypot(x, y)), across)
+        per_input = self.value({"per_input": 1.0, **table}, "per_input", what)
+        return Drive(self.face(table, what), (x / hypot(x, y), y / hypot(x, y)), across, per_input)
 
     def probe(self, table: Mapping[str, Any]) -> tuple[str, tuple[float, float]]:
         name = str(table.get("name", ""))

@@ -23,7 +23,7 @@ from fingervision.models.table import TableModel
 from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
-from fingervision.storage.plain_file import in_utf8, plain, why
+from fingervision.storage.plain_file import in_utf8, text_of, why
 from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
@@ -62,7 +62,7 @@ def read_model(
         simulation = table(path)
         return CorrectedModel(simulation.name, simulation, str(path), simulation.input_range_mm, {})
     try:
-        document = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
+        document = tomllib.loads(text_of(path))
     except FileNotFoundError:
         raise InputFileError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:

@@ -28,12 +28,12 @@ class Numbers:
 
     @classmethod
     def whole(cls, value: NDArray[np.float64]) -> "Numbers":
-        """Build a column from values without empty cells."""
+        """Make a column from values without empty cells."""
         return cls(value, np.ones(value.size, dtype=np.bool_))
 
     @property
     def complete(self) -> bool:
-        """Whether no cell is empty."""
+        """Whether the column has no empty cell."""
         return bool(self.present.all())
 
 

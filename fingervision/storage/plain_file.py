@@ -1,13 +1,18 @@
-"""Refuse pipes and devices as input files, because reading them could wait for ever or never end."""
+"""Read input files: pipes and devices, which could wait for ever, are refused, and so is text that is not UTF-8."""
 
+import codecs
 import errno
 from pathlib import Path
 
 from fingervision.domain.errors import OutputError
 
+SAVE_AS_UTF8 = "open it in a text editor and save it with the encoding UTF-8"
+SAMPLE_BYTES = 1 << 16
+"""Part of a file that is searched for zero bytes."""
+
 
 def plain(path: Path) -> Path:
-    """Return the path if it is a file that can be read to its end.
+    """Return a path if it is a file that can be read to its end; refuse pipes and devices.
 
     Parameters
     ----------
@@ -29,13 +34,40 @@ def plain(path: Path) -> Path:
     return path
 
 
+class NotUtf8Error(ValueError):
+    """A text file has another encoding than UTF-8; the message is a clause that states which, and what to do."""
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a file in UTF-8, with or without a byte-order mark.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read, or is a pipe, a socket or a device.
+    NotUtf8Error
+        The file is UTF-16, or is not UTF-8 for another reason.
+    """
+    content = plain(path).read_bytes()
+    # Documents have no zero bytes. In UTF-16 every second byte of ASCII text is zero.
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in content[:SAMPLE_BYTES]:
+        what = "it holds zero bytes, as text in UTF-16 does (Windows calls it Unicode)"
+        raise NotUtf8Error(f"{what}: {SAVE_AS_UTF8}")
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        found = f"byte 0x{content[error.start]:02x} in line {line} belongs to another encoding"
+        raise NotUtf8Error(f"{found}: {SAVE_AS_UTF8}") from error
+
+
 def why(error: Exception) -> str:
     """Reason stated by a system error, without error number and path, for a message that names the file separately."""
     return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
 
 
 def in_utf8(path: Path, text: str) -> str:
-    """Return a text if it can be encoded in UTF-8; it may contain file names that cannot.
+    """Return a text unchanged if UTF-8 can encode it, and refuse it otherwise; file names may contain other characters.
 
     Raises
     ------
@@ -47,7 +79,7 @@ def in_utf8(path: Path, text: str) -> str:
     except UnicodeEncodeError as error:
         line = next(each for each in text.splitlines() if error.object[error.start] in each)
         raise OutputError(
-            f"{path.name} must be in UTF-8, but would name a file that is not ({line.strip()[:200]!a}): rename that "
-            "file and run again."
+            f"{path.name} is written in UTF-8, but would contain a file name that UTF-8 cannot encode "
+            f"({line.strip()[:200]!a}): rename that file and run again."
         ) from error
     return text

@@ -38,8 +38,12 @@ def write_recipe(
     lines = [f"schema = {SCHEMA}", f"name = {json.dumps(name, ensure_ascii=False)}", f"below_force_n = {below_force_n}"]
     for step in steps:
         lines += ["", "[[step]]"]
-        lines += [
-            f"{key} = {json.dumps(value, ensure_ascii=False) if isinstance(value, str) else value}"
-            for key, value in step.items()
-        ]
+        lines += [f"{key} = {_in_toml(value)}" for key, value in step.items()]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _in_toml(value: object) -> str:
+    """Write a value of a step; a negative number that was rounded to zero becomes 0.0 instead of -0.0."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    return f"{value + 0.0}" if isinstance(value, float) else f"{value}"

@@ -10,6 +10,7 @@ import numpy as np
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.missing_references import OWN_RECORDING
+from fingervision.frames.open_container import open_container
 from fingervision.frames.received import OwnPacket
 from fingervision.vision.grey import to_grey
 
@@ -109,7 +110,7 @@ class RecordedVideo:
             raise self._failed(error) from error
 
     def _keep(self, frames: int) -> None:
-        with av.open(f"file:{self._path}") as old:
+        with open_container(self._path) as old:
             stream = old.streams.video[0]
             self._stream_of(stream.codec_context.width, stream.codec_context.height, str(stream.codec_context.pix_fmt))
             kept = 0
@@ -187,7 +188,7 @@ def frames_in(path: Path) -> int:
     """Number of complete frames in a recording that may have been interrupted; 0 without a recording."""
     count = 0
     try:
-        with av.open(f"file:{path}") as container:
+        with open_container(path) as container:
             for packet in container.demux(container.streams.video[0]):
                 count += packet.pts is not None and packet.size > 0
     except (av.FFmpegError, OSError, IndexError):

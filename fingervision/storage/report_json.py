@@ -54,8 +54,12 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
 
 
 def _effect(effect: NamedEffect) -> dict[str, object]:
-    """Convert an effect to a mapping for JSON, with its place, its end and the points of its curve, if any."""
+    """Convert an effect to a mapping for JSON, with its place, its end, one-sided limits and its curve, if any."""
     document = asdict(effect)
+    for parameter in document["parameters"].values():
+        for limit in ("at_least", "at_most"):
+            if parameter[limit] is None:
+                del parameter[limit]
     points = document.pop("points")
     for name in ("place", "end"):
         if not document[name]:

@@ -10,7 +10,7 @@ from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
 from fingervision.domain.errors import DataError, OutputError, UsageError, unreadable
 from fingervision.storage.decimal_number import decimal_number
-from fingervision.storage.plain_file import plain, why
+from fingervision.storage.plain_file import NotUtf8Error, text_of, why
 
 COLUMNS = ("level", "light")
 # Full scales that pictures have.
@@ -48,9 +48,9 @@ def read_response(path: Path) -> CameraResponse:
         The file cannot be read, or is no response.
     """
     try:
-        with plain(path).open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(line for line in file if not line.startswith("#")))
-    except (OSError, UnicodeDecodeError) as error:
+        lines = text_of(path).splitlines(keepends=True)
+        rows = list(csv.reader(line for line in lines if not line.startswith("#")))
+    except (OSError, NotUtf8Error) as error:
         raise unreadable(error)(f"The camera response {path} could not be read: {why(error)}.") from error
     if not rows or tuple(cell.strip() for cell in rows[0]) != COLUMNS:
         raise DataError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")

@@ -119,7 +119,7 @@ def _owner(out: Path) -> str | None:
 
 
 def _of_another(out: Path, source: Path) -> str | None:
-    """Name of the other input to which a folder's results belong; None without results, or with those of this input."""
+    """Name of the other input to which a folder's results belong; None without results or for the same input."""
     owner = _owner(out)
     if owner is None or (out / owner).resolve() == source.resolve():
         return None

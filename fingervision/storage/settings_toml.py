@@ -14,7 +14,7 @@ from fingervision.storage.toml_section import Section, read_document
 SCHEMA = 1
 TIPS = ("auto", *(direction.value for direction in Direction))
 POLARITIES = ("auto", "dark", "light")
-TOP_KEYS = ("schema", "calibration", "px_per_mm", "below_tip_mm", "tips", "roi", "fingers", "camera")
+TOP_KEYS = ("schema", "calibration", "px_per_mm", "u_px_per_mm", "below_tip_mm", "tips", "roi", "fingers", "camera")
 CAMERA_NUMBERS = ("rate_hz", "exposure_ms", "gain", "focus", "white_balance_k")
 CAMERA_KEYS = (*CAMERA_NUMBERS, "size", "pixel_format")
 
@@ -50,6 +50,10 @@ def read_settings(path: Path) -> dict[str, Any]:
         found["calibration"] = path.parent / top.word("calibration")
     if "px_per_mm" in values:
         found["px_per_mm"] = top.number("px_per_mm", above=0.0)
+    if "u_px_per_mm" in values:
+        if "px_per_mm" not in values:
+            top.refuse("u_px_per_mm", "needs the scale whose uncertainty it is: add px_per_mm.")
+        found["u_px_per_mm"] = top.number("u_px_per_mm", above=0.0)
     if "below_tip_mm" in values:
         found["below_tip_mm"] = top.number("below_tip_mm", above=0.0)
     if "tips" in values:

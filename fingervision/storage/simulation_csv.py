@@ -32,7 +32,7 @@ def write_simulation(
     response: Response,
     bodies: Mapping[str, NDArray[np.float64]] = MappingProxyType({}),
 ) -> None:
-    """Write a simulation table with one row per input; `fingervision.storage.simulation_table` reads it.
+    """Write a simulation table with one row per input.
 
     Parameters
     ----------

@@ -126,7 +126,9 @@ def write_steps(path: Path, data: StepData) -> None:
     try:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
-        raise OutputError(f"The step data {path} could not be written ({error.strerror}).") from error
+        raise OutputError(
+            f"The step data of the motor controller could not be written to {path} ({error.strerror})."
+        ) from error
 
 
 def _text(words: str) -> str:

@@ -130,7 +130,7 @@ class Account:
 
 
 def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account:
-    """Interpret a table as a given kind of table, or as the kind that leaves the fewest open questions.
+    """Interpret a table as a given kind of table, or as the kind for which the fewest questions remain.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 
 
 def _open_columns(table: Understood) -> int:
-    """Number of unresolved columns of an interpretation; a missing required column counts twice."""
+    """Number of columns whose role or unit is unresolved; a missing required column counts twice."""
     missing = sum(question.key.startswith("columns.") for question in table.questions)
     missing += sum(bool(question.missing) for question in table.questions)
     # A column called after a program's model holds no measurement.

@@ -91,7 +91,7 @@ def _numbers(column: RawColumn, decimal: str) -> tuple[Numbers, int]:
 
 
 def _channel(column: RawColumn) -> tuple[str, float] | None:
-    """Name of the channel in a column, and the conversion factor of its unit; None if the column is not a channel."""
+    """Name of the channel in a column, and the conversion factor of its unit; None for a column of another kind."""
     text = column.name.strip().strip('"').strip()
     if text in NO_CHANNELS or column.since:
         return None

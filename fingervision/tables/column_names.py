@@ -36,7 +36,7 @@ class ColumnName:
 
     @property
     def source(self) -> str | None:
-        """`measured` or `simulation` if the name states only the source of the values; otherwise None."""
+        """`measured` or `simulation` if the name states only the source of the values; None for any other name."""
         return source_of(self.base)
 
 

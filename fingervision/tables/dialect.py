@@ -118,7 +118,7 @@ def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -
 
 
 def _explained(rows: Sequence[Sequence[str]], decimal: str) -> tuple[float, int] | None:
-    """Fraction of cells that are values in rows of the most frequent length, and this length."""
+    """Fraction of cells that are valid values, in rows of the most frequent length, and this length."""
     numeric = [(len(row), sum(is_number(cell, decimal) for cell in row), row) for row in rows]
     lengths = Counter(length for length, numbers, _ in numeric if length > 1 and numbers)
     if not lengths:

@@ -106,7 +106,7 @@ def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
 
 
 def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
-    """Indices of the columns of a role: the column that the user names, otherwise those recognised by name."""
+    """Indices of the columns with a role: the column that the user names, otherwise those recognised by name."""
     stated = given.columns.get(role)
     if stated is not None:
         found = [k for k, name in enumerate(names) if stated in (name.text, name.base, str(k + 1))]
@@ -120,7 +120,7 @@ def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
 
 
 def _side(word: str) -> str:
-    """Translate a word for a direction to fingervision's own word; unknown words are kept, and refused later."""
+    """Translate a word for a direction to `up` or `down`; unknown words are kept, and refused later."""
     for arrow, side in ARROWS.items():
         word = word.replace(arrow, side)
     plain = " ".join(tokens(word)) or word.strip()

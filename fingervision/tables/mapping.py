@@ -59,7 +59,7 @@ class Entry:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether the entry contains no decision."""
+        """Whether the entry contains no decision of the user."""
         return self.source is None
 
     def over(self, other: "Entry") -> "Entry":

@@ -1,4 +1,4 @@
-"""Files with several tables (sheets, groups, structures): choice of the table to read."""
+"""Files with several tables (sheets, groups, structures): choose the table to read."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from fingervision.tables.questions import OpenQuestionError, Question
 
 
 def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, what: str) -> str:
-    """Name of the table to read: the table that the user states, the only table, or the only recognisable table.
+    """Name of the table to read: the one that the user states, the only one, or the only recognisable one.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 
 
@@ -34,6 +35,26 @@ class RawColumn:
 
     def __len__(self) -> int:
         return self.content.value.size if isinstance(self.content, Numbers) else len(self.content)
+
+
+MOST_COLUMNS = 4096
+"""Columns of a table: loggers write at most some hundreds; each costs about 0.2 ms to understand (`table` of 100 000
+took minutes)."""
+
+
+def check_columns(path: Path, count: int) -> None:
+    """Refuse a table with too many columns before the columns' names are interpreted.
+
+    Raises
+    ------
+    DataError
+        The table has more than `MOST_COLUMNS` columns.
+    """
+    if count > MOST_COLUMNS:
+        raise DataError(
+            f"{path} must have at most {MOST_COLUMNS} columns, but has {count}: export the columns that are needed, or "
+            "exchange rows and columns."
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,5 +99,5 @@ class RawTable:
         return len(self.columns[0]) if self.columns else 0
 
     def place(self, row: int) -> str:
-        """Location of a row in the file."""
+        """Location of a row in the file, for messages."""
         return f"line {self.lines[row]}" if len(self.lines) else f"row {row + 1}"

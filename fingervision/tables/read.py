@@ -197,6 +197,6 @@ def _said(table: Understood, given: Entry) -> list[str]:
 
 
 def said(given: Entry, what: str, notes: tuple[str, ...], left_out: tuple[str, ...]) -> list[str]:
-    """Sentence on how a table of another program was read."""
+    """Sentence on how a table of another program was interpreted."""
     how = f" with {given.source}" if given.source is not None else ""
     return [f"Read as {what}{how}.", *notes, *(f"Left out: {words}." for words in left_out)]

@@ -45,7 +45,7 @@ def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
         text = text.rstrip("\x00")
         if "\x00" in text:
             raise DataError(
-                f"{path} must be a table as text, or of a format that is read (.xlsx, .mat, .parquet, .tdms, .lvm), "
+                f"{path} must be a text table, or a file of a supported format (.xlsx, .mat, .parquet, .tdms, .lvm), "
                 f"but holds zero bytes (the first is character {text.index(chr(0))}): export it again."
             )
     lines = text.splitlines()

@@ -121,7 +121,7 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
 
 
 def _labelled(line: str, dialect: Dialect) -> tuple[str, tuple[str, ...]]:
-    """Label (in lower case) in the first column of a worksheet's header row, and the row's value for each column."""
+    """Label (in lower case) in the first column of the header row, and the row's value for each column."""
     label, *cells = [cell.strip() for cell in line.split("\t")]
     if len(cells) == dialect.wide - 1:
         cells = ["", *cells]
@@ -161,7 +161,7 @@ def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
 
 
 def _splits(text: str, dialect: Dialect) -> list[list[str]]:
-    """List the ways to split a line into names, the most probable first."""
+    """List the ways in which a line can be split into names, the most probable first."""
     ways = [split(text, dialect.separator)]
     if dialect.separator is None:
         ways.append([cell.strip() for cell in re.split(r"\t+|\s{2,}", text) if cell.strip()])

@@ -21,7 +21,7 @@ from fingervision.tables.dialect import (
 )
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
-from fingervision.tables.raw_table import RawColumn, RawTable
+from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
 from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, names_in
 
 NUMBER_BEGINS = frozenset("0123456789+-., \t")
@@ -61,6 +61,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
             f"{path} must hold rows of two numbers or more, but has none in its {len(lines)} lines: name another file, "
             "or export the table again."
         )
+    check_columns(path, dialect.wide)
     first = first_row(lines, dialect, given)
     header = find_header(lines, first, dialect, given)
     if not header.names:
@@ -218,7 +219,7 @@ class _Rows:
 
 
 def _is_prose(text: str, decimal: str) -> bool:
-    """Whether most of what a line holds between blanks and separators is no number, date or empty cell."""
+    """Whether most of a line's text is no number, date or empty cell."""
     parts = BETWEEN.split(text.strip())
     return sum(is_value(part, decimal) for part in parts) < 0.5 * len(parts)
 

@@ -96,7 +96,7 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
 def _taken_apart(
     cells: Sequence[str],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.intp], list[str]]:
-    """For each cell, seconds of the day, whether it is a time, and index of its date (-1 for none); also all dates."""
+    """For each cell: seconds of the day, whether it is a time, and index of its date (-1 for none); also all dates."""
     clock_s, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
     codes = np.full(len(cells), -1, dtype=np.intp)
     number: dict[str, int] = {}
@@ -115,7 +115,7 @@ def _taken_apart(
 
 
 def _one(text: str) -> tuple[str, float | None]:
-    """Split a cell into date ('' for none) and seconds of the day; None if the cell is not a time."""
+    """Split a cell into date ('' for none) and seconds of the day; None if the cell contains no time."""
     offset = 0.0
     if (zone := ZONE.search(text)) is not None and ":" in text[: zone.start()]:
         offset = _offset(zone[0])
@@ -131,7 +131,7 @@ def _one(text: str) -> tuple[str, float | None]:
 def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
     """Convert each date to days since the first date (a single zero without dates).
 
-    The result is None if a date does not exist in this order of day, month and year.
+    The result is None if a date does not exist in the assumed order of day, month and year.
     """
     numbers = [_ordinal(word, order) for word in words]
     if None in numbers:

@@ -87,7 +87,7 @@ class Understood:
         return self.raw.path
 
     def decided(self) -> "Understood":
-        """Return the table itself if there is no open question.
+        """Return the interpreted table if there is no open question; otherwise raise an error with the question.
 
         Raises
         ------

@@ -61,7 +61,7 @@ class MoveCheck(Protocol):
 
     @property
     def has_steps(self) -> bool:
-        """Whether the actuator keeps step data.
+        """Whether the actuator has step data (stored motions that are called by number).
 
         An actuator with step data supports `run_step`, and can reach only the end positions of its steps.
         """
@@ -75,7 +75,7 @@ class MoveCheck(Protocol):
 class Actuator(MoveCheck, Protocol):
     """A linear stage whose motions start at once and end by themselves.
 
-    `busy` states whether a motion is in progress.
+    The property `busy` states whether a motion is in progress.
 
     Every method raises `FingervisionError` with a sentence if the connection is lost or the motion is refused (beyond
     the limits, alarm, still busy); a refused motion is not started.
@@ -117,7 +117,7 @@ class Actuator(MoveCheck, Protocol):
         ...
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions (mm) since the last call, oldest first, the last one read now; at least one."""
+        """Positions (mm) since the last call, the oldest first; the last is read now, so that there is at least one."""
         ...
 
     def close(self) -> None:

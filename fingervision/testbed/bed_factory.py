@@ -73,7 +73,7 @@ def open_bed(
     all_simulated = all(kind.SIMULATED for kind in parts.values())
     has_gripper = "gripper" in top.values
     if hidden.effects and not has_gripper:
-        raise UsageError(f"--hide must have a simulated gripper to act in, but {name} has no [gripper]: add one.")
+        raise UsageError(f"--hide adds an effect to a simulated gripper, but {name} has no [gripper]: add one.")
     clock: Clock = VirtualClock(pace, earlier_s[1] if earlier_s else 0.0) if all_simulated else HostClock()
     context = BuildContext(
         clock=clock,
@@ -204,7 +204,7 @@ def stated_scale(section: Section, folder: Path) -> Scale | None:
 
 
 def gripper_model(section: Section, folder: Path) -> Model:
-    """Read the gripper model that simulated parts use, and by which gap and force are predicted for the limits."""
+    """Read the gripper model that simulated parts use, and that predicts gap and force for the limits."""
     section.only(("file", "columns", "kind", "large_rotation", "contact"))
     if "file" in section.values:
         path = folder / section.word("file")

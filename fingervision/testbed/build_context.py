@@ -13,7 +13,7 @@ from fingervision.testbed.simulation.injected_effects import Hidden
 
 @dataclass(slots=True)
 class BuildContext:
-    """The test bed under construction, in the order actuator, gripper, force sensor, camera.
+    """Context of a device's builder: the parts built so far, in the order actuator, gripper, force sensor, camera.
 
     Parameters
     ----------

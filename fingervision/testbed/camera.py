@@ -32,7 +32,7 @@ class Shot(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Latency from exposure to arrival: its smallest value, and the standard uncertainty of this value.
+    """Smallest latency from exposure to arrival of a frame (s), with its standard uncertainty.
 
     Parameters
     ----------
@@ -55,11 +55,11 @@ class BedCamera(Protocol):
 
     @property
     def latency(self) -> Latency:
-        """Latency from exposure to arrival, as far as it is known."""
+        """Smallest latency from exposure to arrival, as stated in the configuration."""
         ...
 
     def next(self) -> Shot:
-        """Wait for the next frame.
+        """Wait for the camera's next frame and return it.
 
         Raises
         ------

@@ -22,7 +22,7 @@ class ForceSensor(Protocol):
         ...
 
     def readings(self) -> tuple[Reading, ...]:
-        """Forces (N) since the last call, oldest first, the last one read now; at least one."""
+        """Forces (N) since the last call, the oldest first; the last is read now, so that there is at least one."""
         ...
 
     def close(self) -> None:

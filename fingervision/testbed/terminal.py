@@ -15,8 +15,9 @@ LOOK_EVERY_S = 0.2
 class Terminal:
     """Keyboard and screen of the person at the test bed.
 
-    If two parts of the program read from the keyboard, each would take lines meant for the other. Therefore all lines
-    are read here: a line is the response to a question if one was asked, and otherwise a command of a single letter.
+    If two parts of the program read from the keyboard, each would take lines that are meant for the other. Therefore
+    all lines are read here: a line is the response to a question if one was asked, and otherwise a command of a single
+    letter.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ class Terminal:
 
     @contextmanager
     def listening(self, unasked: Callable[[str], None], ended: Callable[[], bool]) -> Iterator[None]:
-        """Receive single letters too, if a person is at the keyboard.
+        """Within the `with` block, receive single letters too, if a person is at the keyboard.
 
         Parameters
         ----------

@@ -31,7 +31,7 @@ def bed_at(path: str | Path) -> Bed:
 
 
 class _BedContract:
-    """Tests of a part through its test bed; define `open_bed`, or pass an open test bed with `of`."""
+    """Tests of a device through its test bed; define `open_bed`, or pass an open test bed with `of`."""
 
     _open: Bed | None = None
 
@@ -241,7 +241,7 @@ class CameraContract(_BedContract):
 
 
 def _place_mm(bed: Bed, by_mm: float) -> float:
-    """The position `by_mm`, clipped to the limits of the test bed (mm)."""
+    """The position `by_mm` away from the present one, clipped to the limits of the test bed (mm)."""
     low, high = bed.limits.lower_mm, bed.limits.upper_mm
     middle = min(max(0.0, low), high)
     return min(max(middle + by_mm, low), high)
@@ -257,7 +257,7 @@ def _near_mm(bed: Bed) -> float:
 
 
 def _still_mm(bed: Bed) -> float:
-    """Allowed difference of two readings at rest, and of a reading at the reference from 0 (mm)."""
+    """Allowed difference (mm) of two readings at rest, and of a reading at the reference from 0."""
     return bed.actuator.limits.repeatability_mm + ROUNDING_MM
 
 
@@ -288,7 +288,7 @@ def _until_rest(bed: Bed) -> tuple[Reading, ...]:
 
 
 def _watched(bed: Bed, seconds: float) -> tuple[Reading, ...]:
-    """Collect readings for some seconds; an actuator that does not stream readings is polled frequently."""
+    """Collect readings for some seconds; an actuator that does not send readings by itself is asked frequently."""
     seen: list[Reading] = []
     until_s = bed.clock.now_s() + seconds
     while bed.clock.now_s() < until_s:

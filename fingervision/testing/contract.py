@@ -1,4 +1,4 @@
-"""Common parts of contract tests: a failure is reported as a sentence; a test may declare that it does not apply."""
+"""Parts shared by all contract tests: a failure is a sentence; a test may declare that it does not apply."""
 
 from typing import Any
 from unittest import SkipTest

@@ -25,7 +25,7 @@ MODEL = TableModel("straight", INPUT_MM, -0.5 * GAP_MM, 0.5 * GAP_MM, 2.0 * INPU
 
 
 def bench() -> History:
-    """Sample history of two runs, each with an opening, a rest and a return; the second run has half the speed."""
+    """Sample history of two runs, each with an opening, a rest and a return; the second run is half as fast."""
     up = np.linspace(-0.4, 1.4, 120)
     run = np.concatenate([up, np.full(40, 1.4), up[::-1]])
     return History(
@@ -42,7 +42,7 @@ def bench() -> History:
 
 
 def neutral_values(effect: Effect, history: History) -> dict[str, float]:
-    """Parameter values at which the effect must change nothing: neutral values, or starting values of shapes."""
+    """Parameter values at which the effect must change nothing; parameters of shape get their starting values."""
     return {
         p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) if p.neutral is None else p.neutral
         for p in _searched(effect, history)
@@ -65,12 +65,12 @@ def usual_values(effect: Effect, history: History) -> dict[str, float]:
 
 
 class EffectContract:
-    """Tests of one effect, stated as the class attribute `effect`."""
+    """Contract tests of one effect, stated as the class attribute `effect`."""
 
     effect: Effect
 
     def test_it_states_what_it_is(self) -> None:
-        """Name, stage, words, formula, source, residual and parameters are declared; a trial response is valid."""
+        """Name, section of the chain, words, formula, source, residual and parameters are declared; a trial works."""
         try:
             try_effect(self.effect)
         except MisfitError as error:
@@ -129,7 +129,7 @@ class EffectContract:
         )
 
     def test_memory_starts_each_run_at_rest(self) -> None:
-        """An effect with memory does not depend on earlier runs at the first sample of a run."""
+        """At the first sample of a run, an effect with memory does not depend on earlier runs."""
         if not self.effect.memory:
             raise NotApplicable(f"{self.effect.name} does not depend on earlier inputs")
         bare = self._chain().respond({})
@@ -159,7 +159,7 @@ class EffectContract:
         )
 
     def test_without_the_data_that_it_needs_it_is_excluded(self) -> None:
-        """A table without the times, edges, force or shared clock that an effect needs excludes it, with the reason."""
+        """A table without times, edges, force or a shared clock excludes an effect that needs them, with the reason."""
         needs = (
             (self.effect.needs_times, replace(bench(), time_s=None), "times"),
             (self.effect.needs_shared_clock, replace(bench(), shared_clock=False), "a shared clock"),
@@ -225,7 +225,7 @@ class _ChainOf:
         self._chain.__dict__["effects"] = {effect.name: effect}
 
     def respond(self, settings: dict[str, dict[str, float]]) -> Response:
-        """Compute the response of the chain."""
+        """Compute the response of the measuring chain with this one effect."""
         return self._chain.respond(settings)
 
 

@@ -14,7 +14,7 @@ NOWHERE = ("nowhere/nothing.xyz", "no such recording")
 
 
 class FrameSourceContract:
-    """Tests of one kind of frame source, stated as `kind`, with a recording that it can open, stated as `name`."""
+    """Contract tests of one kind of frame source, stated as `kind`, with a recording that it can open (`name`)."""
 
     kind: SourceKind
     name: str

@@ -1,4 +1,4 @@
-"""Simulate data with a hidden effect and diagnose these data: the diagnosis must identify the effect."""
+"""Simulate data with an effect and diagnose these data: the diagnosis must identify the effect."""
 
 from collections.abc import Mapping
 

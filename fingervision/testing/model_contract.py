@@ -13,7 +13,7 @@ RELATIVE = 1e-6
 
 
 class ModelContract:
-    """Tests of one kind of model, stated as `kind`, with the drawing of the published gripper."""
+    """Contract tests of one kind of model, stated as `kind`, on the drawing of the published gripper."""
 
     kind: Kind
 

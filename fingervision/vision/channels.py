@@ -61,11 +61,11 @@ class Channel:
     rows: int
 
     def left(self, row: float) -> float:
-        """Last pixel of the left finger in a row."""
+        """Column of the left finger's last pixel in a row."""
         return self.left_c + self.left_m * row
 
     def right(self, row: float) -> float:
-        """First pixel of the right finger in a row."""
+        """Column of the right finger's first pixel in a row."""
         return self.right_c + self.right_m * row
 
 
@@ -123,7 +123,7 @@ def _straight(chain: Ints) -> Channel | None:
 
 
 def _beside(upright: Mask, channel: Channel) -> tuple[Build, Build]:
-    """Width of the objects to the left and to the right of a channel (pixels)."""
+    """Widths of the objects to the left and to the right of a channel (pixels)."""
     sides = (channel.left_c, channel.left_m, channel.right_c, channel.right_m)
     widths = _beside_lines(upright, *sides, channel.first_row, channel.last_row)
     last = upright.shape[1] - 1

@@ -90,7 +90,7 @@ def fit_circle(
     blur_px : float
         Initial estimate of the blur.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def fit_circle(
 
 
 def _columns(x: Floats, y: Floats, p: Floats) -> tuple[Floats, Floats]:
-    """Columns of the model that are linear in its coefficients, and derivatives by x, y, radius and blur."""
+    """Columns of the linear part of the model, and derivatives by x, y, radius and blur."""
     dx, dy = x - p[0], y - p[1]
     r = np.maximum(np.hypot(dx, dy), 1e-9)
     cosine, sine = np.abs(dx) / r, np.abs(dy) / r

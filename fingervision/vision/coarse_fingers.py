@@ -69,7 +69,7 @@ class CoarseFingers:
 
     @property
     def is_joined(self) -> bool:
-        """Whether the two fingers' common base is in view."""
+        """Whether the base that joins the two fingers is in view."""
         return self.left.top.outline is self.right.top.outline
 
 

@@ -1,10 +1,10 @@
 """Possible displacement of a whole edge by a video codec, estimated from the codec's quantiser step.
 
-In an edge parallel to the codec's blocks all rows have a common error, which the scatter of the rows about a line does
-not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture either.
-The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For an edge
-of contrast A the coefficients change by about A per pixel of displacement, so that the displacement is a fixed fraction
-of `step / A`.
+If an edge is parallel to the codec's blocks, all its rows share an error, which the scatter of the rows about a line
+does not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture
+either. The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For
+an edge of contrast A the coefficients change by about A per pixel of displacement, so that the displacement is a fixed
+fraction of `step / A`.
 """
 
 from dataclasses import replace
@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.median import middle
+from fingervision.vision.orientation import Orientation
+from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +40,7 @@ EIGHT_BITS = 255.0
 
 
 def displaced_px(step: float, contrast: float) -> float:
-    """Standard uncertainty of an edge's position from a codec error common to the whole edge (pixels).
+    """Standard uncertainty of an edge's position (px) from a codec error that the whole edge shares.
 
     Parameters
     ----------
@@ -46,6 +50,40 @@ def displaced_px(step: float, contrast: float) -> float:
         Contrast of the edge, in grey levels of an 8-bit scale.
     """
     return DISPLACED * step / max(abs(contrast), 1.0)
+
+
+def flanks_displaced_px(
+    edges: EdgePoints, orientation: Orientation, quantiser: Quantiser, light: Floats, top_level: int
+) -> tuple[float, float]:
+    """Standard uncertainty (px) of the position of both inner flanks, from codec errors that all of their rows share.
+
+    Parameters
+    ----------
+    edges : EdgePoints
+        Steps that were fitted to every line, in the fingers' axes.
+    orientation : Orientation
+        Transformation from the fingers' axes to the picture.
+    quantiser : Quantiser
+        Quantiser of the picture.
+    light : ndarray of float, shape (levels,)
+        Light for every stored level (look-up table).
+    top_level : int
+        Highest level of the scale.
+    """
+    displaced = []
+    for k, level in enumerate(edges.inside):
+        is_seen = edges.lines.weight[k, :INNER] > 0
+        if not np.any(is_seen):
+            displaced.append(0.0)
+            continue
+        across, contrast = (middle(a[k, :INNER][is_seen]) for a in (edges.position, edges.contrast))
+        rows = edges.lines.fixed[k, :INNER][is_seen]
+        x, y = orientation.to_pixels(across, 0.5 * float(rows.min() + rows.max()))
+        half_px = ACROSS_SIGMAS * float(edges.blur_px[k, 0]) + ACROSS_PX, 0.5 * float(np.ptp(rows))
+        beside, along = half_px if orientation.direction.is_vertical else half_px[::-1]
+        step = quantiser.near(x, y, beside, along)
+        displaced.append(displaced_px(step, _stored_contrast(level, contrast, light, top_level)))
+    return displaced[0], displaced[1]
 
 
 def with_coding_error(
@@ -68,20 +106,27 @@ def with_coding_error(
     """
     displaced = []
     for edge, level in zip((found.left, found.right), inside, strict=True):
-        stored = np.interp([level, level + edge.contrast], light[: top_level + 1], np.arange(top_level + 1.0))
         across, along = ACROSS_SIGMAS * edge.blur_px + ACROSS_PX, ALONG_PX
         if not found.direction.is_vertical:
             across, along = along, across
         step = quantiser.near(edge.x_px, edge.y_px, across, along)
-        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level) * _by_slope(edge.slope))
+        displaced.append(
+            displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level)) * _by_slope(edge.slope)
+        )
     return _less_sure(found, displaced[0], displaced[1])
+
+
+def _stored_contrast(level: float, contrast: float, light: Floats, top_level: int) -> float:
+    """Contrast of an edge in stored levels on an 8-bit scale, from the light inside and the change of light."""
+    stored = np.interp([level, level + contrast], light[: top_level + 1], np.arange(top_level + 1.0))
+    return float(np.ptp(stored)) * EIGHT_BITS / top_level
 
 
 def _by_slope(slope: float) -> float:
     """Displacement of the measuring point across the finger per displacement of an outline along its normal.
 
-    A leaning edge moves across by more than along its normal. The tip is displaced as well, by itself, and takes the
-    measuring height with it, along the edge.
+    A leaning edge moves farther across the finger than along its own normal. The tip is displaced by its own codec
+    error as well, and shifts the measuring height along the edge.
     """
     return hypot(hypot(1.0, slope), slope)
 

@@ -1,4 +1,4 @@
-"""Distance of a blurred corner's half-level contour from the corner's vertex."""
+"""Distance between a blurred corner's half-level contour and the vertex of the corner."""
 
 from functools import lru_cache
 from math import cos, erf, exp, pi, sin, sqrt, tan
@@ -69,7 +69,7 @@ def _retreat(steps: int) -> float:
 
 
 def _share(depth: float, turn: float) -> float:
-    """Blurred coverage of a wedge at a point that has the same depth inside both of its sides."""
+    """Blurred coverage of a wedge at a point with the same depth inside both of its sides."""
     width = 0.5 * turn / MIDPOINTS
     owen = sum(exp(-0.5 * (depth / cos((k + 0.5) * width)) ** 2) for k in range(MIDPOINTS)) * width / (2.0 * pi)
     return 0.5 * (1.0 + erf(depth / sqrt(2.0))) - 2.0 * owen

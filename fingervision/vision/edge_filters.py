@@ -46,7 +46,7 @@ _mean_square = loop("edge_filters_mean_square")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeFilters:
-    """Filters for one length of window; arrays of shape (blurs, offsets, pixels) unless stated otherwise.
+    """Filters for one length of the fit window; arrays of shape (blurs, offsets, pixels) unless stated otherwise.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class EdgeFilters:
         return Look(position, contrast, blur, sigma, row, column)
 
     def middle(self, sigma_px: float) -> tuple[int, int]:
-        """Row and column in the table of filters for an edge of this blur in the centre of the window."""
+        """Row and column in the table of filters for an edge of a given blur in the centre of the window."""
         return _row(sigma_px, self.sigmas_px.size), _column(0.0)
 
     def mean_square(self, levels: Floats, look: "Look") -> tuple[Floats, Floats]:
@@ -127,7 +127,7 @@ class Lines(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """Result of one look-up of all edges; arrays of shape (n,) unless stated otherwise.
+    """Result of one look-up in the table of filters for all edges; arrays of shape (n,) unless stated otherwise.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class Look:
 
 
 def reach_for(sigma_px: float) -> int:
-    """Half-length of the window needed for an edge of this blur."""
+    """Half-length of the fit window (px) that is needed for an edge of a given blur."""
     needed = REACH_SIGMAS * sigma_px + REACH_EXTRA_PX
     return next((reach for reach in REACHES_PX if reach >= needed), REACHES_PX[-1])
 

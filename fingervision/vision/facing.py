@@ -12,7 +12,7 @@ Facing = tuple[NDArray[np.int_], NDArray[np.int_]]
 
 
 def facing_lines(lines: ProfileLines, reach: int) -> Facing | None:
-    """Indices of the left and the right finger's inner lines in common rows, where one window contains both edges."""
+    """Indices of the inner lines of left and right finger in the same rows, where one window contains both edges."""
     filled = [int(n) for n in lines.weight[:, :INNER].sum(axis=1)]
     if min(filled) == 0 or lines.coarse[1, : filled[1]].min() - lines.coarse[0, : filled[0]].max() >= 2 * reach:
         return None
@@ -26,7 +26,7 @@ def without_the_other(
 ) -> Floats:
     """Subtract the other finger's edge from lines whose window contains the edges of both fingers.
 
-    There the background between the fingers appears as a narrow stripe.
+    In such a window the background between the fingers appears as a narrow stripe.
     """
     levels, reach = values.copy(), values.shape[-1] // 2
     edge = lines.coarse + lines.outward * position

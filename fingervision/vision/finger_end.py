@@ -91,7 +91,7 @@ def fit_finger_end(points: OutlinePoints, start: Floats, origin: Floats, u_prior
 
 
 def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_prior: Floats) -> FingerEnd:
-    """Repeat the fit from other corner radii if it rejects points.
+    """Repeat the fit from other starting radii of the corners if it rejects points.
 
     With a wrong fillet radius, the points of the corner look like outliers (dust).
 

@@ -50,7 +50,7 @@ def compared(
 
 
 def on_flanks(p: Floats, origin: Floats, x: Floats, y: Floats) -> Flags:
-    """Whether each point lies on the straight part of a flank."""
+    """Whether each point of the outline lies on the straight part of a flank."""
     is_on = np.empty(x.size, dtype=np.bool_)
     _on_flanks(p, origin, x, y, is_on)
     return is_on

@@ -1,8 +1,8 @@
 """Step 4, finding the fingers: which two objects in view are the fingers, and in which direction they point.
 
 A tip is a local maximum of an outline in the direction in which the tips point, with a sufficient topographic
-prominence. Two touching fingers are one object with two local maxima and a notch between them, and are found in the
-same way. If an outline's local maximum is at the picture's border, the tip is out of view. Only background may lie
+prominence. Two touching fingers are one object with two local maxima and a notch between them, and are found by the
+same criteria. If an outline's local maximum is at the picture's border, the tip is out of view. Only background may lie
 between the two fingers, and no third object beside them may look like a finger.
 """
 
@@ -17,7 +17,7 @@ from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.coarse_fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.flanks import follow_down, has_straight_flanks
-from fingervision.vision.likeness import MOST_TURNED, Build, are_alike, build, common_turn, end_alike
+from fingervision.vision.likeness import MOST_TURNED, Build, are_alike, build, common_turn, end_alike, lie_level
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.outlines import Outline, Outlines, find_outlines, longest_first
 from fingervision.vision.tops import Top, find_tops
@@ -34,6 +34,9 @@ ROOTED_BONUS = 2.0
 LYING_HEIGHTS = 6.0
 # Of things that lie in view only those that are so many times as long as wide may be fingers: coins are not.
 LYING_SLENDER = 1.5
+# Fingers are longer than their gap is wide, or a little shorter: two things that lie in view and are farther apart than
+# so many times the length of the shorter one are two things.
+LYING_APART = 2.0
 # A gripper that lies in view is the only thing of its size: no third outline has this share of its length.
 COMPANY_SHARE = 0.4
 # A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
@@ -147,6 +150,10 @@ def _best_pair(
             top.prominence_px < LYING_SLENDER * one.width_px for top, one in zip((left, right), builds, strict=True)
         ):
             continue
+        step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
+        is_far = apart_px - 0.5 * sum(one.width_px for one in builds) > LYING_APART * prominence
+        if is_lying and (is_far or not lie_level(step_px, apart_px, below_tip_px, builds)):
+            continue
         if _is_open(mask, pair[0], pair[1], orientation, below_tip_px, builds):
             are_cut = builds[0].is_cut and builds[1].is_cut
             best, two = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted, are_cut), (left, right)
@@ -212,7 +219,7 @@ def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFinge
 
 
 def _standing(tops: list[Top], below_tip_px: float) -> list[Top]:
-    """Objects that reach the picture's border like a finger."""
+    """Objects that extend to the picture's border, as a finger does."""
     return [
         top
         for top in tops
@@ -236,7 +243,7 @@ def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
 
 
 def _end_alike(first: Top, second: Top, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are at about the same height along the fingers."""
+    """Whether two tips are at about the same height along the fingers (also for a turned camera)."""
     left, right = (first, second) if first.across_px <= second.across_px else (second, first)
     step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
     return end_alike(step_px, apart_px, below_tip_px, builds)

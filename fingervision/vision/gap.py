@@ -84,7 +84,7 @@ def measure_gap(
     light_gap : bool
         Whether the fingers are darker than the gap.
     coding : Coding
-        Coding of the picture, which determines how many neighbouring points have a common error.
+        Coding of the picture, which determines how many neighbouring points share an error.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
 
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
-    """Return the reason why no gap can be measured from the edges; None if there is no such reason."""
+    """Return the reason why the edges give no gap; None if there is no such reason."""
     real = edges.lines.weight > 0
     inner = real & IS_INNER
     if np.count_nonzero(inner) < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns

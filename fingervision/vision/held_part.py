@@ -18,7 +18,7 @@ U_ALONG_PX = 1.0
 
 
 def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
-    """Lines on which a finger's own edge is visible; lines hidden by a held part are removed."""
+    """Lines of pixels on which a finger's own edge is visible; lines hidden by a held part are removed."""
     pair = (fingers.left, fingers.right)
     if not any(finger.hidden.size for finger in pair):
         return lines
@@ -41,7 +41,7 @@ def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
 
 
 def _inner_across(finger: CoarseFinger) -> int:
-    """Coordinate across the picture of the innermost pixel of the finger's tip."""
+    """Coordinate across the picture of the innermost pixel of a finger's tip."""
     near = finger.outline[finger.outline[:, 1] <= finger.top_along_px + 2 * BESIDE_TIP_PX, 0]
     return int(near.max() if finger.inner_sign > 0 else near.min())
 
@@ -59,7 +59,7 @@ def held_part(
         Fitted end shapes of the left and of the right finger.
     spread : (float, float)
         Ratio of the residuals' variance to the stated variance for each finger, multiplied by the number of
-        neighbouring points with a common error.
+        neighbouring points that share an error.
     light_gap : bool
         Whether the fingers are darker than the gap.
 

@@ -32,7 +32,7 @@ _apart = loop("interlace_apart")
 
 
 def at_half_way(edges: EdgePoints) -> tuple[EdgePoints, float]:
-    """Return the edges half-way between the two fields, and the faster finger's displacement from field to field (px).
+    """Return the edges half-way between the two fields, and the faster finger's displacement between them (px).
 
     The picture's rows must be rows of `edges`, which holds if the tips point up or down.
     """

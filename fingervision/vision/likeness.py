@@ -37,7 +37,7 @@ _build = loop("likeness_build")
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """Width and tilt of an object.
+    """Width and tilt of an object that may be a finger.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def are_alike(first: Build, second: Build) -> bool:
 
 
 def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are at about the same height, as those of one gripper are, also for a turned camera.
+    """Whether two tips are at about the same height, as those of one gripper are; a turned camera is allowed for.
 
     Parameters
     ----------
@@ -99,6 +99,24 @@ def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tupl
         return False
     turn = -step_px / max(apart_px, 1.0)
     return all(abs(one.lean - turn) <= LEANS_ALIKE for one in builds)
+
+
+def lie_level(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build]) -> bool:
+    """Whether two objects that lie wholly in view end at one height, in the camera's angle that they show themselves.
+
+    Fingers that come in from the picture's border show by this that they belong together, whatever the camera's angle.
+    Nothing of the kind is known of two bars that lie in view: the step between their ends must be that of a camera
+    turned as both of them lean on average.
+
+    Parameters
+    ----------
+    step_px, apart_px, below_tip_px : float
+        As in `end_alike`.
+    builds : (Build, Build)
+        Width and tilt of the left and of the right object.
+    """
+    turn = 0.5 * (builds[0].lean + builds[1].lean)
+    return abs(step_px + turn * apart_px) <= STEP_HEIGHTS * below_tip_px
 
 
 def common_turn(leans: Sequence[float]) -> float:

@@ -46,7 +46,7 @@ def first_blur(upright: GreyImage, lines: ProfileLines, light: Floats) -> float:
 
 
 def first_position(levels: Floats) -> Floats:
-    """Position of a step between the window's two end levels for which the window's mean level is that observed."""
+    """Position of a step between the fit window's two end levels for which the window has the observed mean level."""
     position = np.empty(levels.shape[:2])
     _first_position(levels, position)
     return position

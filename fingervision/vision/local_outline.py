@@ -43,7 +43,7 @@ _fit = loop("local_outline_polynomial")
 
 @dataclass(frozen=True, slots=True)
 class LocalOutline:
-    """The outline near one point.
+    """Polynomial that describes the outline near one point.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def outline_near(
 
 
 def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> LocalOutline | None:
-    """The outermost point of a smooth outline, searched from an initial estimate."""
+    """The outermost point of a smooth outline, iterated from an initial estimate."""
     for _step in range(3):
         fit = outline_near(points, (x, y), (0.0, -1.0), blur_px)
         if fit is None:
@@ -116,7 +116,7 @@ def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> Loca
 def local_edge(
     points: OutlinePoints, x: float, y: float, slope: float, blur_px: float
 ) -> tuple[LocalOutline, float] | None:
-    """Position and slope of a smooth inner edge at the height `y`, searched from an initial estimate."""
+    """Position and slope of a smooth inner edge at the height `y`, iterated from an initial estimate."""
     for _step in range(3):
         length = hypot(1.0, slope)
         nx, ny = 1.0 / length, -slope / length
@@ -155,7 +155,7 @@ def local_measuring_point(points: OutlinePoints, below_tip_px: float, shared: fl
     below_tip_px : float
         Distance of the measuring point below the tip.
     shared : float
-        Number of neighbouring points with a common error.
+        Number of neighbouring points that share an error.
     """
     blur = float(np.median(points.blur))
     top = int(np.argmin(points.y))

@@ -22,7 +22,7 @@ AGREES = 2.5
 
 
 def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFingers:
-    """Return the fingers with their outlines extended downwards; a finger that holds a part is not changed."""
+    """Return the fingers with their outlines extended towards the roots; a finger that holds a part is not changed."""
     left, right = (
         finger if finger.hidden.size else _longer(finger, below_tip_px + LONG_PX)
         for finger in (fingers.left, fingers.right)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from fingervision.domain.loops import loop
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.first_guess import line
 from fingervision.vision.grey import GreyImage
@@ -23,6 +24,8 @@ LEFT_OUT = 4.0
 STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
 STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
 
+_bins = loop("mean_profile_bins")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeanProfile:
@@ -31,6 +34,30 @@ class MeanProfile:
     t: Floats
     light: Floats
     count: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A straight line with the interface of NumPy's polynomials, whose evaluation takes longer than the whole profile.
+
+    Parameters
+    ----------
+    intercept : float
+        Value at zero.
+    slope : float
+        Change per unit.
+    """
+
+    intercept: float
+    slope: float
+
+    def __call__(self, at: Ints) -> Floats:
+        """Values of the line at given positions, shape (n,)."""
+        return np.asarray(self.intercept + self.slope * at, dtype=np.float64)
+
+    def deriv(self) -> "Line":
+        """Derivative of the line, which is constant."""
+        return Line(self.slope, 0.0)
 
 
 def mean_profile(
@@ -42,18 +69,19 @@ def mean_profile(
     room: int,
     curves: tuple[int, ...] = STRAIGHT_ONLY,
 ) -> MeanProfile | None:
-    """Mean profile across the half of a flank that is farther from the tip; None if it is short or not smooth."""
+    """Mean profile across the half of a flank farther from the tip; None if that half is short or not smooth."""
     real = np.flatnonzero(edges.lines.weight[k, part] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS or room < REACH_PX // 2:
         return None
     fixed, found = edges.lines.fixed[k, part][rows], edges.position[k, part][rows]
     outward = int(edges.lines.outward[k, part][0])
+    curve: Line | Polynomial
     for degree in curves:
         keep = np.ones(rows.size, dtype=bool)
         for _look in range(3):
             if degree == 1:  # a hundred times faster
-                curve = Polynomial(line(fixed[keep].astype(np.float64), found[keep]))
+                curve = Line(*line(fixed[keep].astype(np.float64), found[keep]))
             else:
                 curve = Polynomial.fit(fixed[keep], found[keep], degree)
             away = found - curve(fixed)
@@ -66,16 +94,11 @@ def mean_profile(
     else:
         return None
     fixed = _rows_between(fixed[keep])
-    edge, slope = curve(fixed), curve.deriv()(fixed)[:, None]
-    columns = np.rint(edge).astype(int)[:, None] + outward * np.arange(-REACH_PX, room + 1)
-    is_in = (columns >= 0) & (columns < upright.shape[1])
-    values = light[upright[np.broadcast_to(fixed[:, None], columns.shape)[is_in], columns[is_in]]]
-    t = (outward * (columns - edge[:, None]) / np.hypot(1.0, slope))[is_in]
-    place = np.floor(t / BIN_PX).astype(int) + int(2.0 * REACH_PX / BIN_PX)
-    count = np.bincount(place)
+    edge, slope = curve(fixed), curve.deriv()(fixed)
+    count, distance, total = np.empty((3, int((3 * REACH_PX + room + 2) / BIN_PX)))
+    _bins(upright, light, fixed, edge, slope, outward, room, count, distance, total)
     full = count >= FEWEST_IN_BIN
-    total, middle = np.bincount(place, values), np.bincount(place, t)
-    return MeanProfile(middle[full] / count[full], total[full] / count[full], count[full].astype(np.float64))
+    return MeanProfile(distance[full] / count[full], total[full] / count[full], count[full])
 
 
 def _rows_between(looked_at: Ints) -> Ints:

@@ -55,7 +55,7 @@ class MeasuringPoint:
 
 
 def squared(end: FingerEnd) -> FingerEnd:
-    """Return the fitted end with its top made perpendicular to its flanks, unless the points contradict it.
+    """Return the fitted finger end with its top made perpendicular to its flanks, unless the points contradict this.
 
     The top of a finger that is cut straight is perpendicular to its flanks, which are long and determine the tilt far
     more precisely than the short top. If the directions of top and flanks agree within their uncertainty, they are

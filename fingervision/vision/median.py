@@ -16,6 +16,6 @@ def middle(values: NDArray[np.float64]) -> float:
 def median(values: NDArray[np.float64]) -> float:
     """The median: for an even number of values the mean of the two central ones; 0 for no values.
 
-    It is twenty times as fast as `numpy.median`.
+    This function is twenty times as fast as `numpy.median`.
     """
     return float(_median(np.ascontiguousarray(values)))

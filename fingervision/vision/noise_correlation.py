@@ -42,7 +42,7 @@ def flat_noise(
     row: int,
     column: int,
 ) -> tuple[float, float]:
-    """Number of neighbouring lines with common noise (1 for independent lines), and standard deviation of the noise.
+    """Number of neighbouring lines that share noise (1 for independent lines); standard deviation of the noise.
 
     Parameters
     ----------

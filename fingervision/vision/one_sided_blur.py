@@ -46,7 +46,7 @@ def sides_of(middles: Array, normals: Array) -> NDArray[np.intp]:
 def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: Array) -> Array:
     """Uncertainty of the edge positions that is suggested by differences in blur between the sides of a body.
 
-    Each column is one standard uncertainty, common to the chunks of one side.
+    Each column of the result is one standard uncertainty, which all chunks of one side share.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
 
 
 def _excess(mean: Array, variance: Array, normal: Array) -> Array:
-    """Excess of each side's squared blur that a shadow would explain, shape (k,); 0 where nothing suggests one.
+    """Part of each side's squared blur that a shadow would explain, shape (k,); 0 for a side without such a part.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class EdgeView:
     outward_px : float
         Edge bias: distance by which an edge appears outside its body, in pixels of the picture.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
     body_level, contrast : float or None
         Level of the bodies, and difference of the background from it; None if not known.
     u_outward_px, u_size : float
@@ -162,7 +162,7 @@ def _in_picture(chunks: Chunks, flat: FlatMap | None) -> _InPicture:
 def chunk_edges(
     grey: NDArray[np.float64], flat_chunks: Chunks, body_is_dark: bool, blur: float, view: EdgeView
 ) -> ChunkEdges:
-    """Fit a blurred step to the pixels around every chunk.
+    """Fit a blurred step to the pixels around every chunk (short stretch of the outline).
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def chunk_edges(
 def _like_the_others(
     blurs: Array, level: Array, contrast: Array, noise: Array, used: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether each chunk shows the body's own edge, judged by comparison with the other chunks that show an edge."""
+    """Whether each chunk shows the body's own edge, judged by comparison with the other chunks of the body."""
     usual = float(np.median(contrast[used]))
     # A shadow falls on up to half of a body's sides: the better half tells what an edge of its own looks like.
     sharp, quiet = float(np.quantile(blurs[used], 0.25)), float(np.quantile(noise[used], 0.25))
@@ -237,7 +237,7 @@ def _like_the_others(
 def _step(
     values: Array, s: Array, blur: float, body_is_dark: bool
 ) -> tuple[float, float, float, float, float, float, float] | None:
-    """Fit a blurred step by Gauss-Newton iteration; None where there is no step.
+    """Fit a blurred step by Gauss-Newton iteration; None if the pixels contain no step.
 
     Return the offset, its variance, the blur of the optics and its standard uncertainty, the level of the body, the
     contrast to the background, and the standard deviation of the noise.

@@ -1,8 +1,8 @@
 """Remove a held part from the binary picture, and record in which rows it hides the fingers' edges.
 
-Any object in the space between the fingers, which is bounded by two straight lines, is a part: held by both fingers,
-stuck to one of them, or free. After the removal of the part, the two fingers are found as usual; the rows in which the
-part touches an inner edge are left out of the measurement.
+Any object in the space between the fingers (bounded by two straight lines) is a part: held by both fingers, stuck to
+one of them, or free. After the removal of the part, the two fingers are found as usual; the rows in which the part
+touches an inner edge are left out of the measurement.
 """
 
 from dataclasses import replace
@@ -138,11 +138,11 @@ def _found_without(
 
 
 def _is_on_side(finger: CoarseFinger, across: float, reach_px: float) -> bool:
-    """Whether the finger found is the one that bounds the channel on this side."""
+    """Whether a finger is the one that bounds the channel on a given side."""
     found, along = inner_crossing(finger.outline, finger.top_along_px + reach_px)
     return abs(found - across) <= ON_SIDE_PX + abs(along - finger.top_along_px - reach_px)
 
 
 def _widened(rows: Ints) -> Ints:
-    """Add the neighbouring rows to a set of rows."""
+    """Add the rows above and below to a set of rows."""
     return np.unique((rows[:, None] + np.arange(-BEYOND_PX, BEYOND_PX + 1)).ravel())

@@ -21,7 +21,13 @@ from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges
-from fingervision.vision.coding_error import EVEN_SHIFTS, with_coding_error, with_shared_shift
+from fingervision.vision.coding_error import (
+    EVEN_SHIFTS,
+    SHARED_SHIFTS,
+    flanks_displaced_px,
+    with_coding_error,
+    with_shared_shift,
+)
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
@@ -203,7 +209,7 @@ def _measured(
     coded: _Coded,
     scale: int,
 ) -> _Attempt:
-    """Measure a pair of fingers; if they are rough, also over longer flanks, and keep the more certain result."""
+    """Measure a pair of fingers; if they are rough, measure longer flanks too, and keep the more certain result."""
     upright = fingers.orientation.view(grey)
     how = (settings, scale, light_gap, coded)
     edges, outcome = _edges_and_gap(upright, fingers, *how)
@@ -227,8 +233,17 @@ def _edges_and_gap(
     edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
     if fingers.orientation.direction.is_vertical:
         edges, apart_px = at_half_way(edges)
+
+    def displaced_px(found: EdgePoints) -> tuple[float, float]:
+        if coded.quantiser is not None:
+            return flanks_displaced_px(found, fingers.orientation, coded.quantiser, light, scale)
+        if coded.coding is Coding.LOSSLESS:
+            return 0.0, 0.0
+        alike_px = SHARED_SHIFTS[coded.coding] * shared_shift_px(flanks(upright, found, light))
+        return alike_px, alike_px
+
     with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
-        edges = with_profile(upright, edges, light, scale, settings.is_outline)
+        edges = with_profile(upright, edges, light, scale, settings.is_outline, displaced_px)
     if edges.beside == STRIP:
         return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
@@ -276,7 +291,7 @@ def _with_two_tones(
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:
-    """Full scale of the light; a measured camera response has its own."""
+    """Full scale of the light, which is different for a measured camera response."""
     known = settings.response.top_level
     bits = settings.bits if known is None or grey.dtype == np.uint8 else known.bit_length()
     found = top_level(grey, bits)

@@ -30,7 +30,7 @@ class Side(NamedTuple):
 
 
 class ReadOff(NamedTuple):
-    """Tip, inner edge, change of the edge per pixel towards the root, and the sides that determine tip and edge."""
+    """Result for a chain of sides: tip, inner edge, slope of the edge, and the sides that determine tip and edge."""
 
     tip: float
     apex: float
@@ -84,7 +84,7 @@ class Polygon(NamedTuple):
         return None if edge is None else ReadOff(height, apex, edge[0], edge[1], frozenset((*top, *edge[2])))
 
     def _tip(self, ends: "_Ends") -> tuple[float, float, tuple[int, ...], int] | None:
-        """Height of the tip, its position across, the sides that form it, the side to search the inner edge from."""
+        """Height of the tip, its position across, the sides that form it, and the side where the inner edge begins."""
         if self.level is not None:
             (x0, y0), (x1, y1) = ends.first[self.level], ends.last[self.level]
             return 0.5 * (y0 + y1), 0.5 * (x0 + x1), (self.level,), self.level
@@ -111,7 +111,7 @@ class Polygon(NamedTuple):
 
 
 class _Ends(NamedTuple):
-    """Ends of every side between the fillets of its corners, and the centres of the fillets."""
+    """End points of every side between the fillets of its corners, and the centres of the fillets."""
 
     first: list[tuple[float, float]]
     last: list[tuple[float, float]]
@@ -119,7 +119,7 @@ class _Ends(NamedTuple):
 
     @classmethod
     def of(cls, sides: list[Side], corners: list[Corner], radii: list[float]) -> "_Ends | None":
-        """Compute the ends from sides, corners and radii; None if two fillets overlap."""
+        """Compute end points from sides, corners and radii; None if two fillets overlap."""
         first, last, centres = [], [], []
         for k, side in enumerate(sides):
             c, s = cos(side.angle), sin(side.angle)

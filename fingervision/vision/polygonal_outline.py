@@ -77,7 +77,7 @@ def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared
     below_tip_px : float
         Distance of the measuring point below the tip.
     shared : float
-        Number of neighbouring points with a common error.
+        Number of neighbouring points that share an error.
     """
     if not _has_straight_top(points):
         return None
@@ -138,7 +138,7 @@ def _chain(points: OutlinePoints, lowest: float) -> Ints:
 
 
 def _line(x: Floats, y: Floats, u: Floats) -> _Fitted:
-    """Weighted total least-squares line; `u` is positive for uncertainties along x, negative for those along y."""
+    """Line by weighted total least squares; `u` is positive for uncertainties along x, negative for those along y."""
     start = np.full(x.size, atan2(float(y[-1] - y[0]), float(x[-1] - x[0])))
     for _look in range(2):
         across = np.where(u > 0, np.abs(np.sin(start)), np.abs(np.cos(start)))

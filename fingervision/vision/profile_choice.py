@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.beside_edge import without_additions
-from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
+from fingervision.vision.blur_uncertainty import Displacement, not_displaced
+from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
+from fingervision.vision.flank_fits import MODEL_LEAVES, MODEL_TIMES, Flank, FlankFits, best_fit
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.mean_profile import (
     BIN_PX,
@@ -26,20 +28,24 @@ from fingervision.vision.mean_profile import (
     mean_profile,
 )
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
-from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
+from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STEP, WALL, ProfileFit
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 from fingervision.vision.symmetric_spread import symmetric_squares
-from fingervision.vision.wall_width import WIDER, wall_limits_px
+from fingervision.vision.wall_width import (
+    WIDER,
+    are_outer_flanks_in_view,
+    is_surely_broader,
+    squared_blurs,
+    wall_limits_px,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
 # The flanks are looked at where a step leaves so many times the noise of the picture's flat parts.
 UNEXPLAINED = 1.2
-# A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
-# step does with half of that, or with so many times what the best model leaves. A wall improves it by so much in
-# chi-square.
-MODEL_LEAVES, MODEL_TIMES, STEP_TIMES, SIGNIFICANT = 4.0, 10.0, 3.0, 30.0
+# A wall improves what a step leaves by so much in chi-square.
+SIGNIFICANT = 30.0
 # One model is clearly better than another that leaves so much more chi-square, in units of what its own bins leave
 # (odds of e^8 to one).
 CLEARLY = 16.0
@@ -57,12 +63,8 @@ CUT_OFF_SIGMAS = 2.0
 # as a shadow makes. One of breadth w spreads a step by w / 2 at most: this one is broader than two pixels, and its own
 # edge may be the one that was found.
 ONE_SIDED, ONE_SIDED_PX, STRIP = 0.5, 1.2, "strip"
-# A model that leaves so many times what one may leave is none, however long it is fitted.
-HOPELESS_TIMES = 2.0
 # A wall or glare narrower than so many blurs cannot be told from the blur itself.
 RESOLVED_BLURS = 1.6
-# What a step takes for blur is partly what stands beside it: the search begins at this share of it as well.
-OWN_BLUR = 0.55
 # Motion spreads a fillet of this radius like a box and not like a Gaussian: the half-level moves by up to half of the
 # variance that it adds over the radius.
 MOTION_RADIUS_PX = 15.0
@@ -72,9 +74,14 @@ U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 
 
 def with_profile(
-    upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
+    upright: GreyImage,
+    edges: EdgePoints,
+    light: Floats,
+    top_level: int,
+    is_outline: bool = False,
+    displaced_px: Displacement = not_displaced,
 ) -> EdgePoints:
-    """Return the points moved to the finger's own edge, if a structure beside the edge has displaced the fitted step.
+    """Return the edge points moved to the finger's own edge, if a structure beside it displaced the fitted step.
 
     Parameters
     ----------
@@ -89,107 +96,112 @@ def with_profile(
     is_outline : bool
         Whether the edge of a thick part is that of its whole outline, side walls included, rather than that of its
         front face.
+    displaced_px : callable
+        Standard uncertainty of both flanks' positions by a codec (pixels), from the edges; called only where a width
+        is in question.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
-        return _unsure_of_width(edges)
+        return _unsure_of_width(edges, displaced_px)
     room = _room(edges)
     # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        return _unsure_of_width(edges)
+        return _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
         return sharp
     weight = 1.0 / edges.noise_flat**2
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
-    fits = [[_best(STEP, profile, weight, blur[k])] for k, profile in enumerate(inner) if profile]
-    bins = sum(profile.t.size for profile in inner if profile)
     profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
-    if sum(each[STEP].squares for each in fits) < 0.5 * MODEL_LEAVES * bins:
-        # A step explains both, whatever the others would: only how wide it is is still to be asked.
-        fits = [[each[STEP]] * 4 for each in fits]
-    else:
-        step = sum(each[STEP].squares for each in fits)
-        too_many = HOPELESS_TIMES * max(MODEL_LEAVES * bins, step / MODEL_TIMES)
-        for k, profile in enumerate(inner):
-            if profile:
-                fits[k] += [_best(kind, profile, weight, blur[k], too_many=too_many) for kind in (WALL, SHADOW, GLARE)]
-    left = np.array([[fit.squares for fit in each] for each in fits]).sum(axis=0)
-    enough = max(MODEL_LEAVES * bins, left[STEP] / MODEL_TIMES)
-    is_step = left[STEP] < max(0.5 * enough, STEP_TIMES * left.min())
-    shadow, wall, glare = ([each[kind] for each in fits] for kind in (SHADOW, WALL, GLARE))
+    fits = FlankFits(profiles)
+    bins, enough, steps = fits.bins, fits.enough, fits.of(STEP)
     all_around = np.hypot(1.0, edges.lines.slope)
-    margin = CLEARLY * np.maximum(left / bins, 1.0)
+    is_step = fits.is_step()
     # Optics of any shape that spread light alike to both sides (a disc of defocus, a halo) are no shadow and no glare.
-    is_lopsided = not is_step and not _is_symmetric(profiles, [each[STEP] for each in fits])
-    is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
-    if is_lopsided and is_shadow and _are_of_size(shadow, -1.0):
-        return _without_shadow(upright, edges, light, shadow, [_best(FADING, *seen) for seen in profiles], bins)
-    if is_lopsided and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
-        moved = _moved(edges, glare, U_GLARE, all_around, "glare")
-        return without_additions(upright, moved, light, GLARE, glare)
-    outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
+    is_lopsided = not is_step and not _is_symmetric(profiles, steps)
+    # What a model leaves, on both flanks together, and what another must leave more to be clearly worse.
+    left = np.array([fits.squares(kind) for kind in range(4)]) if not is_step else np.full(4, fits.squares(STEP))
+    margin = CLEARLY * np.maximum(left / bins, 1.0)
+    if is_lopsided:
+        shadow, glare = fits.of(SHADOW), fits.of(GLARE)
+        is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
+        if is_shadow and _are_of_size(shadow, -1.0):
+            return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
+        if left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
+            moved = _moved(edges, glare, U_GLARE, all_around, "glare")
+            return without_additions(upright, moved, light, GLARE, glare)
+    # Along the picture's border there are lines but no flank.
+    outer: list[MeanProfile | None] = [None, None]
+    if are_outer_flanks_in_view(edges):
+        outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
+        wall = fits.of(WALL)
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
         is_strip = [
-            each[STEP].squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * each[WALL].squares)
-            for each, (profile, _, _) in zip(fits, profiles, strict=True)
+            step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
+            for step, fit, (profile, _, _) in zip(steps, wall, profiles, strict=True)
         ]
         if is_strip[0] != is_strip[1]:
             return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
             # Flanks that are broader than the tips: by a wall, or by motion, and nothing here tells which.
             wall = [
-                _best(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
+                best_fit(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
                 for seen, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
             ]
             is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and _are_of_size(wall, -1.0)
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
         # A wall is there: the edge lies as far off as the fit says, give or take its own doubt.
         farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
-        return _unsure(edges, farthest, "wall") if is_wall else _unsure_of_width(edges)
+        unsure = _unsure_of_width(edges, displaced_px)
+        if not is_wall:
+            return unsure
+        # The shape of a wall that is narrower than the blur does not tell how dark it is: its width alone counts.
+        is_narrow = any(fit.breadth < RESOLVED_BLURS * fit.blur for fit in wall)
+        return _unsure(unsure if is_narrow else edges, farthest, "wall")
     if is_lopsided and left[SHADOW] < enough:
         # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
         beyond = np.array(
-            [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
+            [[best_fit(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
         )
         both = left[:3] + beyond.sum(axis=0)
         is_likelier = both[SHADOW] + margin[SHADOW] < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
         if is_likelier and _are_of_size(shadow, -1.0):
-            return _without_shadow(upright, edges, light, shadow, [_best(FADING, *seen) for seen in profiles], bins)
-    widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
+            return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
+    widths = [best_fit(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
     is_one_sided = [
-        each[STEP].blur ** 2 > width**2 + max(ONE_SIDED * width**2, ONE_SIDED_PX**2)
-        and each[STEP].squares > MODEL_LEAVES * profile.t.size
-        for each, width, profile in zip(fits, widths, inner, strict=True)
+        step.blur**2 > width**2 + max(ONE_SIDED * width**2, ONE_SIDED_PX**2)
+        and step.squares > MODEL_LEAVES * profile.t.size
+        for step, width, profile in zip(steps, widths, inner, strict=True)
         if profile
     ]
     if is_one_sided[0] != is_one_sided[1]:
         return replace(edges, beside=STRIP)
     # Light from one side casts a shadow beside one finger's inner flank and the other finger's outer one, and nothing
     # else does. Up to two pixels broad it only widens them: a strip of two equal steps by half of its breadth.
-    wider = [each[STEP].blur ** 2 - width**2 for each, width in zip(fits, widths, strict=True)]
-    if (
-        min(wider) < -ONE_SIDED * min(fits[0][STEP].blur, fits[1][STEP].blur) ** 2
-        and max(wider) > ONE_SIDED * min(widths) ** 2
-    ):
+    wider = [step.blur**2 - width**2 for step, width in zip(steps, widths, strict=True)]
+    if min(wider) < -ONE_SIDED * min(step.blur for step in steps) ** 2 and max(wider) > ONE_SIDED * min(widths) ** 2:
         return _unsure(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
-    if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
-        narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
+    if all(step.blur**2 > (1.0 + WIDER) * width**2 for step, width in zip(steps, widths, strict=True)):
+        narrow = [best_fit(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
         remains = sum(fit.squares for fit in narrow)
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
             chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
             return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
-    resolved = np.maximum(edges.blur_px, LEAST_RESOLVED_BLUR_PX)
-    flanks, tips = (resolved[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
-    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
-    if any(widened):
-        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
-    if not (is_step or is_lopsided) and left[GLARE] < enough and _are_of_size(glare, 1.0):
+    flanks, tips = squared_blurs(edges)
+    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
+    if np.any(widened):
+        widened *= is_surely_broader(edges, displaced_px)
+    if np.any(widened):
+        return _unsure(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
+    if is_step:
+        return edges
+    wall, glare = fits.of(WALL), fits.of(GLARE)
+    if not is_lopsided and left[GLARE] < enough and _are_of_size(glare, 1.0):
         if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of light hides in such optics, or none
             return _unsure(edges, [abs(fit.position) for fit in glare], "glare")
         return edges
@@ -246,7 +258,7 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
     return replace(moved, marks=_stated(moved, u_px), beside="sharpening")
 
 
-def _is_symmetric(flanks: list[tuple[MeanProfile, float, float]], steps: list[ProfileFit]) -> bool:
+def _is_symmetric(flanks: list[Flank], steps: list[ProfileFit]) -> bool:
     """Whether the profiles of both flanks could be caused by optics that spread light symmetrically."""
     squares = left = 0.0
     for (profile, weight, blur), step in zip(flanks, steps, strict=True):
@@ -264,36 +276,15 @@ def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
 
 
 def _room(edges: EdgePoints) -> int:
-    """Largest length of a window that does not reach the other finger (pixels)."""
+    """Largest length (px) of a fit window that does not reach the other finger."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
     if not (real[0].size and real[1].size):
         return 0
     return int(min(REACH_PX, 0.5 * (real[1].min() - real[0].max())))
 
 
-def _best(
-    kind: int,
-    profile: MeanProfile,
-    weight: float,
-    blur: float,
-    is_blur_known: bool = False,
-    too_many: float = np.inf,
-) -> ProfileFit:
-    """The best fit of a model from all starting values."""
-    weights = profile.count * weight
-    blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
-    return min(
-        (
-            fit_profile(kind, profile.t, profile.light, weights, own, start, is_blur_known, too_many)
-            for own in blurs
-            for start in STARTS_PX[kind]
-        ),
-        key=lambda fit: fit.squares,
-    )
-
-
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement of the inner edge across the picture, for a side wall."""
+    """Movement along every line per pixel of movement of the inner edge across the picture, due to a side wall."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
@@ -320,18 +311,18 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
 
 
 def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Leave the edges in place, with an uncertainty up to the limit, because the cause is not decided."""
+    """Leave the edges in place, with an uncertainty for the possible displacement, because its cause is undecided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
-def _unsure_of_width(edges: EdgePoints) -> EdgePoints:
+def _unsure_of_width(edges: EdgePoints, displaced_px: Displacement) -> EdgePoints:
     """State how far a wall may have moved the edges where nothing but their width says that there is one."""
-    limits = wall_limits_px(edges)
+    limits = wall_limits_px(edges, displaced_px)
     return edges if limits is None else _unsure(edges, limits, "wall")
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Marks with the given uncertainties, one for each finger."""
+    """Edge marks with the given uncertainties, one for each finger."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right

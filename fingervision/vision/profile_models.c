@@ -25,49 +25,129 @@ static double addition(int64_t kind, double t, double blur, double breadth) {
     return beside(kind, t, blur, breadth, step, density);
 }
 
-/* Level, step, tail and addition at one place. */
-static void parts_at(int64_t kind, double t, const double *p, double *row) {
-    double away = t - p[POSITION], blur = p[BLUR], density, other, step = normal(away / blur, &density);
-    row[0] = 1.0;
-    row[1] = step;
-    row[2] = normal(away / (TAIL_BLURS * blur), &other) - step;
-    row[3] = beside(kind, away, blur, p[BREADTH], step, density);
-}
-
 typedef struct {
     int64_t kind, n;
     const double *t, *value, *weight;
-    double *rows; /* room for n times LINEAR */
 } Seen;
 
-/* Weighted squares with the linear parameters at their best, which are put into `p`; the model goes to `model` if any.
-   Negative where the linear parameters cannot be told apart. */
-static double squares_of(const Seen *s, double *p, double *model) {
-    int count = s->kind != STEP ? LINEAR : LINEAR - 1;
-    double gram[LINEAR * LINEAR] = {0.0}, right[LINEAR] = {0.0}, total = 0.0;
+/* The model's parts at every place, and the sums of their products that do not know the breadth. */
+typedef struct {
+    double *step, *density, *tail, *addition, *model;
+    double gram[LINEAR * LINEAR], right[LINEAR];
+} Parts;
+
+/* Room for the parts of `n` places: PARTS times as many numbers. */
+enum { PARTS = 5 };
+static Parts parts_in(double *room, int64_t n) {
+    Parts parts = {room, room + n, room + 2 * n, room + 3 * n, room + 4 * n, {0.0}, {0.0}};
+    return parts;
+}
+
+/* The step, its density, and the tail: they do not know the breadth of what stands beside them. */
+static void put_steps(const Seen *s, const double *p, Parts *to) {
+    double blur = p[BLUR], other;
     for (int64_t i = 0; i < s->n; i++) {
-        double *row = s->rows + i * LINEAR;
-        parts_at(s->kind, s->t[i], p, row);
-        for (int a = 0; a < count; a++) {
-            double weighted = s->weight[i] * row[a];
-            right[a] += weighted * s->value[i];
-            for (int b = 0; b <= a; b++) gram[a * count + b] += weighted * row[b];
-        }
+        double away = s->t[i] - p[POSITION], step = normal(away / blur, &to->density[i]);
+        to->step[i] = step;
+        to->tail[i] = normal(away / (TAIL_BLURS * blur), &other) - step;
     }
-    for (int a = 0; a < count; a++)
-        for (int b = 0; b < a; b++) gram[b * count + a] = gram[a * count + b];
+}
+
+static inline void put_additions_of(int64_t kind, const Seen *s, const double *p, const Parts *steps, double *addition) {
+    for (int64_t i = 0; i < s->n; i++)
+        addition[i] = beside(kind, s->t[i] - p[POSITION], p[BLUR], p[BREADTH], steps->step[i], steps->density[i]);
+}
+
+/* The addition, with a loop for every kind that the compiler need not ask in. */
+static void put_additions(const Seen *s, const double *p, const Parts *steps, double *addition) {
+    if (s->kind == WALL) put_additions_of(WALL, s, p, steps, addition);
+    else if (s->kind == SHADOW) put_additions_of(SHADOW, s, p, steps, addition);
+    else if (s->kind == GLARE) put_additions_of(GLARE, s, p, steps, addition);
+    else if (s->kind == FADING) put_additions_of(FADING, s, p, steps, addition);
+}
+
+/* Sums of weighted products of level, step and tail with one another and with the light. */
+static void sum_steps(const Seen *s, Parts *to) {
+    double g00 = 0.0, g10 = 0.0, g11 = 0.0, g20 = 0.0, g21 = 0.0, g22 = 0.0, r0 = 0.0, r1 = 0.0, r2 = 0.0;
+    for (int64_t i = 0; i < s->n; i++) {
+        double weight = s->weight[i], value = s->value[i], step = to->step[i], tail = to->tail[i];
+        double by_step = weight * step, by_tail = weight * tail;
+        g00 += weight;
+        g10 += by_step;
+        g11 += by_step * step;
+        g20 += by_tail;
+        g21 += by_tail * step;
+        g22 += by_tail * tail;
+        r0 += weight * value;
+        r1 += by_step * value;
+        r2 += by_tail * value;
+    }
+    double gram[] = {g00, g10, g20, 0.0, g10, g11, g21, 0.0, g20, g21, g22, 0.0, 0.0, 0.0, 0.0, 0.0}, right[] = {r0, r1, r2, 0.0};
+    memcpy(to->gram, gram, sizeof gram);
+    memcpy(to->right, right, sizeof right);
+}
+
+/* Weighted squares with the linear parameters at their best, which are put into `p`; the model goes to `model`. Negative
+   where the linear parameters cannot be told apart. */
+static double squares_with(const Seen *s, double *p, const Parts *parts, const double *addition, double *model) {
+    int count = s->kind != STEP ? LINEAR : LINEAR - 1;
+    double gram[LINEAR * LINEAR], right[LINEAR], total = 0.0;
+    for (int a = 0; a < count; a++) {
+        right[a] = parts->right[a];
+        for (int b = 0; b < count; b++) gram[a * count + b] = parts->gram[a * LINEAR + b];
+    }
+    if (count == LINEAR) {
+        double g0 = 0.0, g1 = 0.0, g2 = 0.0, g3 = 0.0, r = 0.0;
+        for (int64_t i = 0; i < s->n; i++) {
+            double weighted = s->weight[i] * addition[i];
+            g0 += weighted;
+            g1 += weighted * parts->step[i];
+            g2 += weighted * parts->tail[i];
+            g3 += weighted * addition[i];
+            r += weighted * s->value[i];
+        }
+        gram[12] = gram[3] = g0;
+        gram[13] = gram[7] = g1;
+        gram[14] = gram[11] = g2;
+        gram[15] = g3;
+        right[3] = r;
+    }
     for (int a = 0; a < count; a++) gram[a * count + a] *= 1.0 + 1e-9;
     /* The tail is small: a weak pull to nothing keeps it from standing in for a wall. */
     gram[2 * count + 2] += 0.05 * gram[1 * count + 1];
     if (!solve(gram, count, right, 1)) return -1.0;
     for (int a = 0; a < LINEAR; a++) p[a] = a < count ? right[a] : 0.0;
-    for (int64_t i = 0; i < s->n; i++) {
-        double found = 0.0;
-        for (int a = 0; a < LINEAR; a++) found += p[a] * s->rows[i * LINEAR + a];
-        total += s->weight[i] * square(s->value[i] - found);
-        if (model) model[i] = found;
-    }
+    if (count == LINEAR)
+        for (int64_t i = 0; i < s->n; i++) model[i] = p[0] + p[1] * parts->step[i] + p[2] * parts->tail[i] + p[3] * addition[i];
+    else
+        for (int64_t i = 0; i < s->n; i++) model[i] = p[0] + p[1] * parts->step[i] + p[2] * parts->tail[i];
+    for (int64_t i = 0; i < s->n; i++) total += s->weight[i] * square(s->value[i] - model[i]);
     return total;
+}
+
+/* The same with all parts found anew, which go to `to` with the model. */
+static double squares_of(const Seen *s, double *p, Parts *to) {
+    put_steps(s, p, to);
+    put_additions(s, p, to, to->addition);
+    sum_steps(s, to);
+    return squares_with(s, p, to, to->addition, to->model);
+}
+
+/* Weighted products of the derivatives with one another and with what the model leaves: all sums in one pass. */
+static inline void put_normal_equations(
+    int count, const Seen *s, const double *jacobian, const double *model, double *matrix, double *right
+) {
+    double sums[9] = {0.0}, ends[3] = {0.0};
+    for (int64_t i = 0; i < s->n; i++) {
+        double left = s->value[i] - model[i];
+        for (int a = 0; a < count; a++) {
+            double weighted = s->weight[i] * jacobian[a * s->n + i];
+            ends[a] += weighted * left;
+            for (int b = 0; b < count; b++) sums[a * 3 + b] += weighted * jacobian[b * s->n + i];
+        }
+    }
+    memcpy(matrix, sums, sizeof sums);
+    memcpy(right, ends, sizeof ends);
 }
 
 /* Fit one model to a mean profile (Levenberg and Marquardt over position, blur and breadth): kind, t, value, weight, blur,
@@ -76,8 +156,9 @@ LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
     int64_t n = in[1].n, kind = in[0].i;
     int free_count = kind != STEP ? 3 : 2, is_blur_known = (int)in[6].i;
     double p[PARAMETERS] = {0.0}, matrix[9] = {0.0}, right[3] = {0.0}, damping = 1e-2;
-    double *base = floats(n * (1 + 1 + 3 + LINEAR)), *other = base + n, *jacobian = base + 2 * n;
-    Seen s = {kind, n, FLOATS(1), FLOATS(2), FLOATS(3), base + 5 * n};
+    double *kept = floats(n * (2 * PARTS + 1 + 3)), *addition = kept + 2 * PARTS * n, *jacobian = addition + n;
+    Parts two[2] = {parts_in(kept, n), parts_in(kept + PARTS * n, n)}, *base = &two[0], *other = &two[1];
+    Seen s = {kind, n, FLOATS(1), FLOATS(2), FLOATS(3)};
     p[BLUR] = in[4].d;
     p[BREADTH] = in[5].d;
     if (kind == WALL) p[POSITION] = -0.5 * in[5].d;
@@ -93,18 +174,14 @@ LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
             }
             memcpy(moved, p, sizeof moved);
             moved[POSITION + a] += 1e-4;
-            if (squares_of(&s, moved, other) < 0.0) goto done;
-            for (int64_t i = 0; i < n; i++) jacobian[a * n + i] = (other[i] - base[i]) / 1e-4;
+            if (POSITION + a == BREADTH) { /* step and tail stay */
+                put_additions(&s, moved, base, addition);
+                if (squares_with(&s, moved, base, addition, other->model) < 0.0) goto done;
+            } else if (squares_of(&s, moved, other) < 0.0) goto done;
+            for (int64_t i = 0; i < n; i++) jacobian[a * n + i] = (other->model[i] - base->model[i]) / 1e-4;
         }
-        for (int a = 0; a < free_count; a++) {
-            right[a] = 0.0;
-            for (int64_t i = 0; i < n; i++) right[a] += s.weight[i] * jacobian[a * n + i] * (s.value[i] - base[i]);
-            for (int b = 0; b < free_count; b++) {
-                double total = 0.0;
-                for (int64_t i = 0; i < n; i++) total += s.weight[i] * jacobian[a * n + i] * jacobian[b * n + i];
-                matrix[a * 3 + b] = total;
-            }
-        }
+        if (free_count == 3) put_normal_equations(3, &s, jacobian, base->model, matrix, right);
+        else put_normal_equations(2, &s, jacobian, base->model, matrix, right);
         if (is_blur_known) {
             for (int a = 0; a < free_count; a++) matrix[3 + a] = matrix[a * 3 + 1] = 0.0;
             matrix[4] = 1.0;
@@ -140,7 +217,9 @@ LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
                 has_moved = best - squares > (squares > in[9].d ? SLOW : SETTLED) * best;
                 best = squares;
                 memcpy(p, new, sizeof p);
-                memcpy(base, other, (size_t)n * sizeof(double));
+                Parts *better = other;
+                other = base;
+                base = better;
                 damping = larger(0.3 * damping, 1e-6);
                 break;
             }
@@ -165,7 +244,7 @@ LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
     out[5].d = share;
     out[6].d = p[BLUR];
 done:
-    free(base);
+    free(kept);
 }
 
 LOOP(profile_models_addition, "iddd", "d") { out[0].d = addition(in[0].i, in[1].d, in[2].d, in[3].d); }

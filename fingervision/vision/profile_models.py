@@ -1,7 +1,7 @@
 """Models of the mean profile across a flank, each fitted by least squares.
 
-A finger's edge is a step of light, blurred by the optics. Beside it there may be a second step (the side wall of a
-thick part, between the finger's face and the background), a ramp (a soft shadow on the background) or a bright line
+A finger's edge is a step of light, blurred by the optics. Beside the edge there may be a second step (the side wall of
+a thick part, between the finger's face and the background), a ramp (a soft shadow on the background) or a bright line
 (glare along the edge, on the finger). Each of these structures displaces a fitted single step towards itself.
 """
 

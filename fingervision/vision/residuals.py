@@ -49,7 +49,7 @@ _distance_in_spacings = loop("residuals_distance_in_spacings")
 
 
 def spread(end: FingerEnd) -> float:
-    """Ratio of the residuals' variance to the variances stated for the points."""
+    """Ratio of the residuals' variance to the variances that were stated for the points."""
     free = max(float(end.robust.sum()) - PARAMETERS, 1.0)
     return max(float(end.robust @ end.residual**2) / free / BIWEIGHT_SPREAD, 0.5)
 
@@ -57,7 +57,7 @@ def spread(end: FingerEnd) -> float:
 def shared_points(
     points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd], coding: Coding
 ) -> float:
-    """Number of neighbouring points with a common error, the same for both fingers.
+    """Number of neighbouring points that share an error; it is the same for both fingers.
 
     The error that a codec causes in a whole block is absorbed by the fitted shape and does not appear in the residuals;
     therefore the block's size is used for coded pictures.

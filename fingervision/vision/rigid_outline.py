@@ -49,9 +49,9 @@ class RigidFit:
         Standard deviation of the edges' blur.
     by_outward, by_scale : ndarray of float, shape (3,)
         Change of x, y and the angle per 1 px of outward shift of all edges, and per unit of relative error of the
-        body's size. These errors are common to all frames and not included in the covariance.
+        body's size. These errors are the same in all frames and not included in the covariance.
     by_shadows : ndarray of float, shape (3, 3)
-        Covariance of x, y and the angle due to possible shadows along some sides; common to all frames too.
+        Covariance of x, y and the angle due to possible shadows along some sides; the same in all frames.
     size_error, u_size_error : float
         Relative excess of the body's size in the picture over the drawing, after a common shift of all edges was
         fitted; and its standard uncertainty, infinite if the edges do not determine it.
@@ -164,7 +164,7 @@ def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
 
 @dataclass(frozen=True, slots=True)
 class _Halved:
-    """The map to the undistorted plane, for a picture that was halved."""
+    """The map to the undistorted plane for a halved picture."""
 
     whole: FlatMap
     scale: float
@@ -180,7 +180,7 @@ class _Halved:
 def _rigid(
     chunks: Chunks, edges: ChunkEdges, about: Array, view: EdgeView
 ) -> tuple[Array, Array, Array, Array, tuple[float, float]] | None:
-    """Small rigid motion from the chunks' offsets, with its covariance, effects of common errors, and the size error.
+    """Small rigid motion from the chunks' offsets, with its covariance, effects of shared errors, and the size error.
 
     Return the motion; its covariance; the sensitivities of the three pose parameters to a common edge shift and to a
     relative size error, shape (3, 2); the covariance due to possible shadows at the edges, shape (3, 3); and the size

@@ -1,9 +1,9 @@
 """Corner of a rough finger: a fillet or a straight cut, which roughness may hide from each other.
 
-A fillet of radius R and a cut whose legs are 0.655 R take the same area off a corner and nowhere differ by more than
-0.06 R. Where roughness hides that, the measuring point is the mean over both shapes, each weighted by its likelihood
-(Bayesian model averaging: Hoeting et al., Statistical Science 14, 1999, 382, doi:10.1214/ss/1009212519); the variance
-between the two shapes is part of its uncertainty.
+A fillet of radius R and a straight cut whose legs are 0.655 R remove the same area from a corner, and nowhere differ by
+more than 0.06 R. If roughness hides this difference, the measuring point is the mean over both shapes, each weighted by
+its likelihood (Bayesian model averaging: Hoeting et al., Statistical Science 14, 1999, 382, doi:10.1214/ss/1009212519);
+the variance between the two shapes is part of its uncertainty.
 """
 
 from dataclasses import replace
@@ -84,7 +84,7 @@ def with_corner_doubt(
 def _cut(
     points: OutlinePoints, end: FingerEnd, leg: float, below_tip_px: float, shared_px: float
 ) -> tuple[float, float, float] | None:
-    """Chi-square of cut corners less that of the fillets, and the tip and edge of the cut finger; None without any."""
+    """Chi-square of cut corners minus that of fillets, and tip and edge of the cut finger; None if not cut."""
     p, (x0, y0) = end.parameters, end.origin
     if p[INNER_R] < SMALLEST_PX:
         return None

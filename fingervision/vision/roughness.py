@@ -60,12 +60,12 @@ class Roughness:
 
     @property
     def shared_px(self) -> float:
-        """Length of edge that counts as one independent point: the integral of the correlation (pixels)."""
+        """Length of edge (px) that counts as one independent point: the integral of the correlation."""
         return float((2.0 * self.covariance.sum() - self.covariance[0]) / self.covariance[0])
 
 
 def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd]) -> Roughness | None:
-    """Estimate the roughness from the flanks of both fingers; None if they show none.
+    """Estimate the roughness from the flanks of both fingers; None if the flanks show no roughness.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def with_roughness(points: OutlinePoints, found: Roughness) -> OutlinePoints:
 def shared_along(
     points: OutlinePoints, end: FingerEnd, u_prior: Floats, bare: OutlinePoints, found: Roughness
 ) -> FingerEnd:
-    """The fitted end, with the covariance that follows from points with deviations correlated along the edge.
+    """The fitted finger end, with the covariance that follows from deviations correlated along the edge.
 
     Parameters
     ----------

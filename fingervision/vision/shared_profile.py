@@ -97,7 +97,7 @@ def flanks(upright: GreyImage, edges: EdgePoints, light: Floats) -> list[Flank]:
 def shared_shift_px(found: list[Flank]) -> float:
     """Standard uncertainty of one flank's position from its rows' significant mean residual (pixels).
 
-    It is 0 if no mean residual is significant.
+    The result is 0 if no mean residual is significant.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def shared_shift_px(found: list[Flank]) -> float:
 def even_shift_px(found: list[Flank]) -> float:
     """Standard uncertainty of a flank's position from the even part of its mean residual profile only (pixels).
 
-    It is 0 if noise explains the profile.
+    The result is 0 if noise explains the profile.
 
     Parameters
     ----------
@@ -135,7 +135,8 @@ def _whole(flank: Flank) -> float:
 def _even(flank: Flank) -> float:
     """Variance of each pixel's mean over the rows, from the residuals of the profile's symmetric (even) part.
 
-    A linear decrease of light over the window on both sides of the edge is not part of the edge, and is excluded too.
+    A linear decrease of light over the window on both sides of the edge is not part of the edge, and is excluded as
+    well.
     """
     half = 0.5 * flank.mean.size
     away = np.arange(flank.mean.size) + 0.5 - half - flank.offset_px

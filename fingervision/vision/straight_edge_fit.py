@@ -52,7 +52,7 @@ _edges = loop("straight_edge_fit_edges")
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Band in which the edges are searched, with axes t (across the edges) and s (along them) from a centre.
+    """Band of pixels in which the edges are searched, with axes t (across the edges) and s (along them) from a centre.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class EdgeStart:
-    """Initial estimate of one edge.
+    """Initial estimate of one straight edge.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class EdgeStart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightEdges:
-    """Edges fitted jointly; k is their number.
+    """Straight edges fitted jointly; k is the number of edges.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class NoEdgeFitError(ValueError):
 
 
 def reach_px(blur_px: float) -> float:
-    """Half-width of the band needed for an edge of this blur (pixels)."""
+    """Half-width (px) of the band that is needed for an edge of a given blur."""
     return REACH_SIGMAS * float(np.hypot(blur_px, ROUNDING**0.5)) + REACH_EXTRA_PX
 
 
@@ -188,7 +188,7 @@ def fit_straight_edges(
     blur_px : float
         Initial estimate of the blur.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
     cut_off : int
         +1 if the lighter plateau of the first edge lies at the end of the scale, -1 if the darker one does: the clipped
         part of the step is then estimated too. 0 otherwise.

@@ -82,7 +82,7 @@ def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
 
 
 def _joined(runs: list[Ints], terms: Floats, noise: float) -> list[Ints]:
-    """Join runs that lie on one straight line: the points left out between them were dust."""
+    """Join runs that lie on one straight line: the omitted points between them were dust."""
     joined: list[Ints] = []
     for run in runs:
         if joined:

@@ -30,7 +30,7 @@ CLOSING_SLOPE, NOTCH_SIGMAS = 0.1, 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StripeEdges:
-    """Left and right edge of a narrow gap (a stripe) in every row; arrays of shape (n,).
+    """Left and right edge of a narrow gap (a bright stripe) in every row; arrays of shape (n,).
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class StripeEdges:
     u_noise : ndarray of float
         Standard uncertainty of each edge from the noise of its own row.
     u_shared : ndarray of float
-        Standard uncertainty of each edge due to the contrast, which is common to all rows.
+        Standard uncertainty of each edge due to the contrast, which is the same in all rows.
     """
 
     left: Floats

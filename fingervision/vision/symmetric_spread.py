@@ -1,7 +1,7 @@
 """Fit of an edge with any symmetric blur: the part of a mean profile that no such blur explains.
 
 Defocus, motion or a halo blurs a step of light into a profile that is antisymmetric (odd) about the edge, whatever the
-shape of the blur. Glare and shadow do not: their profiles have a symmetric (even) part.
+shape of the blur. Glare and shadow have profiles with a symmetric (even) part.
 """
 
 import numpy as np

@@ -3,7 +3,7 @@
 The picture is compared with its reflection through a point, `I(c + x) - I(c - x)`; the centre is the point with the
 least sum of squares (Gauss-Newton). Only the symmetry is assumed, not the mark's size, blur or tone. The variance is
 that of a fit with known shape of the mark, `sigma^2 (sum g g')^-1`, the Cramer-Rao bound: the gradient of the
-difference is doubled, and the variance of its noise is doubled too. A plane of light is subtracted.
+difference is doubled, and the variance of its noise is doubled too. A linear gradient of light is subtracted.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.patch_registration import LEAST_INFORMATION, MARGIN_PX, ROUNDING
+from fingervision.vision.patch_covariance import LEAST_INFORMATION, ROUNDING
+from fingervision.vision.patch_reference import MARGIN_PX
 from fingervision.vision.spline_interpolation import coefficients, interpolated_power, sampled
 
 Floats = NDArray[np.float32]
@@ -69,7 +70,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
     half_px : int
         Half width of the window.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
 
     Raises
     ------

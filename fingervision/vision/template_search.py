@@ -24,7 +24,7 @@ _best = loop("template_search_best")
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """The best match of a template.
+    """The best match of a template in a picture.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Match:
 
 
 class Template:
-    """A template, prepared for repeated searches.
+    """A picture of an object, prepared for repeated searches.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def chance_correlation(template: Floats) -> float:
 def high_pass_noise(levels: Floats) -> float:
     """Standard deviation of white noise, from a high-pass filter (a second difference along each axis).
 
-    Immerkaer, Computer Vision and Image Understanding 64(2), 1996, doi:10.1006/cviu.1996.0060.
+    Source: Immerkaer, Computer Vision and Image Understanding 64(2), 1996, doi:10.1006/cviu.1996.0060.
     """
     inner = levels.astype(np.float64)
     across = inner[:, :-2] - 2.0 * inner[:, 1:-1] + inner[:, 2:]

@@ -36,7 +36,7 @@ _strips = loop("third_tone_strips")
 
 
 def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
-    """Threshold that puts a strip of a third tone into its right class; None if no strip is in the wrong class.
+    """Threshold that puts a strip of a third tone into the right class; None if no strip is in the wrong class.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
 
 
 def _room(edges: EdgePoints) -> int:
-    """Half of the distance between the inner edges (pixels)."""
+    """Half of the distance between the fingers' inner edges (pixels)."""
     inner = [edges.position[j, :INNER][edges.lines.weight[j, :INNER] > 0] for j in range(2)]
     if min(inner[0].size, inner[1].size) == 0:
         return 0

@@ -51,7 +51,7 @@ class Top:
 
 
 def find_tops(mask: NDArray[np.uint8], outlines: Outlines, orientation: Orientation) -> list[Top]:
-    """The local maxima of all outlines with the largest prominence, in falling order, at most `MOST_TOPS`."""
+    """Find the local maxima of all outlines with the largest prominence, in falling order, at most `MOST_TOPS`."""
     outline, index, prominence = np.empty((3, MOST_TOPS), dtype=np.int64)
     is_rooted = np.empty(MOST_TOPS, dtype=np.bool_)
     way = (orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)

@@ -1,52 +1,89 @@
 """Displacement of an edge that a side wall may have caused, by the width of the flanks alone.
 
 A wall of breadth w whose light is a share s of the step's adds s (1 - s) w^2 to the variance of the flank's spread, and
-puts a single fitted step (1 - s) w beyond the finger's own edge. Where the wall is narrower than the blur, or the flank
-too curved for a mean profile, only this added variance shows it. The outer flanks would tell a wall from motion; where
-they are out of view, the tips are all there is to compare with.
+puts a single fitted step (1 - s) w beyond the finger's own edge. If the wall is narrower than the blur, or the flank
+too curved for a mean profile, only this added variance indicates the wall. The outer flanks would distinguish a wall
+from motion; if they are out of view, the flanks can be compared only with the tips.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fingervision.vision.blur_uncertainty import Displacement, u_squared_blur
 from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.mean_profile import FEWEST_ROWS
 from fingervision.vision.profile_lines import INNER, ROWS
 
+Floats = NDArray[np.float64]
+
 # The inner flank is wider than the outer one, or than the tip, where its variance is larger by this share.
 WIDER = 0.15
 # The same for the flanks of both fingers together, whose noise is less: walls of 1 px add as much.
 BOTH_WIDER = 0.08
+# It is broader by at least so many standard uncertainties as well. 3 in 1000 normal differences are larger; a codec
+# widens a flank now and then by 20 % at the steps of ordinary streams, and no wall is there.
+SURE = 3.0
 # A wall that nothing shows but the flank's width has at least this share of the step's light: darker ones are resolved.
 DARKEST_WALL = 0.2
 # An outer flank has at least this share of the inner one's contrast; along the picture's border there is no step.
 EDGE_SHARE = 0.3
 
 
-def wall_limits_px(edges: EdgePoints) -> list[float] | None:
+def wall_limits_px(edges: EdgePoints, displaced_px: Displacement) -> list[float] | None:
     """Largest displacement of each inner edge by a side wall; None where the flanks are as sharp as the tips.
 
-    None as well where the outer flanks are in view, because these tell a wall from motion.
+    The result is also None if the outer flanks are in view, because these distinguish a wall from motion.
 
     Parameters
     ----------
     edges : EdgePoints
         Steps that were fitted to every line.
+    displaced_px : callable
+        Standard uncertainty of both flanks' positions by a codec (pixels), from the edges.
 
     Returns
     -------
     list of float or None
         Of the left and of the right finger (pixels).
     """
+    if are_outer_flanks_in_view(edges) or not np.any(edges.lines.weight[:, :INNER] > 0):
+        return None
+    flanks, tips = squared_blurs(edges)
+    more = flanks - tips
+    is_both = more.sum() > BOTH_WIDER * tips.sum()
+    is_one = more > WIDER * tips
+    if not (is_both or np.any(is_one)):
+        return None
+    u_more = _u_excess(edges, displaced_px)
+    if not (is_both and more.sum() > SURE * float(np.hypot(*u_more))) and not np.any(is_one & (more > SURE * u_more)):
+        return None
+    limits: list[float] = np.sqrt((1.0 - DARKEST_WALL) / DARKEST_WALL * np.maximum(more, 0.0)).tolist()
+    return limits
+
+
+def are_outer_flanks_in_view(edges: EdgePoints) -> bool:
+    """Whether both fingers' outer flanks can be compared with the inner ones; the picture's border is not a flank."""
     size, is_real = np.abs(edges.contrast), edges.lines.weight > 0
     inner = size[:, :INNER][is_real[:, :INNER]]
     if not inner.size:
-        return None
+        return False
     is_in_view = is_real[:, INNER:ROWS] & (size[:, INNER:ROWS] > EDGE_SHARE * np.median(inner))
-    if np.count_nonzero(is_in_view, axis=1).min() >= FEWEST_ROWS:
-        return None
+    return int(np.count_nonzero(is_in_view, axis=1).min()) >= FEWEST_ROWS
+
+
+def squared_blurs(edges: EdgePoints) -> tuple[Floats, Floats]:
+    """Squared spread of inner flanks and tips of both fingers, pixel width included (px^2)."""
     flanks, tips = (np.maximum(edges.blur_px[:, part], LEAST_RESOLVED_BLUR_PX) ** 2 + PIXEL_VARIANCE for part in (0, 1))
-    if flanks.sum() < (1.0 + BOTH_WIDER) * tips.sum() and not np.any(flanks > (1.0 + WIDER) * tips):
-        return None
-    limits: list[float] = np.sqrt((1.0 - DARKEST_WALL) / DARKEST_WALL * np.maximum(flanks - tips, 0.0)).tolist()
-    return limits
+    return flanks, tips
+
+
+def is_surely_broader(edges: EdgePoints, displaced_px: Displacement) -> NDArray[np.bool_]:
+    """Whether each finger's inner flank is broader than its tip by more than noise and codec explain, shape (2,)."""
+    flanks, tips = squared_blurs(edges)
+    return np.asarray(flanks - tips > SURE * _u_excess(edges, displaced_px))
+
+
+def _u_excess(edges: EdgePoints, displaced_px: Displacement) -> Floats:
+    """Standard uncertainty of the excess of each flank's squared spread over its tip's, shape (2,) (pixels squared)."""
+    return np.asarray(np.hypot(*u_squared_blur(edges, displaced_px(edges)).T))

@@ -24,6 +24,6 @@ def is_free(mask: NDArray[np.uint8], start: Place, end: Place) -> bool:
 
 
 def inner_crossing(outline: Outline, height: float) -> tuple[float, float]:
-    """Position (across, along) at which a finger's outline, followed from its inner side, rises past a height."""
+    """Position (across, along) at which a finger's outline, followed from its inner side, first exceeds a height."""
     across, along = _inner_crossing(outline, height)
     return across, along

@@ -18,7 +18,7 @@ from bluesky.protocols import Flyable, Movable, Readable, Stoppable, Triggerable
 from fingervision.adapters.bluesky import Devices, devices
 from fingervision.adapters.bluesky_agent import NextRunAgent, run_steps
 from fingervision.adapters.thread_status import ThreadStatus
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, LimitError, StateError
 from fingervision.tables.read import read_model
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.simulation.injected_effects import Hidden
@@ -130,13 +130,13 @@ def test_a_stop_ends_a_motion(made: Devices) -> None:
 
 def test_beyond_the_limits_nothing_moves(made: Devices) -> None:
     before = made.stage.read()["stage"]["value"]
-    with pytest.raises(FingervisionError, match="nothing was moved"):
+    with pytest.raises(LimitError, match="nothing was moved"):
         made.stage.set(100.0)
-    with pytest.raises(FingervisionError, match="prepared"):
+    with pytest.raises(StateError, match="prepared"):
         made.stage.kickoff()
     assert made.stage.read()["stage"]["value"] == before
     assert made.gap is not None
-    with pytest.raises(FingervisionError, match="triggered"):
+    with pytest.raises(StateError, match="triggered"):
         made.gap.read()
 
 
@@ -165,8 +165,8 @@ def test_a_status_tells_its_failure_and_calls_back_once() -> None:
 def test_rows_without_an_input_and_strange_steps_are_refused(made: Devices, engine: RunEngine, tmp_path: Path) -> None:
     table = tmp_path / "s.csv"
     table.write_text("input_mm,gap_mm\n0,4\n1,11.7\n", encoding="utf-8")
-    with pytest.raises(FingervisionError, match="input_mm"):
+    with pytest.raises(DataError, match="input_mm"):
         NextRunAgent(read_model(table)).ingest([{"gap_mm": 1.0}])
     assert made.gap is not None
-    with pytest.raises(FingervisionError, match="pirouette"):
+    with pytest.raises(DataError, match="pirouette"):
         list(run_steps([{"kind": "pirouette"}], made.stage, made.gap))

@@ -11,7 +11,7 @@ from pymeasure.instruments.newport import ESP300
 from pymeasure.instruments.newport.esp300 import Axis
 from pymeasure.test import expected_protocol
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, DeviceError
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.actuators.esp300 import Esp300Stage
 from fingervision.testbed.bed import Bed
@@ -46,7 +46,7 @@ def test_an_error_of_the_controller_is_a_sentence_and_an_alarm() -> None:
     talk = [*OPENED, ("1MD?", "1"), ("1VA1", None), ("1PA7", None), ("TE?", "113"), ("TE?", "0")]
     with expected_protocol(ESP300, talk) as controller:
         opened = stage(controller)
-        with pytest.raises(FingervisionError, match="motor not enabled"):
+        with pytest.raises(DeviceError, match="motor not enabled"):
             opened.move(7.0, 1.0)
         assert opened.alarm is not None
         assert opened.alarm.code == "13"
@@ -55,7 +55,7 @@ def test_an_error_of_the_controller_is_a_sentence_and_an_alarm() -> None:
 def test_an_axis_in_other_units_is_refused() -> None:
     with (
         expected_protocol(ESP300, [("1SN?", "3")]) as controller,
-        pytest.raises(FingervisionError, match="micrometer"),
+        pytest.raises(DeviceError, match="micrometer"),
     ):
         stage(controller)
 
@@ -76,5 +76,5 @@ def test_a_port_that_is_none_is_said_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "bed.toml"
     keys = 'kind = "esp300"\nport = "ASRL/dev/nothing::INSTR"\nlower_mm = 0\nupper_mm = 5\nspeed_mm_s = 1\n'
     path.write_text(f"schema = 1\n[actuator]\n{keys}", encoding="utf-8")
-    with pytest.raises(FingervisionError, match=r"port in line 4 .*nothing"):
+    with pytest.raises(DataError, match=r"port in line 4 .*nothing"):
         open_bed(str(path))

@@ -206,12 +206,12 @@ def test_an_output_folder_of_something_else_is_left_alone(run: Run, copy: Path) 
     Path("mine/thesis.txt").write_text("years of work", encoding="utf-8")
     code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "mine")
     assert code == 1
-    assert "--out must be a new folder or one of an earlier batch, but mine holds something else (thesis.txt)" in err
+    assert "--out must be a new folder or that of an earlier batch, but mine contains other files (thesis.txt)" in err
     assert [path.name for path in Path("mine").iterdir()] == ["thesis.txt"]
     code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "mine/thesis.txt")
     assert (code, "is a file: name another" in err) == (1, True)
     code, _, err = run("batch", "measure", "rec/**/*.mkv", *ALONE, "--out", "rec")
-    assert (code, "--out must lie apart from the inputs" in err) == (2, True)
+    assert (code, "--out must be a folder without inputs" in err) == (2, True)
 
 
 def test_a_batch_of_another_command_is_left_alone(run: Run, copy: Path) -> None:

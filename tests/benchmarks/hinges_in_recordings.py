@@ -26,7 +26,8 @@ import numpy as np
 
 from calib.calibration import BareScale
 from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
-from fingervision.diagnosis.bodies.place_search import PlaceFindings, PlaceSearch
+from fingervision.diagnosis.bodies.place_findings import PlaceFindings
+from fingervision.diagnosis.bodies.place_search import PlaceSearch
 from fingervision.domain.body_poses import FramePoses
 from fingervision.domain.errors import FingervisionError
 from fingervision.measuring.body_poses import BodyTracker

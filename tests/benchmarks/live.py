@@ -34,7 +34,9 @@ import cv2
 import numpy as np
 
 from calib.calibration import BareScale
+from fingervision.domain.errors import DeviceError
 from fingervision.frames.source import Wish
+from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.opening import opened
 from fingervision.live.server import Page, bound
@@ -42,7 +44,7 @@ from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.gaps_csv import GapRow
 
-ASLEEP_AFTER_S = 5.0
+ASLEEP_AFTER_S, BEGINS_WITHIN_S = 5.0, 30.0
 CYCLE, PX_PER_MM = 50, 34.0
 MOST_CORE, MOST_GROWN = 0.25, 1.05
 JPEG_BEGINS = b"\xff\xd8\xff"
@@ -88,12 +90,23 @@ def main() -> None:
         others = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(wanted.busy)]
         camera = subprocess.Popen(serving, stderr=subprocess.DEVNULL)
         try:
-            time.sleep(3.0 if wanted.rtsp else 1.0)
             run(address, Path(folder), wanted)
         finally:
             for each in (camera, *others):
                 each.kill()
                 each.wait()
+
+
+def answering(address: str) -> Capture:
+    """Open the camera, which needs some seconds to begin on a busy machine."""
+    until_s = time.monotonic() + BEGINS_WITHIN_S
+    while True:
+        try:
+            return opened(address, Wish())
+        except DeviceError:
+            if time.monotonic() > until_s:
+                raise
+            time.sleep(0.2)
 
 
 def mjpeg(pictures: Path, rate_hz: int, address: str) -> list[str]:
@@ -112,7 +125,7 @@ def rtsp(pictures: Path, port: int) -> list[str]:
 
 def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     """Measure for the wanted time and print what it cost."""
-    session = Session(opened(address, Wish()), Choices(BareScale(PX_PER_MM)), folder)
+    session = Session(answering(address), Choices(BareScale(PX_PER_MM)), folder)
     late_s: list[float] = []
     times_s: list[float] = []
     arrived: list[float] = []

@@ -1,8 +1,9 @@
-"""Memory of the page itself, in Chromium: used heap of its scripts, after a collection, minute by minute.
+"""Memory of the page in Chromium (used heap of its scripts, after a collection) and of its server, minute by minute.
 
 Run as `python -m tests.benchmarks.page_memory [--minutes 15]` from the top; the live view is simulated, at 25 Hz.
-Printed: megabytes of the script heap, elements of the document, listeners, and pictures shown so far. The chart keeps
-ten minutes of rows, and messages are few, so that after those minutes all of them must stay as they are.
+Printed: resident megabytes of the server, megabytes of the script heap, elements of the document, listeners, and
+pictures shown so far. The chart keeps ten minutes of rows, and messages are few, so that after those minutes all of
+them must stay as they are.
 """
 
 import argparse
@@ -20,6 +21,13 @@ from tests.live.browser import CHROMIUM, QUIET
 
 START_S, EVERY_S = 120.0, 60.0
 MEGABYTE = 1e6
+HEADINGS = f"{'min':>5} {'server MB':>9} {'heap MB':>8} {'elements':>9} {'listeners':>10} {'pictures':>9}"
+
+
+def resident_mb(process: int) -> float:
+    """Return the resident memory of a process, in megabytes (Linux: VmRSS, in units of 1024 bytes)."""
+    status = Path(f"/proc/{process}/status").read_text()
+    return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) * 1024 / MEGABYTE
 
 
 def main() -> None:
@@ -42,7 +50,7 @@ def main() -> None:
                 page.goto(found[0])
                 session = page.context.new_cdp_session(page)
                 session.send("Performance.enable")
-                print(f"{'min':>5} {'heap MB':>8} {'elements':>9} {'listeners':>10} {'pictures':>9}", flush=True)
+                print(HEADINGS, flush=True)
                 began_s = time.monotonic()
                 while (minutes := (time.monotonic() - began_s) / 60.0) <= chosen.minutes:
                     session.send("HeapProfiler.collectGarbage")
@@ -51,8 +59,8 @@ def main() -> None:
                     }
                     pictures = page.evaluate("Number(document.querySelector('#picture').dataset.shown || 0)")
                     print(
-                        f"{minutes:5.1f} {metrics['JSHeapUsedSize'] / MEGABYTE:8.2f} {metrics['Nodes']:9.0f} "
-                        f"{metrics['JSEventListeners']:10.0f} {pictures:9}",
+                        f"{minutes:5.1f} {resident_mb(live.pid):9.1f} {metrics['JSHeapUsedSize'] / MEGABYTE:8.2f} "
+                        f"{metrics['Nodes']:9.0f} {metrics['JSEventListeners']:10.0f} {pictures:9}",
                         flush=True,
                     )
                     page.wait_for_timeout(EVERY_S * 1e3)

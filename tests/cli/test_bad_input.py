@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -27,6 +28,8 @@ FILES: dict[str, str | bytes] = {
     "nan.csv": TABLE + "0,0,nan\n",
     "empty.csv": "",
     "head.csv": TABLE,
+    "below.csv": TABLE.replace("\n", ",u_gap_mm\n")
+    + "".join(f"{k},{k},{k},{0.01 - 0.02 * (k == 7)}\n" for k in range(9)),
     "short.csv": TABLE + "0,0,1\n1,1\n",
     "text.csv": "hello world\n",
     "json.csv": '{"a": 1}\n',
@@ -40,6 +43,10 @@ FILES: dict[str, str | bytes] = {
     "a.toml": 'schema = 1\nbase = "b.toml"\n',
     "b.toml": 'schema = 1\nbase = "a.toml"\n',
     "latin.toml": 'schema = 1\nbase = "sim\xe9.csv"\n'.encode("latin1"),
+    "wide.toml": f"{MODEL}".encode("utf-16"),
+    "wide_unmarked.toml": f"{MODEL}".encode("utf-16-le"),
+    "wide_bed.toml": RECIPE.encode("utf-16"),
+    "wide.json": '{"schema": 1, "px_per_mm": 20}'.encode("utf-16"),
     "unclosed.toml": 'schema = 1\nbase = "sim.csv\n',
     "effect3.toml": f"{MODEL}effect = 3\n",
     "schema9.toml": 'schema = 9\nbase = "sim.csv"\n',
@@ -80,6 +87,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scenes = [two_fingers(60.0 + k, below_tip_px=6.0, width_px=40.0, frame=(240, 200)) for k in range(2)]
     frames = (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes))
     write_clip(found / "c.mkv", frames, Ffv1())
+    (found / "good").mkdir()
+    cv2.imwrite(str(found / "good" / "a.png"), render(scenes[0], Camera(), rng))
     for name, content in FILES.items():
         (found / name).parent.mkdir(exist_ok=True)
         (found / name).write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -187,6 +196,7 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (diagnose("nan.csv"), 1, "nan"),
     (diagnose("empty.csv"), 1, "empty"),
     (diagnose("head.csv"), 1, "has 0"),
+    (diagnose("below.csv"), 1, "-0.01 in data row 8"),
     (diagnose("short.csv"), 1, "Line 3"),
     (diagnose("text.csv"), 1, "two numbers"),
     (diagnose("json.csv"), 1, "two numbers"),
@@ -202,6 +212,15 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (diagnose("m.csv", "a.toml"), 1, "leads back to itself"),
     (("batch", "diagnose", "m.csv", "--model", "a.toml", "--out", "o", "--jobs", "1"), 1, "a.toml"),
     (diagnose("m.csv", "latin.toml"), 1, "latin.toml"),
+    (diagnose("m.csv", "latin.toml"), 1, "0xe9 in line 2"),
+    (diagnose("m.csv", "wide.toml"), 1, "UTF-16"),
+    (diagnose("m.csv", "wide_unmarked.toml"), 1, "save it with the encoding UTF-8"),
+    (("model", "wide.toml"), 1, "UTF-16"),
+    (("batch", "diagnose", "m.csv", "--model", "wide.toml", "--out", "o", "--jobs", "1"), 1, "UTF-16"),
+    (measure("c.mkv", "--gauges", "wide.toml"), 1, "UTF-16"),
+    (measure("c.mkv", "--settings", "wide.toml"), 1, "UTF-16"),
+    (calibrated("wide.json"), 1, "UTF-16"),
+    (bed("wide_bed.toml"), 1, "UTF-16"),
     (diagnose("m.csv", "unclosed.toml"), 1, "line 2"),
     (diagnose("m.csv", "effect3.toml"), 1, "`effect` is 3"),
     (diagnose("m.csv", "schema9.toml"), 1, "schema"),
@@ -233,8 +252,11 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (measure("zero.png"), 1, "zero.png"),
     (measure("images"), 1, "a.png"),
     (measure("images", "--rate-hz", "-5"), 2, "-5"),
+    (measure("good", "--rate-hz", "1e-300"), 2, "between 1e-06 and 1e+07"),
+    (measure("c.mkv", "--below-tip-mm", "1e9"), 2, "240x200 pixels"),
     (measure("folder"), 1, "folder"),
     (measure("["), 1, "["),
+    (measure("\x1b[31mred\x07.mkv"), 1, r"\x1b[31mred\x07.mkv"),
     (measure(LONG), 1, "too long"),
     (measure("c.mkv", "--out", LONG), 1, "cannot be written"),
     (measure("c.mkv", "--out", "c.mkv"), 1, "is a file"),

@@ -174,7 +174,7 @@ def test_a_calibration_for_other_frames_is_refused(run: Run, clip: Path) -> None
     ("arguments", "code", "sentence"),
     [
         (("CLIP",), 2, "The scale must be given, but is not: add --calibration FILE"),
-        (("CLIP", *SCALE, "--calibration", "c.json"), 2, "but both are there: leave one out"),
+        (("CLIP", *SCALE, "--calibration", "c.json"), 2, "but both are given: leave one out"),
         (("CLIP", "--px-per-mm", "0"), 2, "--px-per-mm must be positive, but is 0."),
         (("CLIP", "--px-per-mm", "-3"), 2, "--px-per-mm must be positive, but is -3."),
         (("CLIP", "--px-per-mm", "nan"), 2, "--px-per-mm must be positive, but is nan."),
@@ -184,7 +184,7 @@ def test_a_calibration_for_other_frames_is_refused(run: Run, clip: Path) -> None
         (("CLIP", *SCALE, "--roi", "1,2,3"), 2, "--roi must be four whole numbers X,Y,W,H in pixels, but is '1,2,3'."),
         (("CLIP", *SCALE, "--below-tip-mm", "0"), 2, "--below-tip-mm must be positive, but is 0."),
         (("CLIP", *SCALE, "--rate-hz", "25"), 2, "is a video with its own: leave it out."),
-        (("CLIP", *SCALE, "--steps", "-1"), 2, "--steps must be the number of a frame"),
+        (("CLIP", *SCALE, "--steps", "-1"), 2, "must be the number of a frame, from 0, but is -1"),
         (("CLIP", *SCALE, "--steps", "99"), 2, "--steps must be the number of a frame that can be read, 0 to 11"),
         (("CLIP", *SCALE, "--drive", "none.csv"), 1, "There is no drive table none.csv."),
         (("CLIP", "--calibration", "none.json"), 1, "There is no calibration file none.json"),

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli.model import command
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, InputFileError, OutputError, UsageError
 from fingervision.models.grip import Part, first_grip_mm
 from fingervision.models.kinds import kinds
 from fingervision.models.lumped import LumpedGripper
@@ -88,14 +88,12 @@ def test_the_stiffness_matrix_knows_small_displacements_alone(tmp_path: Path) ->
 
 def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
     (tmp_path / "o").write_text("")
-    with pytest.raises(
-        FingervisionError, match=r"--out must be a folder that can be written, but .* is not: File exists"
-    ):
+    with pytest.raises(OutputError, match=r"--out must be a folder that can be written, but .* is not: File exists"):
         run(GRIPPER, "--kind", "lumped", "--out", tmp_path / "o")
 
 
 def test_a_missing_gripper_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match="There is no gripper"):
+    with pytest.raises(InputFileError, match="There is no gripper"):
         run(tmp_path / "none.toml")
 
 

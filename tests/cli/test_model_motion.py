@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from fingervision.cli._model_motion import for_picture
 from fingervision.cli.compare import command as compare
 from fingervision.cli.model import command
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import DataError, FingervisionError, ModelError, UsageError
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
@@ -145,7 +147,10 @@ def test_a_mechanism_moves_too(tmp_path: Path) -> None:
         (("--frequency", "nan:inf"), r"--frequency must be A:B"),
         (("--frequency", "1:1e9"), r"must end within the first \d+ modes, below .* Hz, but ends at 1e\+09 Hz"),
         (("--frequency", "1:500", "--damping", "modal:2"), r"must give a damping ratio below 0.3"),
-        (("--frequency", "1:1e4", "--damping", "paper"), r"describes modes up to 3\d\d.* Hz alone .* end it before"),
+        (
+            ("--frequency", "1:1e4", "--damping", "paper"),
+            r"is valid for modes up to 3\d\d.* Hz only .* end the band before",
+        ),
         (("--modes", "0"), r"--modes must be a number from 1 to 40, or a positive frequency"),
         (("--modes", "-5Hz"), r"--modes must be"),
         (("--modes", "many"), r"--modes must be"),
@@ -156,7 +161,7 @@ def test_a_mechanism_moves_too(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_motion_is_refused(tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(UsageError, match=sentence):
         run(GRIPPER, "--kind", "lumped", "--out", tmp_path, *options)
     assert not list(tmp_path.glob("frequency.*"))
     assert not list(tmp_path.glob("modes.*"))
@@ -226,13 +231,30 @@ def test_uncertain_numbers_give_every_figure_its_own(tmp_path: Path) -> None:
 def test_an_uncertain_list_is_refused(tmp_path: Path) -> None:
     stated = GRIPPER.read_text().replace("hinge1_mm = [35.5, 30.0]", "hinge1_mm = { value = [35.5, 30.0], u = 0.1 }")
     (tmp_path / "g.toml").write_text(stated)
-    with pytest.raises(FingervisionError, match=r"lever.hinge1_mm in .* must belong to a single number"):
+    with pytest.raises(DataError, match=r"lever.hinge1_mm in .* must belong to a single number"):
         run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
 
 
 def test_an_uncertainty_beyond_sense_leaves_no_results(tmp_path: Path) -> None:
     stated = GRIPPER.read_text().replace("\nthickness_mm = 1.0", "\nthickness_mm = { value = 1.0, u = 2.0 }")
     (tmp_path / "g.toml").write_text(stated)
-    with pytest.raises(FingervisionError, match=r"The uncertainty of hinge.thickness_mm must leave .* positive"):
+    with pytest.raises(ModelError, match=r"The uncertainty of hinge.thickness_mm must leave .* positive"):
         run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
     assert not (tmp_path / "o").exists()
+
+
+def test_the_plot_of_three_rows_shows_the_first_touch_and_the_vibration() -> None:
+    """Rows between the drive's own, in each run; the drive's stay, and a dense drive is left alone."""
+    drive = DriveHistory(np.array([0.0, 1.0, 2.0, 0.0, 4.0]), np.array([0.0, -1.0, 0.5, 0.0, 1.0]),
+                         ("a", "a", "a", "b", "b"))  # fmt: skip
+    finer = for_picture(drive, 359.0)
+    runs = np.array(finer.run)
+    for name, own in (("a", [0.0, 1.0, 2.0]), ("b", [0.0, 4.0])):
+        times = finer.time_s[runs == name]
+        assert set(own) <= set(times)
+        assert np.all(np.diff(times) > 0.0)
+        assert np.diff(times).max() < 0.002 * np.ptp(times)
+        assert np.diff(times)[:200].max() < 0.1 / 359.0
+    assert np.allclose(finer.input_mm[runs == "a"], np.interp(finer.time_s[runs == "a"], [0, 1, 2], [0, -1, 0.5]))
+    dense = DriveHistory(np.arange(700.0), np.zeros(700))
+    assert for_picture(dense, 359.0) is dense

@@ -13,7 +13,7 @@ from fingervision.diagnosis.inference.plausibility import mixed_rows
 from fingervision.diagnosis.inference.searched import problem_of
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.report.open_parameters import open_parameters
-from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.domain.errors import DataError, ExitCode, FingervisionError
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from fingervision.storage.simulation_table import read_simulation_table
@@ -47,7 +47,7 @@ def write(folder: Path, text: str, name: str = "measured.csv") -> Path:
     ],
 )
 def test_a_wrong_table_is_refused_in_a_sentence(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(FingervisionError) as caught:
+    with pytest.raises(DataError) as caught:
         read_measured_table(write(tmp_path, text))
     assert words in str(caught.value)
 
@@ -56,18 +56,18 @@ def test_a_wrong_table_is_refused_in_a_sentence(tmp_path: Path, text: str, words
 def test_inputs_in_another_unit_are_recognised(tmp_path: Path, factor: float, unit: str) -> None:
     rows = "\n".join(f"{0.1 * k * factor},{4.0 + 0.77 * k}" for k in range(8))
     table = read_measured_table(write(tmp_path, "input_mm,gap_mm\n" + rows))
-    with pytest.raises(FingervisionError, match=f"as if in {unit}"):
+    with pytest.raises(DataError, match=f"as if in {unit}"):
         prepare(table, read_model(write(tmp_path, "input_mm,gap_mm\n-1,-3.7\n2,19.4", "sim.csv")))
 
 
 def test_a_model_that_does_not_cover_the_inputs_is_refused(tmp_path: Path) -> None:
     table = read_measured_table(write(tmp_path, "input_mm,gap_mm\n" + GOOD))
-    with pytest.raises(FingervisionError, match=r"must lie within the model's 0 to 0\.5 mm, but runs from 0 to 0\.7"):
+    with pytest.raises(DataError, match=r"must lie within the model's 0 to 0\.5 mm, but runs from 0 to 0\.7"):
         prepare(table, read_model(write(tmp_path, "input_mm,gap_mm\n0,4\n0.5,7.8", "sim.csv")))
 
 
 def test_a_simulation_that_ignores_the_input_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match="gap_mm must depend on the input, but is 4 in every row"):
+    with pytest.raises(DataError, match="gap_mm must depend on the input, but is 4 in every row"):
         read_simulation_table(write(tmp_path, "input_mm,gap_mm\n0,4\n1,4", "sim.csv"))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fingervision.diagnosis.compare import compare
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model, write_model
@@ -136,5 +136,5 @@ def test_compare_refits_the_drawing_too_and_says_so(tmp_path: Path) -> None:
 def test_a_wrong_corrected_model_is_refused_in_a_sentence(tmp_path: Path, lines: str, words: str) -> None:
     path = tmp_path / "model.toml"
     path.write_text(f'schema = 1\nbase = "{DRAWING}"\n{lines}\n', encoding="utf-8")
-    with pytest.raises(FingervisionError, match=words):
+    with pytest.raises(DataError, match=words):
         read_model(path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import pytest
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DeviceError, UsageError
 from fingervision.domain.frame import Coding
 from fingervision.frames.camera import CameraFrames
 from fingervision.frames.camera_settings import MSMF, READ, V4L2, Settled, coding_of, requests, settled
@@ -165,7 +165,7 @@ def test_what_is_no_camera_is_refused_and_opencv_keeps_its_words_to_itself(
 ) -> None:
     device = tmp_path / "video0"
     device.touch()
-    with pytest.raises(FingervisionError, match=f"The camera {device} cannot be opened: it is in use"):
+    with pytest.raises(DeviceError, match=f"The camera {device} cannot be opened: it is in use"):
         CameraFrames(str(device), Wish())
     assert capfd.readouterr().err == ""
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import FrameSource, Wish, open_source
@@ -96,7 +96,7 @@ def test_a_bad_table_of_times_is_refused_in_a_sentence(tmp_path: Path, table: st
     for number in range(2):
         save(tmp_path / f"{number}.png", noise(number))
     (tmp_path / "times.csv").write_text(table)
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(DataError, match=sentence):
         open_source(str(tmp_path))
 
 
@@ -164,12 +164,12 @@ def test_jpeg_is_lossy_and_png_is_not(tmp_path: Path) -> None:
 
 
 def test_where_there_are_no_images_the_sentence_says_so(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match=r"The folder .* must hold images .* but there is none"):
+    with pytest.raises(InputFileError, match=r"The folder .* must hold images .* but there is none"):
         open_source(str(tmp_path))
-    with pytest.raises(FingervisionError, match=r"The pattern .* must match images .* but there is none"):
+    with pytest.raises(InputFileError, match=r"The pattern .* must match images .* but there is none"):
         open_source(str(tmp_path / "*.png"))
     (tmp_path / "0.png").write_text("no image")
     with pytest.raises(
-        FingervisionError, match=r"None of the 1 images of .* can be read: 0\.png is damaged, or is not an image"
+        InputFileError, match=r"None of the 1 images of .* can be read: 0\.png is damaged, or is not an image"
     ):
         open_source(str(tmp_path))

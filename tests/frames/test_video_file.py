@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import Wish, open_source
@@ -231,7 +231,7 @@ def test_a_second_pass_reads_the_same(tmp_path: Path) -> None:
 )
 def test_what_is_no_video_is_refused_in_a_sentence(tmp_path: Path, content: bytes, sentence: str) -> None:
     (tmp_path / "clip.mp4").write_bytes(content)
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(DataError, match=sentence):
         open_source(str(tmp_path / "clip.mp4"))
 
 
@@ -242,7 +242,7 @@ def test_sound_alone_is_no_video(tmp_path: Path) -> None:
         sound = av.AudioFrame.from_ndarray(np.zeros((1, 800), np.int16), format="s16", layout="mono")
         sound.sample_rate = 8000
         container.mux(stream.encode(sound))
-    with pytest.raises(FingervisionError, match="must hold a video, but has no video stream"):
+    with pytest.raises(DataError, match="must hold a video, but has no video stream"):
         open_source(str(tmp_path / "sound.wav"))
 
 
@@ -253,5 +253,5 @@ def test_a_rate_is_refused_for_what_has_times(tmp_path: Path) -> None:
 
 
 def test_what_is_not_there_is_named() -> None:
-    with pytest.raises(FingervisionError, match=r"There is no recording nowhere\.mp4"):
+    with pytest.raises(InputFileError, match=r"There is no recording nowhere\.mp4"):
         open_source("nowhere.mp4")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError
 from fingervision.gauges.gauge_file import Gauge, check_gauges, read_gauges
 from fingervision.gauges.kinds import kind_named, kinds
 
@@ -54,20 +54,20 @@ def _with(line: str, instead: str) -> str:
     ],
 )
 def test_what_cannot_be_meant_is_said_in_a_sentence(tmp_path: Path, text: str, facts: list[str]) -> None:
-    with pytest.raises(FingervisionError) as refused:
+    with pytest.raises(DataError) as refused:
         _read(tmp_path, text)
     for fact in facts:
         assert fact in str(refused.value)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match="no gauge file"):
+    with pytest.raises(InputFileError, match="no gauge file"):
         read_gauges(tmp_path / "gauges.toml")
 
 
 def test_a_gauge_that_is_larger_than_the_frame_is_refused(tmp_path: Path) -> None:
     gauges = _read(tmp_path, _with("length_px", "length_px = 5000"))
-    with pytest.raises(FingervisionError, match=r"'a'.*640x480.*length_px is 5000"):
+    with pytest.raises(DataError, match=r"'a'.*640x480.*length_px is 5000"):
         check_gauges(gauges, 640, 480)
 
 

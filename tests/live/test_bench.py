@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, StateError, UsageError
 from fingervision.domain.status import Status
 from fingervision.frames.received import Received
 from fingervision.live.bed.bench import Bench
@@ -125,12 +125,12 @@ def test_anybody_stops_and_only_who_may_moves(session: Session, bench: Bench) ->
         {"do": "bed_home"},
         {"do": "bed_run", "recipe": "recipe.toml"},
     ):
-        with pytest.raises(FingervisionError, match="--allow-motion"):
+        with pytest.raises(StateError, match="--allow-motion"):
             obey(session, request)
     session.features["allow_motion"] = True
     obey(session, {"do": "bed_move", "to_mm": 1.4, "speed_mm_s": 0.1})
     until(lambda: bench.position_mm > 0.1)
-    with pytest.raises(FingervisionError, match="stop it first"):
+    with pytest.raises(StateError, match="stop it first"):
         obey(session, {"do": "bed_home"})
     session.features["allow_motion"] = False
     obey(session, {"do": "bed_stop"})
@@ -186,7 +186,7 @@ def test_a_hidden_backlash_is_named_on_the_page_within_a_minute_of_motion(
     says(page, "Running there and back")
     shown(page, "document.querySelector('#verdict_effects').textContent.includes('backlash')")
     # Motion: the recipe's own 4 s and the way there, less than a minute.
-    found = float(page.inner_text("#verdict_effects").split("play_mm ")[1].split()[0])
+    found = float(page.inner_text("#verdict_effects").split("play ")[1].split()[0])
     assert found == pytest.approx(0.03, abs=0.001)
     assert "named" in page.inner_text("#verdict_words")
     assert page.locator("#bed_stop").is_visible()

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calib.calibration import BareScale
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.simulated import SimulatedGripper
 from fingervision.live.choices import Choices
@@ -41,6 +41,6 @@ def test_without_limits_or_gap_there_is_no_verdict() -> None:
     ],
 )
 def test_what_cannot_be_meant_is_a_sentence(choices: Choices, words: str) -> None:
-    with pytest.raises(FingervisionError) as refused:
+    with pytest.raises(UsageError) as refused:
         choices.check(DESCRIPTION)
     assert str(refused.value).startswith(words)

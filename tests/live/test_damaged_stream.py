@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.network_stream import NetworkStream
 from fingervision.frames.source import open_source
@@ -139,7 +139,7 @@ def test_times_behind_a_lost_header_stay(tmp_path: Path, film: list[np.ndarray])
 
 def items_of(stream: Path) -> list[Frame | LostFrame]:
     items: list[Frame | LostFrame] = []
-    with pytest.raises(FingervisionError, match="cut off"):
+    with pytest.raises(DeviceError, match="cut off"):
         items.extend(NetworkStream(str(stream)))
     return items
 

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, StateError
 from fingervision.gauges.fields import fields_of
 from fingervision.gauges.gauge_file import read_gauges
 from fingervision.gauges.kinds import kind_named, kinds
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section
-from fingervision.live.playback.gauge_board import FieldError
+from fingervision.live.playback.gauge_board import ChangedMeanwhileError, FieldError
 from fingervision.live.playback.gauges_beside import GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
@@ -95,7 +95,7 @@ def test_a_kind_says_all_its_keys_and_a_gauge_of_usual_values_can_be_meant(name:
 def test_what_is_added_and_changed_is_saved_and_read_again_the_same(opened_on: Opened, tmp_path: Path) -> None:
     path = tmp_path / "new" / "gauges.toml"
     view, beside = opened_on(path)
-    with pytest.raises(FingervisionError, match="at least one"):
+    with pytest.raises(DataError, match="at least one"):
         obey(view, {"do": "gauges_save"})
     obey(view, {"do": "gauge_add", "table": EDGE})
     obey(view, {"do": "gauge_add", "table": BAR})
@@ -193,7 +193,7 @@ def test_a_key_that_is_missing_is_said(opened_on: Opened, tmp_path: Path) -> Non
         with pytest.raises(FingervisionError):
             obey(view, {"do": "gauge_add", "table": bad})
     for request in ("gauge_remove", "gauge_change"):
-        with pytest.raises(FingervisionError, match="no gauge"):
+        with pytest.raises(StateError, match="no gauge"):
             obey(view, {"do": request, "name": "nobody", "changes": {"x_px": 1}})
     assert section(view)["gauges"]["tables"] == []
 
@@ -204,18 +204,18 @@ def test_a_file_that_somebody_else_changed_is_not_overwritten(opened_on: Opened,
     obey(view, {"do": "gauge_add", "table": EDGE})
     path.write_text("# theirs\nschema = 1\n")
     for _ in range(2):
-        with pytest.raises(FingervisionError, match="somebody else"):
+        with pytest.raises(ChangedMeanwhileError, match="somebody else"):
             obey(view, {"do": "gauges_save"})
         assert path.read_text() == "# theirs\nschema = 1\n"
     assert section(view)["gauges"]["changed_meanwhile"]
-    with pytest.raises(FingervisionError):
+    with pytest.raises(DataError):
         obey(view, {"do": "gauges_load"})
     assert section(view)["gauges"]["tables"] == [EDGE]
     obey(view, {"do": "gauges_save", "over": True})
     assert tomllib.loads(path.read_text())["gauge"] == [EDGE]
     assert not section(view)["gauges"]["changed_meanwhile"]
     path.unlink()
-    with pytest.raises(FingervisionError, match="somebody else"):
+    with pytest.raises(ChangedMeanwhileError, match="somebody else"):
         obey(view, {"do": "gauges_save"})
 
 
@@ -224,7 +224,7 @@ def test_a_file_that_cannot_be_written_is_said_and_nothing_lost(opened_on: Opene
     view, _ = opened_on(tmp_path / "folder" / "gauges.toml")
     obey(view, {"do": "gauge_add", "table": EDGE})
     (tmp_path / "folder").write_text("a file where the folder should be")
-    with pytest.raises(FingervisionError, match="could not be"):
+    with pytest.raises(ChangedMeanwhileError, match="could not be"):
         obey(view, {"do": "gauges_save"})
     assert section(view)["gauges"]["tables"] == [EDGE]
 
@@ -233,7 +233,7 @@ def test_a_file_that_cannot_be_written_is_said_and_nothing_lost(opened_on: Opene
 def test_a_file_that_cannot_be_meant_is_refused_before_anything(text: str, opened_on: Opened, tmp_path: Path) -> None:
     path = tmp_path / "gauges.toml"
     path.write_text(text)
-    with pytest.raises(FingervisionError, match=r"gauges\.toml"):
+    with pytest.raises(DataError, match=r"gauges\.toml"):
         opened_on(path)
     assert path.read_text() == text
 

@@ -33,8 +33,9 @@ def refused(*arguments: str | Path) -> FingervisionError:
             ("rtsp://lab:secret@127.0.0.1:9/feed", "--px-per-mm", "34"),
             "The stream rtsp://lab:***@127.0.0.1:9/feed must answer",
         ),
-        (("http://127.0.0.1:9/feed", "--size", "640x480"), "--size and --rate-hz are for cameras of this machine"),
+        (("http://127.0.0.1:9/feed", "--size", "640x480"), "--size and --rate-hz are for cameras of this computer"),
         (("simulated", "--size", "wide"), "--size must be WxH in pixels, such as 640x480, but is 'wide'."),
+        (("simulated", "--rate-hz", "0"), "--rate-hz must be between 1 and 1000, but is 0."),
         (("simulated", "--size", "10x10"), "--size of the simulated camera must be 320x240 to 4096x4096"),
         (
             ("simulated", "--exposure-ms", "8"),

@@ -340,7 +340,7 @@ def test_strangers_are_refused(live: Callable[..., Any], browser: Any) -> None:
         page.send('{"do": "read", "path": "/etc/passwd"}')
         answers = (page.recv() for _ in range(20))
         refusal = next(json.loads(each) for each in answers if isinstance(each, str))
-        assert refusal["refused"].startswith("The page may ask for bed_home, bed_jog,")
+        assert refusal["refused"].startswith("A request of the browser page must be one of bed_home, bed_jog,")
         page.send("x" * 10_000)
         with pytest.raises(ConnectionClosed):
             deque(iter(page.recv, None), maxlen=0)

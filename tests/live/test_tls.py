@@ -14,7 +14,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from calib.calibration import BareScale
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import InputFileError, UsageError
 from fingervision.frames.source import Wish
 from fingervision.live.access import access
 from fingervision.live.choices import Choices
@@ -87,10 +87,10 @@ def test_a_pair_that_cannot_be_used_is_a_sentence(tmp_path: Path) -> None:
         (certificate, tmp_path / "empty.pem"),
         (key, certificate),
     ):
-        with pytest.raises(FingervisionError, match="must be PEM files that belong together") as refused:
+        with pytest.raises(InputFileError, match="must be PEM files that belong together") as refused:
             access("127.0.0.1", 0, None, one, two)
         assert "\n" not in str(refused.value)
-    with pytest.raises(FingervisionError, match="There is no file"):
+    with pytest.raises(InputFileError, match="There is no file"):
         access("127.0.0.1", 0, None, tmp_path, key)
     with pytest.raises(UsageError, match="needs both"):
         access("127.0.0.1", 0, None, certificate, None)

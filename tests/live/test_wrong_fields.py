@@ -23,7 +23,9 @@ from fingervision.live.frame_measurement import Seen
 from fingervision.live.opening import opened as opened_source
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
+from fingervision.live.session_state import state_of_choices
 from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.settings_toml import read_settings
 from tests.live.browser import browser, needs_chromium, opened, says, shown
 from tests.live.test_attacks import reply, socket_of
 
@@ -48,6 +50,9 @@ WRONG: list[dict[str, Any]] = [
     {"do": "scale", "px_per_mm": -34},
     {"do": "scale", "px_per_mm": True},
     {"do": "scale", "px_per_mm": float("inf")},
+    {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": 0},
+    {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": 34.0},
+    {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": "0.1"},
     {"do": "calibrate", "kind": "ring", "box": [0, 0, 10, 10], "size_mm": 1.0, "u_size_mm": 0.001},
     {"do": "calibrate", "kind": "bar", "box": [0, 0, 3, 3], "size_mm": 1.0, "u_size_mm": 0.001},
     {"do": "calibrate", "kind": "bar", "box": [0, 0, 640, 480], "size_mm": 0.0, "u_size_mm": 0.001},
@@ -98,6 +103,17 @@ def test_what_cannot_be_asked_here_ends_nothing(session: Session, request_: dict
     if session.recording is not None:
         session.stop_recording()
     assert session.choices == before
+
+
+def test_a_scale_is_stated_with_its_uncertainty_and_saved_with_it(session: Session) -> None:
+    obey(session, {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": 0.1})
+    state = state_of_choices(session.choices)
+    assert (state["px_per_mm"], state["u_px_per_mm"]) == (34.0, pytest.approx(0.1))
+    obey(session, {"do": "save_settings"})
+    settings = read_settings(session.out / "settings.toml")
+    assert (settings["px_per_mm"], settings["u_px_per_mm"]) == (34.0, pytest.approx(0.1))
+    obey(session, {"do": "scale", "px_per_mm": 20.0, "u_px_per_mm": None})
+    assert state_of_choices(session.choices)["u_px_per_mm"] is None
 
 
 TWENTY: list[Any] = [

@@ -15,7 +15,7 @@ import pytest
 from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
+from fingervision.domain.errors import ExitCode, OutputError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
@@ -68,7 +68,7 @@ def test_the_true_gaps_come_out_in_millimetres(tmp_path: Path, direction: Direct
 def test_two_measurements_at_once_never_share_a_folder(tmp_path: Path) -> None:
     class Second(RenderedFrames):
         def __iter__(self) -> Iterator[Frame | LostFrame]:
-            with pytest.raises(FingervisionError, match="in use by another run"):
+            with pytest.raises(OutputError, match="in use by another run"):
                 measure(rendered(opening(2)), Task(BareScale(PX_PER_MM)), tmp_path)
             yield from super().__iter__()
 
@@ -178,7 +178,7 @@ def test_a_stop_keeps_what_was_measured(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_results_of_somebody_else_are_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "gaps.csv").write_text("mine\n")
-    with pytest.raises(FingervisionError, match=r"already holds gaps\.csv, and no earlier measurement"):
+    with pytest.raises(OutputError, match=r"already holds gaps\.csv, and no earlier measurement"):
         measure(rendered(opening(1)), Task(BareScale(PX_PER_MM)), tmp_path)
     assert (tmp_path / "gaps.csv").read_text() == "mine\n"
 

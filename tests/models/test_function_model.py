@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lsim
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.models import function_model
 from fingervision.models.function_model import FunctionModel
 from fingervision.storage.measured_table import read_measured_table
@@ -56,7 +56,7 @@ def test_the_answer_at_rest_is_the_static_curve(tmp_path):
 @needs_gcc
 def test_an_fmu_for_another_system_is_refused(tmp_path):
     model = FunctionModel(build_fmu(tmp_path, platform="win64"))
-    with pytest.raises(FingervisionError, match=r"binary for this system .* has one for win64"):
+    with pytest.raises(ModelError, match=r"binary for this system .* has one for win64"):
         model.simulate([(TIME_S, INPUT_MM)])
 
 
@@ -71,7 +71,7 @@ def test_an_fmu_that_nothing_drives_is_refused(tmp_path):
                 content = content.replace(b'causality="input"', b'causality="local"')
                 content = content.replace(b'<Real unit="m" start="0"/>', b'<Real unit="m"/>')
             new.writestr(name, content)
-    with pytest.raises(FingervisionError, match="must have a real input to be driven in time"):
+    with pytest.raises(ModelError, match="must have a real input to be driven in time"):
         FunctionModel(changed).simulate([(TIME_S, INPUT_MM)])
 
 
@@ -102,7 +102,7 @@ def test_two_inputs_ask_which_one_and_a_model_toml_says_it(tmp_path):
 
 @needs_gcc
 def test_a_length_in_another_unit_is_refused(tmp_path):
-    with pytest.raises(FingervisionError, match="is in rad"):
+    with pytest.raises(ModelError, match="is in rad"):
         FunctionModel(build_fmu(tmp_path, unit="rad")).simulate([(TIME_S, INPUT_MM)])
 
 
@@ -136,7 +136,7 @@ def test_a_python_function_is_driven_in_time(tmp_path):
     ],
 )
 def test_a_python_model_that_fails_is_a_sentence(tmp_path, text, sentence):
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(ModelError, match=sentence):
         python_model(tmp_path, text).simulate([(TIME_S, INPUT_MM)])
 
 

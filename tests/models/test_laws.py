@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, obeyed
 from fingervision.domain.effect import History
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
@@ -190,7 +190,7 @@ def test_refitted_numbers_answer_as_the_drawing_with_them(drawn: PhysicalGripper
 
 
 def test_a_name_that_is_no_number_of_the_drawing_is_said(gripper: Gripper) -> None:
-    with pytest.raises(FingervisionError, match=r"named as in gripper\.toml, but is hinge\.width_mm"):
+    with pytest.raises(DataError, match=r"named as in gripper\.toml, but is hinge\.width_mm"):
         redrawn(gripper, "hinge.width_mm", 0.1)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.mesh_outline import ElementSize, mesh_outline
@@ -41,5 +41,5 @@ def test_micro_design_opens_in_the_samples_ratio(finite_element: FiniteElementGr
 
 def test_links_that_do_not_overlap_are_refused(gripper: Gripper) -> None:
     apart = replace(gripper.links, finger_mm=(60.0, 70.0, 50.0, 88.0))
-    with pytest.raises(FingervisionError, match="must be one body, but the links and notches leave 3 pieces"):
+    with pytest.raises(DataError, match="must be one body, but the links and notches leave 3 pieces"):
         mesh_outline(replace(gripper, links=apart), ElementSize(0.5, 4.0))

@@ -6,7 +6,7 @@ The published archives are in no package index; the variables are those of their
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.function_model import FunctionModel
 from fingervision.storage.model_toml import read_model
 from tests.models.fmu_build import can_build, pack_fmu2
@@ -67,5 +67,5 @@ def test_feedthrough_takes_the_discrete_pair_where_it_is_named(tmp_path):
 def test_a_reference_fmu_without_an_input_is_refused_with_the_reason(tmp_path, name):
     option, variables = NOTHING_DRIVES[name]
     path = pack_fmu2(tmp_path, name, variables, "cs", option)
-    with pytest.raises(FingervisionError, match=r"must have a real input to be driven in time, but has none"):
+    with pytest.raises(ModelError, match=r"must have a real input to be driven in time, but has none"):
         FunctionModel(path).simulate([(TIME_S, INPUT_MM)])

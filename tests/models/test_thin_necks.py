@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.hinge_compliance import beam_compliance
@@ -95,5 +95,5 @@ def test_between_plane_stress_and_plane_strain() -> None:
 
 
 def test_a_notch_thicker_than_its_web_is_refused() -> None:
-    with pytest.raises(FingervisionError, match="must leave less than its bar's height of 2 mm, but leaves 3"):
+    with pytest.raises(DataError, match="must leave less than its bar's height of 2 mm, but leaves 3"):
         Notch(3.0, 4.0, 4.0, 3.0, web_mm=2.0)

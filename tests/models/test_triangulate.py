@@ -7,7 +7,7 @@ import pytest
 import skfem
 from scipy.sparse.linalg import splu
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.mesh_outline import ElementSize, mesh_outline
@@ -61,7 +61,7 @@ def test_area_and_loops_and_quality(name: str) -> None:
 
 
 def test_bodies_that_touch_in_a_point_are_refused() -> None:
-    with pytest.raises(FingervisionError, match=r"touches itself in a point at \(1, 1\) mm"):
+    with pytest.raises(DataError, match=r"touches itself in a point at \(1, 1\) mm"):
         _ = region((True, box(0, 1, 0, 1)), (True, box(1, 2, 1, 2))).loops
 
 

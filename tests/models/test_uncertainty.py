@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.parameter import Estimate
 from fingervision.models.gripper_uncertainty import gripper_uncertainty
@@ -59,7 +59,7 @@ def test_numbers_that_leave_no_drawing_are_refused() -> None:
             raise FingervisionError("x must be at most 1.05.")
         return {"y": by.get("x", 0.0)}
 
-    with pytest.raises(FingervisionError, match=r"The uncertainty of x must leave a drawing .* at 1.1 .* at most 1.05"):
+    with pytest.raises(ModelError, match=r"The uncertainty of x must leave a drawing .* at 1.1 .* at most 1.05"):
         propagate(evaluate, {"x": Estimate(1.0, 0.1)})
 
     def bent(by: Mapping[str, float]) -> dict[str, float | None]:
@@ -67,7 +67,7 @@ def test_numbers_that_leave_no_drawing_are_refused() -> None:
             raise FingervisionError("x must be at most 1.11.")
         return {"y": (1.0 + by.get("x", 0.0)) ** -3}
 
-    with pytest.raises(FingervisionError, match=r"stated uncertainties must leave a drawing .*, but \d+ of 128"):
+    with pytest.raises(ModelError, match=r"stated uncertainties must leave a drawing .*, but \d+ of 128"):
         propagate(bent, {"x": Estimate(1.0, 0.1)})
 
 
@@ -124,5 +124,5 @@ def test_sampled_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) 
     ],
 )
 def test_uncertainties_beyond_sense_are_refused(gripper: Gripper, name: str, u: float, sentence: str) -> None:
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(ModelError, match=sentence):
         gripper_uncertainty(replace(gripper, uncertainties=MappingProxyType({name: u})), ENDS)

@@ -3,7 +3,7 @@ import pytest
 from scipy.sparse import csr_matrix
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, paper_rate
 from fingervision.models.driven_body import DrivenBody
@@ -26,12 +26,12 @@ def test_equation_4_by_mode(w: float) -> None:
 
 def test_equation_4_damps_negatively_below_one() -> None:
     assert paper_rate(0.5) == pytest.approx(-19.5, rel=0.01)
-    with pytest.raises(FingervisionError, match="is negative below its reference frequency, 300 rad/s, but the"):
+    with pytest.raises(ModelError, match="is negative below its reference frequency, 300 rad/s, but the"):
         PaperDamping(300.0).ratios(np.array([280.0, 2000.0]))
 
 
 def test_overdamped_modes_are_refused() -> None:
-    with pytest.raises(FingervisionError, match=r"must lie between 0 and 0\.3, but one is"):
+    with pytest.raises(ModelError, match=r"must lie between 0 and 0\.3, but one is"):
         PaperDamping(280.0, 1.0).ratios(np.array([280.0, 28000.0]))
     assert PaperDamping(280.0, 0.5).ratios(np.array([280.0])) == pytest.approx(0.0225, rel=0.02)
 

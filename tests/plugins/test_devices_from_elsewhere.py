@@ -11,6 +11,7 @@ from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.frames.source import open_source
 from fingervision.models.kinds import build_model, kinds
+from fingervision.plugins.faults import PluginShapeError
 from fingervision.testbed.bed_factory import open_bed
 from tests.plugins.installed import install
 
@@ -139,7 +140,7 @@ def test_what_a_stage_raises_later_is_a_sentence_too(tmp_path: Path) -> None:
     )
     (tmp_path / "s.py").write_text(source, encoding="utf-8")
     bed = open_bed(str(bed_at(tmp_path, "s.py")))
-    with pytest.raises(FingervisionError, match=r"s\.py .*home.*ValueError: 7"):
+    with pytest.raises(PluginShapeError, match=r"s\.py .*home.*ValueError: 7"):
         bed.actuator.home()
     bed.close()
 

@@ -6,7 +6,7 @@ import av
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, OutputError
 from fingervision.domain.frame import Frame
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.clip import H264, Codec, Ffv1, Mjpeg, write_clip
@@ -102,15 +102,13 @@ def test_refusals_say_what_must_be(tmp_path: Path) -> None:
         (wide, Mjpeg(), r"Mjpeg holds 8 bits, but the frames have 16"),
         (some_frames(Camera(bits=16, tint=(1.0, 1.0, 1.0))), Ffv1(), r"FFV1 clips hold colour with 8 bits"),
     ]:
-        with pytest.raises(FingervisionError, match=words):
+        with pytest.raises(DataError, match=words):
             write_clip(tmp_path / "clip.mp4", bad, codec)
-    with pytest.raises(FingervisionError, match=r"must end in .mp4, .mov, .mkv, .* but is clip.avi"):
+    with pytest.raises(OutputError, match=r"must end in .mp4, .mov, .mkv, .* but is clip.avi"):
         write_clip(tmp_path / "clip.avi", frames, H264())
-    with pytest.raises(
-        FingervisionError, match=r"must be a file that can be written, but it could not be: No such file"
-    ):
+    with pytest.raises(OutputError, match=r"must be a file that can be written, but it could not be: No such file"):
         write_clip(tmp_path / "missing" / "clip.mp4", frames, H264())
-    with pytest.raises(FingervisionError, match=r"quality must lie between 0 and 100, but is 101"):
+    with pytest.raises(DataError, match=r"quality must lie between 0 and 100, but is 101"):
         through_jpeg(frames[0].pixels, 101)
-    with pytest.raises(FingervisionError, match=r"JPEG holds 8 bits, but the frame has 16"):
+    with pytest.raises(DataError, match=r"JPEG holds 8 bits, but the frame has 16"):
         through_jpeg(wide[0].pixels, 90)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.deformed_plate import deformed_outlines
 
 
@@ -30,5 +30,5 @@ def test_a_hole_runs_the_other_way() -> None:
 
 def test_edges_that_do_not_close_are_refused() -> None:
     edges, nodes = ring(40.0, 60, 100.0, inwards=False)
-    with pytest.raises(FingervisionError, match="close"):
+    with pytest.raises(DataError, match="close"):
         deformed_outlines(edges[:, :-1], nodes)

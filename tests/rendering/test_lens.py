@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.region import Region
 from fingervision.rendering.biarc import biarcs
 from fingervision.rendering.camera import Camera
@@ -125,9 +125,9 @@ def test_what_the_camera_sees_is_drawn_where_it_lies() -> None:
 
 
 def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(FingervisionError, match=r"must not fold the picture, but k1 = -0.5 with k2 = 0"):
+    with pytest.raises(DataError, match=r"must not fold the picture, but k1 = -0.5 with k2 = 0"):
         RadialLens(k1=-0.5)
-    with pytest.raises(FingervisionError, match=r"at most 45 degrees, seen from a positive distance, but is 60"):
+    with pytest.raises(DataError, match=r"at most 45 degrees, seen from a positive distance, but is 60"):
         Tilt(about_x_deg=60.0)
-    with pytest.raises(FingervisionError, match=r"from -1 px"):
+    with pytest.raises(DataError, match=r"from -1 px"):
         Tilt(distance_px=-1.0)

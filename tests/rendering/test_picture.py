@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gap import NoGap
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera
 from fingervision.rendering.dust import dust
@@ -237,25 +237,25 @@ def test_the_scene_of_the_whole_list_has_its_truth() -> None:
 
 
 def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(FingervisionError, match=r"blur_px must be at least 0.1, but is 0"):
+    with pytest.raises(DataError, match=r"blur_px must be at least 0.1, but is 0"):
         Camera(blur_px=0.0)
-    with pytest.raises(FingervisionError, match=r"blur_px must be at least 0.1, but is nan"):
+    with pytest.raises(DataError, match=r"blur_px must be at least 0.1, but is nan"):
         Camera(blur_px=float("nan"))
-    with pytest.raises(FingervisionError, match=r"noise_grey must be 0 or more, but is -1"):
+    with pytest.raises(DataError, match=r"noise_grey must be 0 or more, but is -1"):
         Camera(noise_grey=-1.0)
-    with pytest.raises(FingervisionError, match=r"bloom_px must be a number of pixels, but is inf"):
+    with pytest.raises(DataError, match=r"bloom_px must be a number of pixels, but is inf"):
         Camera(bloom_px=float("inf"))
-    with pytest.raises(FingervisionError, match=r"bits must be 8 or 16, but is 12"):
+    with pytest.raises(DataError, match=r"bits must be 8 or 16, but is 12"):
         Camera(bits=12)
-    with pytest.raises(FingervisionError, match=r"tint must be three factors of 0 or more.* but is \(1.0, 2.0\)"):
+    with pytest.raises(DataError, match=r"tint must be three factors of 0 or more.* but is \(1.0, 2.0\)"):
         Camera(tint=(1.0, 2.0))
-    with pytest.raises(FingervisionError, match=r"grey level must lie between 0 and 255, but is 300"):
+    with pytest.raises(DataError, match=r"grey level must lie between 0 and 255, but is 300"):
         Scene(light=Light(ground=300.0))
-    with pytest.raises(FingervisionError, match=r"at least one pixel each way, but is 0 x 480"):
+    with pytest.raises(DataError, match=r"at least one pixel each way, but is 0 x 480"):
         Scene(width_px=0)
-    with pytest.raises(FingervisionError, match=r"Light must not be negative: slopes lie between -2 and 2"):
+    with pytest.raises(DataError, match=r"Light must not be negative: slopes lie between -2 and 2"):
         Light(slope_x=2.5)
-    with pytest.raises(FingervisionError, match=r"width_px of a rim must be positive, but is 0"):
+    with pytest.raises(DataError, match=r"width_px of a rim must be positive, but is 0"):
         Rim(0.0, 250.0)
-    with pytest.raises(FingervisionError, match=r"Grains must have a number, a size and a level"):
+    with pytest.raises(DataError, match=r"Grains must have a number, a size and a level"):
         dust(3, np.random.default_rng(0), size_px=(0.0, 2.0))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera
@@ -188,26 +188,24 @@ def test_where_there_is_no_gap_there_is_a_reason(scene: Scene, status: Status) -
 
 
 def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(FingervisionError, match=r"at least the step between the tips \(30 px\), but is 20"):
+    with pytest.raises(DataError, match=r"at least the step between the tips \(30 px\), but is 20"):
         two_fingers(20.0, tip_step_px=30.0)
-    with pytest.raises(FingervisionError, match=r"Every size and tilt of two fingers must be a number"):
+    with pytest.raises(DataError, match=r"Every size and tilt of two fingers must be a number"):
         two_fingers(float("nan"))
-    with pytest.raises(FingervisionError, match=r"below_tip_px must lie between 0 and the finger's length, but is -1"):
+    with pytest.raises(DataError, match=r"below_tip_px must lie between 0 and the finger's length, but is -1"):
         two_fingers(20.0, below_tip_px=-1.0)
-    with pytest.raises(
-        FingervisionError, match=r"tilt must be at most 45 degrees, but is 90: choose another direction"
-    ):
+    with pytest.raises(DataError, match=r"tilt must be at most 45 degrees, but is 90: choose another direction"):
         two_fingers(20.0, tilt_deg=90.0)
-    with pytest.raises(FingervisionError, match=r"slant must be at most 45 degrees, but is 80"):
+    with pytest.raises(DataError, match=r"slant must be at most 45 degrees, but is 80"):
         two_fingers(20.0, tip=SquareTip(slant_deg=80.0))
     up, left = two_fingers(20.0), two_fingers(20.0, direction=Direction.LEFT)
-    with pytest.raises(FingervisionError, match=r"must be two and point the same way, but point up, left"):
+    with pytest.raises(DataError, match=r"must be two and point the same way, but point up, left"):
         truth(replace(up, fingers=(up.fingers[0], left.fingers[0])), IDEAL_CAMERA, BELOW_TIP_PX)
-    with pytest.raises(FingervisionError, match=r"width and length must be positive, but are 0 px and"):
+    with pytest.raises(DataError, match=r"width and length must be positive, but are 0 px and"):
         two_fingers(20.0, width_px=0.0)
-    with pytest.raises(FingervisionError, match=r"at most half the width"):
+    with pytest.raises(DataError, match=r"at most half the width"):
         two_fingers(20.0, width_px=40.0, radius_px=21.0)
-    with pytest.raises(FingervisionError, match=r"height must lie between 0 and the finger's length, but is 0 px"):
+    with pytest.raises(DataError, match=r"height must lie between 0 and the finger's length, but is 0 px"):
         two_fingers(20.0, tip=EllipticTip(0.0))
 
 

@@ -13,7 +13,7 @@ from calib.lens import Lens
 from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.calibration_json import read_calibration, write_calibration
 
 
@@ -100,7 +100,7 @@ def test_nonsense_is_refused(tmp_path: Path, edit: dict[str, Any], sentence: str
     path = tmp_path / "calibration.json"
     write_calibration(calibration(), path)
     path.write_text(json.dumps(json.loads(path.read_text()) | edit))
-    with pytest.raises(FingervisionError) as caught:
+    with pytest.raises(DataError) as caught:
         read_calibration(path)
     assert sentence in str(caught.value)
     assert str(path) in str(caught.value)
@@ -119,15 +119,15 @@ def test_nonsense_is_refused(tmp_path: Path, edit: dict[str, Any], sentence: str
 def test_what_is_no_calibration_file(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "calibration.json"
     path.write_bytes(text.encode("latin-1"))
-    with pytest.raises(FingervisionError) as caught:
+    with pytest.raises(DataError) as caught:
         read_calibration(path)
     assert sentence in str(caught.value)
 
 
 def test_no_file_and_no_place(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match="There is no calibration file"):
+    with pytest.raises(InputFileError, match="There is no calibration file"):
         read_calibration(tmp_path / "none.json")
-    with pytest.raises(FingervisionError, match=r"could not be written .* name another place with -o"):
+    with pytest.raises(OutputError, match=r"could not be written .* name another place with -o"):
         write_calibration(calibration(), tmp_path / "none" / "calibration.json")
 
 

@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, ModelError
 from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
 from fingervision.storage.drawing_numbers import bare_tables, changed_tables
 from fingervision.storage.mechanism_toml import read_drawing
@@ -37,7 +37,7 @@ def test_uncertain_numbers_are_taken_apart_and_changed() -> None:
         "thickness_mm": 0.3,
     }
     assert bare["lengths"]["t"] == "plate / 2"
-    with pytest.raises(FingervisionError, match=r"m.toml has no number lengths.x; it has flexure"):
+    with pytest.raises(DataError, match=r"m.toml has no number lengths.x; it has flexure"):
         changed_tables(bare, {"lengths.x": 1.0}, "m.toml")
 
 
@@ -62,16 +62,16 @@ def test_a_leafs_thickness_counts_three_times(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_uncertainty_is_one_sentence(tmp_path: Path, value: str, sentence: str) -> None:
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(DataError, match=sentence):
         read_drawing(drawn(tmp_path, t=value)).mechanism()
 
 
 def test_other_keys_beside_value_and_u_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match=r"lengths.t in .* must be a number"):
+    with pytest.raises(DataError, match=r"lengths.t in .* must be a number"):
         read_drawing(drawn(tmp_path, t="{ value = 0.8, sigma = 0.1 }")).mechanism()
 
 
 def test_an_uncertainty_that_leaves_no_mechanism_is_refused(tmp_path: Path) -> None:
     drawing = read_drawing(drawn(tmp_path, t="{ value = 0.8, u = 0.9 }"))
-    with pytest.raises(FingervisionError, match=r"The uncertainty of lengths.t must leave a drawing that works"):
+    with pytest.raises(ModelError, match=r"The uncertainty of lengths.t must leave a drawing that works"):
         mechanism_uncertainty(drawing.mechanism, drawing.estimates)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError
 from fingervision.storage.drive_csv import read_drive
 
 
@@ -49,13 +49,13 @@ def test_runs_and_force_may_be_missing(tmp_path: Path) -> None:
     ],
 )
 def test_a_bad_table_is_refused_in_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(DataError, match=sentence):
         read_drive(table(tmp_path / "drive.csv", text))
 
 
 def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match="There is no drive table"):
+    with pytest.raises(InputFileError, match="There is no drive table"):
         read_drive(tmp_path / "drive.csv")
     (tmp_path / "drive.csv").write_bytes(b"\xff\xfe\x00\x81" * 10)
-    with pytest.raises(FingervisionError, match="must be a CSV table in UTF-8"):
+    with pytest.raises(DataError, match="must be a CSV table in UTF-8"):
         read_drive(tmp_path / "drive.csv")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import COLUMNS, MM_PLACES, GapRow, GapsCsv
 
@@ -78,5 +78,5 @@ def test_a_full_disk_leaves_whole_rows_and_a_sentence(tmp_path: Path) -> None:
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match=r"could not be written .* name another folder with --out"):
+    with pytest.raises(OutputError, match=r"could not be written .* name another folder with --out"):
         GapsCsv(tmp_path / "nowhere" / "gaps.csv")

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError
 from fingervision.storage.gripper_toml import gripper_from_tables, read_gripper
 
 ROOT = Path(__file__).parents[2]
@@ -62,7 +62,7 @@ def test_an_uncertainty_may_stand_beside_a_number() -> None:
     ],
 )
 def test_what_cannot_be_a_gripper_is_refused_in_a_sentence(changes: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(FingervisionError) as refused:
+    with pytest.raises(DataError) as refused:
         gripper_from_tables(tables(**changes), "g")
     assert sentence in str(refused.value)
 
@@ -70,21 +70,21 @@ def test_what_cannot_be_a_gripper_is_refused_in_a_sentence(changes: dict[str, An
 def test_missing_parts_are_named() -> None:
     whole = tables()
     del whole["material"]
-    with pytest.raises(FingervisionError, match=r"must have a section \[material\], but has none"):
+    with pytest.raises(DataError, match=r"must have a section \[material\], but has none"):
         gripper_from_tables(whole, "g")
     whole = tables()
     del whole["body"]["plate_mm"]
-    with pytest.raises(FingervisionError, match=r"must state body\.plate_mm, but does not"):
+    with pytest.raises(DataError, match=r"must state body\.plate_mm, but does not"):
         gripper_from_tables(whole, "g")
     whole = tables()
     whole["hinges"] = {}
-    with pytest.raises(FingervisionError, match="unknown section, hinges; did you mean hinge"):
+    with pytest.raises(DataError, match="unknown section, hinges; did you mean hinge"):
         gripper_from_tables(whole, "g")
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(FingervisionError, match="There is no gripper"):
+    with pytest.raises(InputFileError, match="There is no gripper"):
         read_gripper(tmp_path / "none.toml")
     (tmp_path / "bad.toml").write_text("[hinge")
-    with pytest.raises(FingervisionError, match="must be TOML, but is not"):
+    with pytest.raises(DataError, match="must be TOML, but is not"):
         read_gripper(tmp_path / "bad.toml")

@@ -8,7 +8,7 @@ import pytest
 
 from fingervision.diagnosis.input.repeated_targets import RepeatedTargets, repeated_targets
 from fingervision.diagnosis.report.positioning_accuracy import positioning_accuracy
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.iso230_table import read_iso230_table
 from fingervision.storage.measured_table import read_measured_table
 
@@ -234,7 +234,7 @@ def test_a_file_that_is_not_there_is_left_to_its_reader(tmp_path: Path) -> None:
     ],
 )
 def test_bad_tables_end_in_a_sentence(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(FingervisionError, match=words):
+    with pytest.raises(DataError, match=words):
         read_iso230_table(write(tmp_path, text))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError, OutputError
+from fingervision.domain.errors import DataError, OutputError
 from fingervision.effects import catalogue
 from fingervision.frames.image_file import PNG_SIGNATURE, UnreadableImageError, read_image
 from fingervision.storage.calibration_json import read_calibration
@@ -31,13 +31,13 @@ def model(folder: Path, parameters: str, name: str = "backlash") -> Path:
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "-1.0", "1e9", "1" * 400])
 def test_a_parameter_outside_its_bounds_is_refused(tmp_path: Path, value: str) -> None:
-    with pytest.raises(FingervisionError, match="play_mm"):
+    with pytest.raises(DataError, match="play_mm"):
         read_model(model(tmp_path, f"play_mm = {{ value = {value}, u = 0.001 }}"))
 
 
 @pytest.mark.parametrize("u", ["nan", "inf", "-1.0"])
 def test_an_uncertainty_that_is_none_is_refused(tmp_path: Path, u: str) -> None:
-    with pytest.raises(FingervisionError, match="u of play_mm"):
+    with pytest.raises(DataError, match="u of play_mm"):
         read_model(model(tmp_path, f"play_mm = {{ value = 0.01, u = {u} }}"))
 
 
@@ -54,14 +54,14 @@ def test_the_bounds_themselves_are_taken(tmp_path: Path) -> None:
 def test_what_is_no_effect_is_a_sentence(tmp_path: Path, effect: str) -> None:
     (tmp_path / "simulation.csv").write_text(SIMULATION)
     (tmp_path / "model.toml").write_text(f"schema = 1\nbase = 'simulation.csv'\n{effect}\n")
-    with pytest.raises(FingervisionError, match="effect"):
+    with pytest.raises(DataError, match="effect"):
         read_model(tmp_path / "model.toml")
 
 
 def test_a_model_that_names_itself_is_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "model.toml").write_text("schema = 1\nbase = 'other.toml'\n")
     (tmp_path / "other.toml").write_text("schema = 1\nbase = 'model.toml'\n")
-    with pytest.raises(FingervisionError, match="leads back to itself"):
+    with pytest.raises(DataError, match="leads back to itself"):
         read_model(tmp_path / "model.toml")
 
 
@@ -74,7 +74,7 @@ def test_a_byte_order_mark_is_no_fault(tmp_path: Path) -> None:
 def test_a_column_that_numbers_the_rows_is_no_run(tmp_path: Path) -> None:
     rows = [f"{k % 7},{k % 5},{k}" for k in range(MOST_RUNS + 1)]
     (tmp_path / "table.csv").write_text("\n".join(["input_mm,gap_mm,run", *rows]))
-    with pytest.raises(FingervisionError, match=f"at most {MOST_RUNS} runs, but has {MOST_RUNS + 1}"):
+    with pytest.raises(DataError, match=f"at most {MOST_RUNS} runs, but has {MOST_RUNS + 1}"):
         read_measured_table(tmp_path / "table.csv")
 
 
@@ -100,9 +100,9 @@ def test_a_number_without_end_is_a_sentence_in_every_document(tmp_path: Path, nu
     ):
         path = tmp_path / Path(name).name
         path.write_text(key.sub(rf"\g<1>{number}", (top / name).read_text(encoding="utf-8"), count=1), encoding="utf-8")
-        with pytest.raises(FingervisionError):
+        with pytest.raises(DataError):
             read(path)
-    with pytest.raises(FingervisionError):
+    with pytest.raises(DataError):
         read_model(model(tmp_path, f"play_mm = {{ value = {number} }}"))
 
 
@@ -110,6 +110,14 @@ def test_a_recipes_name_may_hold_quotes(tmp_path: Path) -> None:
     step = {"kind": "move", "to_mm": 0.3, "speed_mm_s": 0.5}
     write_recipe(tmp_path / "recipe.toml", 'two "speeds" \\ one', [step])
     assert read_recipe(tmp_path / "recipe.toml").name == 'two "speeds" \\ one'
+
+
+def test_a_recipe_holds_no_negative_zero(tmp_path: Path) -> None:
+    step = {"kind": "triangle", "from_mm": -0.0, "to_mm": 0.3, "speed_mm_s": 0.5, "cycles": 2}
+    write_recipe(tmp_path / "recipe.toml", "zero", [step])
+    text = (tmp_path / "recipe.toml").read_text(encoding="utf-8")
+    assert "from_mm = 0.0\n" in text
+    assert "cycles = 2\n" in text
 
 
 @pytest.mark.parametrize("name", ['it\'s "one".csv', "two\nlines.csv", "narrow\u202fspace.csv", "back\\slash.csv"])

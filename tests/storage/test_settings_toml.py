@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli._where_to_measure import where_to_measure
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.settings_toml import read_settings, write_settings
 
 WHOLE = """schema = 1
@@ -44,6 +44,8 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
         ("schema = 2", "2"),
         ("schema = 1\npx_per_mm = -3", "px_per_mm"),
         ('schema = 1\npx_per_mm = "34"', "px_per_mm"),
+        ("schema = 1\nu_px_per_mm = 0.1", "add px_per_mm"),
+        ("schema = 1\npx_per_mm = 34\nu_px_per_mm = 0", "u_px_per_mm"),
         ('schema = 1\npx_per_mm = 34\ncalibration = "c.json"', "both"),
         ('schema = 1\ntips = "sideways"', "tips"),
         ("schema = 1\nroi = [1, 2, 3]", "roi"),
@@ -59,7 +61,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 def test_a_wrong_file_is_refused_with_what_is_wrong(text: str, fact: str, tmp_path: Path) -> None:
     path = tmp_path / "settings.toml"
     path.write_text(text)
-    with pytest.raises(FingervisionError, match=fact):
+    with pytest.raises(DataError, match=fact):
         read_settings(path)
 
 
@@ -82,9 +84,29 @@ def test_the_commands_take_it_and_what_is_given_comes_first(tmp_path: Path) -> N
     path.write_text(WHOLE)
     options = ("--settings", str(path))
     assert taken(*options) == {
-        "calibration": tmp_path / "calibration.json", "px_per_mm": None, "below_tip_mm": 0.4, "tips": "down",
+        "calibration": tmp_path / "calibration.json", "px_per_mm": None, "u_px_per_mm": None, "below_tip_mm": 0.4,
+        "tips": "down",
         "roi": "1,2,300,200",
     }  # fmt: skip
     given = taken(*options, "--px-per-mm", "12", "--tips", "up")
     assert (given["px_per_mm"], given["calibration"], given["tips"]) == (12.0, None, "up")
     assert taken("--px-per-mm", "12")["below_tip_mm"] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ((), (20.0, 0.3, None)),
+        (("--px-per-mm", "40"), (40.0, None, None)),
+        (("--px-per-mm", "40", "--u-px-per-mm", "1"), (40.0, 1.0, None)),
+        (("--u-px-per-mm", "1"), (20.0, 1.0, None)),
+        (("--calibration", "c.json"), (None, None, Path("c.json"))),
+    ],
+)
+def test_an_uncertainty_belongs_to_the_scale_beside_it(
+    tmp_path: Path, options: tuple[str, ...], expected: tuple[object, ...]
+) -> None:
+    path = tmp_path / "settings.toml"
+    path.write_text("schema = 1\npx_per_mm = 20.0\nu_px_per_mm = 0.3\n")
+    given = taken("--settings", str(path), *options)
+    assert (given["px_per_mm"], given["u_px_per_mm"], given["calibration"]) == expected

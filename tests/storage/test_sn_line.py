@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.gripper_toml import gripper_from_tables
 
 TABLES = tomllib.loads((Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml").read_text())
@@ -51,11 +51,11 @@ def test_an_sn_line_and_an_expansion_are_read() -> None:
     ],
 )
 def test_a_wrong_sn_line_is_one_sentence(line: Any, sentence: str) -> None:
-    with pytest.raises(FingervisionError, match=sentence):
+    with pytest.raises(DataError, match=sentence):
         drawn(sn_line=line)
 
 
 @pytest.mark.parametrize("expansion", [1.0, float("inf"), "warm", True])
 def test_a_wrong_expansion_is_one_sentence(expansion: Any) -> None:
-    with pytest.raises(FingervisionError, match=r"material.thermal_expansion_per_k in g.toml must"):
+    with pytest.raises(DataError, match=r"material.thermal_expansion_per_k in g.toml must"):
         drawn(thermal_expansion_per_k=expansion)

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli.model import command
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.gripper_toml import gripper_from_tables
 
 REFERENCE = Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml"
@@ -101,7 +101,7 @@ def drawing(changes: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize(("changes", "named"), WRONG, ids=[str(i) for i in range(len(WRONG))])
 def test_a_wrong_drawing_is_one_sentence(changes: dict[str, Any], named: str) -> None:
-    with pytest.raises(FingervisionError) as refused:
+    with pytest.raises(DataError) as refused:
         gripper_from_tables(drawing(changes), "g.toml")
     sentence = str(refused.value)
     assert named in sentence
@@ -117,6 +117,6 @@ def test_there_are_sixty() -> None:
 def test_nothing_is_written_for_a_wrong_drawing(tmp_path: Path) -> None:
     wrong = tmp_path / "g.toml"
     wrong.write_text(REFERENCE.read_text().replace("radius_mm = 4.0", "radius_mm = 1.0"))
-    with pytest.raises(FingervisionError):
+    with pytest.raises(DataError):
         CliRunner().invoke(command, [str(wrong), "--out", str(tmp_path / "o")], catch_exceptions=False)
     assert not (tmp_path / "o").exists()

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, MissingLibraryError
 from fingervision.tables import needed_library, text_file
-from fingervision.tables.formats import xlsx
+from fingervision.tables.formats import read_raw, xlsx
 from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry
 from fingervision.tables.read import read_drive, read_measured_table, read_model
@@ -31,7 +31,7 @@ def rewritten(path: Path, **parts: bytes) -> Path:
 
 
 def refused(path: Path) -> str:
-    with pytest.raises(FingervisionError) as caught:
+    with pytest.raises(DataError) as caught:
         read_measured_table(path)
     return str(caught.value)
 
@@ -48,6 +48,13 @@ def test_a_long_line_below_a_good_header_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "line.csv"
     path.write_text("time [s],position [mm],gap [mm]\n0,1,2\n" + "1," * text_file.LONGEST_LINE)
     assert "a line of more than 1000000 characters" in refused(path)
+
+
+def test_a_table_of_a_hundred_thousand_columns_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "wide.csv"
+    path.write_text(",".join(f"c{k}" for k in range(100_000)) + "\n" + ",".join("1" * 100_000) + "\n")
+    with pytest.raises(FingervisionError, match="at most 4096 columns, but has 100000"):
+        read_raw(path, Entry())
 
 
 def test_a_text_of_more_than_a_gigabyte_is_refused(tmp_path: Path) -> None:
@@ -184,7 +191,7 @@ def test_a_missing_library_is_a_sentence(tmp_path: Path, monkeypatch: pytest.Mon
 
     path = binary.tdms_channels(tmp_path)
     monkeypatch.setattr(needed_library, "importlib", SimpleNamespace(import_module=missing))
-    with pytest.raises(FingervisionError, match=r"fingervision\[formats\]"):
+    with pytest.raises(MissingLibraryError, match=r"fingervision\[formats\]"):
         read_drive(path)
 
 
@@ -193,7 +200,7 @@ def test_a_reader_that_crashes_is_a_sentence(tmp_path: Path) -> None:
     module.write_text("import os, signal\ndef read(path, given):\n    os.kill(os.getpid(), signal.SIGSEGV)\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(tmp_path)
-        with pytest.raises(FingervisionError, match=r"crashed on it \(signal 11"):
+        with pytest.raises(DataError, match=r"crashed on it \(signal 11"):
             read_apart("crashing_reader", tmp_path / "table.mat", Entry())
 
 

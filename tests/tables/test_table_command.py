@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
-from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
+from fingervision.domain.errors import DataError, ExitCode, NoCalibrationError, UsageError
 from fingervision.tables.mapping import entry_for
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.read import read_drive, read_measured_table, read_model
@@ -115,7 +115,7 @@ def test_own_tables_are_read_to_the_letter_and_need_no_mapping(tmp_path: Path) -
     assert not (tmp_path / "columns.toml").exists()
     assert read_drive(table).input_mm.tolist() == [1.0, 1.0]
     table.write_text("time_s,input_mm\n0,nan\n")
-    with pytest.raises(FingervisionError, match="input_mm in line 2"):
+    with pytest.raises(DataError, match="input_mm in line 2"):
         read_drive(table)
 
 
@@ -134,7 +134,7 @@ def test_own_tables_are_read_to_the_letter_and_need_no_mapping(tmp_path: Path) -
 def test_a_wrong_mapping_is_a_sentence(text: str, words: str, tmp_path: Path) -> None:
     table = copied("german_logger.csv", tmp_path)
     (tmp_path / "columns.toml").write_text(text)
-    with pytest.raises(FingervisionError, match=words):
+    with pytest.raises(DataError, match=words):
         read_measured_table(table)
 
 
@@ -204,5 +204,5 @@ def test_a_moving_run_has_no_repeatability(tmp_path: Path) -> None:
     held = [gaps(tmp_path, f"held{k}.csv", 4.0 + 0.0003 * rng.standard_normal(60)) for k in (1, 2)]
     assert "repeatability" in call("calibrate", "repeat", *held, "--tolerance-mm", "0.02")
     moving = gaps(tmp_path, "moving.csv", 4.0 + 8.0 * np.sin(np.arange(60) / 9.0) + 0.0003 * rng.standard_normal(60))
-    with pytest.raises(FingervisionError, match=r"moving\.csv.*move from"):
+    with pytest.raises(NoCalibrationError, match=r"moving\.csv.*move from"):
         call("calibrate", "repeat", held[0], moving, "--tolerance-mm", "0.02")

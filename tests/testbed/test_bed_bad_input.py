@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pytest
 
 from fingervision.demonstration.demonstrate import demonstrate
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, DeviceError, FingervisionError, LimitError, OutputError
 from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.testbed.actuator import Actuator, Alarm
@@ -44,28 +44,28 @@ gap_mm = {gap_mm}
     [
         (
             'kind = "triangle"\nfrom_mm = -0.3\nto_mm = 1.9\nspeed_mm_s = 0.5',
-            "to_mm in line 6 of {path} leads beyond the bed's limit of position, 1.45 mm: it needs 1.9, which is "
+            "to_mm in line 6 of {path} leads beyond the test bed's limit of position, 1.45 mm: it needs 1.9, which is "
             "0.45 mm too much. Nothing was moved.",
         ),
         (
             'kind = "move"\nto_mm = -0.5\nspeed_mm_s = 0.5',
-            "to_mm in line 5 of {path} leads below the bed's limit of position, -0.46 mm: it needs -0.5, which is "
+            "to_mm in line 5 of {path} leads below the test bed's limit of position, -0.46 mm: it needs -0.5, which is "
             "0.04 mm too little. Nothing was moved.",
         ),
         (
             'kind = "move"\nto_mm = 0.9\nspeed_mm_s = 500',
-            "speed_mm_s in line 6 of {path} leads beyond the bed's limit of speed, 400 mm/s: it needs 500, which is "
-            "100 mm/s too much. Nothing was moved.",
+            "speed_mm_s in line 6 of {path} leads beyond the test bed's limit of speed, 400 mm/s: it needs 500, which "
+            "is 100 mm/s too much. Nothing was moved.",
         ),
         (
             'kind = "sine"\nmean_mm = 1.2\namplitude_mm = 0.5\nfrequency_hz = 0.1',
-            "amplitude_mm in line 6 of {path} leads beyond the bed's limit of position, 1.45 mm: it needs 1.7, which "
-            "is 0.25 mm too much. Nothing was moved.",
+            "amplitude_mm in line 6 of {path} leads beyond the test bed's limit of position, 1.45 mm: it needs 1.7, "
+            "which is 0.25 mm too much. Nothing was moved.",
         ),
         (
             'kind = "close_until_contact"\nspeed_mm_s = 1.0\nbelow_force_n = 7.0',
-            "below_force_n in line 6 of {path} leads beyond the bed's limit of force, 5 N: it needs 7, which is 2 N "
-            "too much. Nothing was moved.",
+            "below_force_n in line 6 of {path} leads beyond the test bed's limit of force, 5 N: it needs 7, which is "
+            "2 N too much. Nothing was moved.",
         ),
         (
             'kind = "moove"\nto_mm = 1',
@@ -96,7 +96,7 @@ gap_mm = {gap_mm}
 )
 def test_a_recipe_that_cannot_be_run_is_said_with_its_line(tmp_path: Path, step: str, sentence: str) -> None:
     kinds = "close_until_contact, hold, move, reference_slot, rezero, shift_picture, sine, staircase, triangle"
-    with pytest.raises(FingervisionError) as caught:
+    with pytest.raises(DataError) as caught:
         run(tmp_path, steps(step))
     path = tmp_path / "recipe.toml"
     assert str(caught.value) == sentence.format(path=path, kinds=f"{kinds}, turn_part_180")
@@ -105,7 +105,7 @@ def test_a_recipe_that_cannot_be_run_is_said_with_its_line(tmp_path: Path, step:
 
 def test_a_force_that_the_gripper_would_need_is_foreseen(tmp_path: Path) -> None:
     text = 'schema = 1\nbelow_force_n = 1.0\n[[step]]\nkind = "move"\nto_mm = 1.2\nspeed_mm_s = 1.0\n'
-    with pytest.raises(FingervisionError, match=r"to_mm in line 5 .* limit of force at 1\.2 mm, 1 N: it needs 2\.46"):
+    with pytest.raises(DataError, match=r"to_mm in line 5 .* limit of force at 1\.2 mm, 1 N: it needs 2\.46"):
         run(tmp_path, text)
 
 
@@ -123,11 +123,11 @@ def test_a_sine_needs_an_actuator_that_goes_anywhere(tmp_path: Path) -> None:
     bed = replace(bed, actuator=Stepping(bed.actuator))  # type: ignore[arg-type]
     sine = 'kind = "sine"\nmean_mm = 0.2\namplitude_mm = 0.1\nfrequency_hz = 0.1'
     recipe = recipe_at(tmp_path, steps(sine))
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(LimitError) as raised:
         run_recipe(read_recipe(recipe), bed, tmp_path / "run")
     assert str(raised.value) == (
-        f"kind in line 4 of {recipe} cannot be done: A sine must be driven in short moves to anywhere on its way, but "
-        "this actuator goes only where its step data lead. Use a triangle or a staircase between two of its steps. "
+        f"kind in line 4 of {recipe} cannot be executed: A sine must be driven in short moves to anywhere on its way, "
+        "but this actuator goes only where its step data lead. Use a triangle or a staircase between two of its steps. "
         "Nothing was moved."
     )
     assert not (tmp_path / "run").exists()
@@ -137,9 +137,7 @@ def test_a_camera_that_sees_no_fingers_lets_nothing_move(tmp_path: Path) -> None
     config = tmp_path / "blind.toml"
     config.write_text(BED.format(camera="off_centre_mm = 30.0", gap_mm=0.0))
     bed = open_bed(str(config))
-    with pytest.raises(
-        FingervisionError, match="The camera must show both fingers before anything moves, but does not"
-    ):
+    with pytest.raises(DeviceError, match="The camera must show both fingers before anything moves, but does not"):
         run_recipe(read_recipe(recipe_at(tmp_path, steps(MOVE))), bed, tmp_path / "run")
     assert bed.actuator.readings()[-1].value == 0.0
     # Nothing was recorded: with the view mended, the same folder will do.
@@ -176,7 +174,7 @@ def test_a_gap_below_the_limit_stops_the_motor(tmp_path: Path) -> None:
     config.write_text(BED.format(camera="", gap_mm=2.0))
     text = steps('kind = "move"\nto_mm = -0.25\nspeed_mm_s = 0.5')
     hidden = Hidden({"rest_gap_error": {"offset_mm": -0.5}})
-    with pytest.raises(FingervisionError, match=r"The gap must stay above 2 mm, but is 1\.9\d+ mm at .*was stopped"):
+    with pytest.raises(LimitError, match=r"The gap must stay above 2 mm, but is 1\.9\d+ mm at .*was stopped"):
         run(tmp_path, text, hidden, str(config))
 
 
@@ -189,7 +187,7 @@ def test_an_alarm_stops_the_run_and_is_said(tmp_path: Path) -> None:
 
     bed = open_bed("simulated")
     recipe = read_recipe(recipe_at(tmp_path))
-    with pytest.raises(FingervisionError, match=r"The actuator .* alarm.* E7 \(overload\)"):
+    with pytest.raises(DeviceError, match=r"The actuator .* alarm.* E7 \(overload\)"):
         run_recipe(recipe, bed, tmp_path / "run", on_progress=Failing(bed).say_when)
     assert not bed.actuator.busy
     assert json.loads((tmp_path / "run" / "run.json").read_text())["complete"] is False
@@ -198,7 +196,7 @@ def test_an_alarm_stops_the_run_and_is_said(tmp_path: Path) -> None:
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.tex").write_text("mine")
-    with pytest.raises(FingervisionError, match=r"must be a new or empty folder, but .* holds thesis\.tex"):
+    with pytest.raises(OutputError, match=r"must be a new or empty folder, but .* holds thesis\.tex"):
         run(tmp_path, steps(MOVE))
     assert (tmp_path / "run" / "thesis.tex").read_text() == "mine"
 
@@ -209,7 +207,7 @@ def test_a_demonstration_leaves_other_files_alone(tmp_path: Path) -> None:
         (tmp_path, f"--out must be a new or empty folder, but {tmp_path} holds thesis.tex: name another."),
         (tmp_path / "thesis.tex", f"--out must be a folder, but {tmp_path / 'thesis.tex'} is a file: name another."),
     ):
-        with pytest.raises(FingervisionError) as raised:
+        with pytest.raises(OutputError) as raised:
             demonstrate(Hidden(), 1, out, lambda words: None)
         assert str(raised.value) == sentence
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
@@ -218,7 +216,7 @@ def test_a_demonstration_leaves_other_files_alone(tmp_path: Path) -> None:
 def test_a_finished_run_is_left_alone(tmp_path: Path) -> None:
     run(tmp_path, steps(MOVE))
     table = (tmp_path / "run" / "samples.csv").read_bytes()
-    with pytest.raises(FingervisionError, match=r"is finished already: name another folder"):
+    with pytest.raises(OutputError, match=r"is finished already: name another folder"):
         run(tmp_path, steps(MOVE))
     assert (tmp_path / "run" / "samples.csv").read_bytes() == table
 
@@ -226,7 +224,7 @@ def test_a_finished_run_is_left_alone(tmp_path: Path) -> None:
 def test_two_programs_on_one_folder(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     lock = FolderLock(tmp_path / "run")
-    with pytest.raises(FingervisionError, match="is in use by another run: wait for its end"):
+    with pytest.raises(OutputError, match="is in use by another run: wait for its end"):
         run(tmp_path, steps(MOVE))
     lock.release()
     run(tmp_path, steps(MOVE))
@@ -235,7 +233,7 @@ def test_two_programs_on_one_folder(tmp_path: Path) -> None:
 def test_a_full_disk_is_seen_before_anything_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda path: type("Usage", (), {"free": 1000})())
     with pytest.raises(
-        FingervisionError, match=r"needs up to \d+ MB, but .* has 0 MB free: free disk space.*Nothing was moved"
+        OutputError, match=r"needs up to \d+ MB, but .* has 0 MB free: free disk space.*Nothing was moved"
     ):
         run(tmp_path, steps(MOVE))
 
@@ -272,7 +270,7 @@ def test_a_disk_that_fills_up_ends_the_run_in_a_sentence(tmp_path: Path) -> None
 def test_a_bed_that_makes_no_sense_is_said(tmp_path: Path, text: str, sentence: str) -> None:
     config = tmp_path / "bed.toml"
     config.write_text(text)
-    with pytest.raises(FingervisionError) as caught:
+    with pytest.raises(DataError) as caught:
         open_bed(str(config))
     assert sentence.format(path=config) in str(caught.value)
 
@@ -280,5 +278,5 @@ def test_a_bed_that_makes_no_sense_is_said(tmp_path: Path, text: str, sentence: 
 def test_a_bed_without_a_camera_or_a_scale_is_said(tmp_path: Path) -> None:
     config = tmp_path / "bed.toml"
     config.write_text('schema = 1\n[actuator]\nkind = "simulated"\n')
-    with pytest.raises(FingervisionError, match=r"A run needs a camera, but the test bed has none: add a \[camera\]"):
+    with pytest.raises(DataError, match=r"A run needs a camera, but the test bed has none: add a \[camera\]"):
         run(tmp_path, steps(MOVE), bed_name=str(config))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import LimitError
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testing import ActuatorContract, CameraContract, ForceSensorContract, NotApplicable, checks_of
@@ -56,7 +56,7 @@ def test_every_camera_keeps_the_contract(bed: Bed, check: str) -> None:
 
 def test_a_motion_that_is_refused_says_that_nothing_was_moved(bed: Bed) -> None:
     limits = bed.actuator.limits
-    with pytest.raises(FingervisionError, match=r"but is .*nothing was moved"):
+    with pytest.raises(LimitError, match=r"but is .*nothing was moved"):
         bed.actuator.move(limits.upper_mm + 0.1, 1.0)
-    with pytest.raises(FingervisionError, match=r"The speed must be .*nothing was moved"):
+    with pytest.raises(LimitError, match=r"The speed must be .*nothing was moved"):
         bed.actuator.move(0.0, limits.speed_mm_s * 1.01)

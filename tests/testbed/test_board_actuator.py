@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from fingervision.cli import cli
 from fingervision.domain.board_settings import Role
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.testbed.actuators.board import BoardActuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
@@ -136,20 +136,20 @@ def test_a_move_that_no_step_makes_is_refused_before_anything_moves(bed: Bed, co
     stands(bed)
     for move, said in (
         ((1.23, 50.0), "A step must lead to 1.23 mm, but none does: the controller goes to 0, 5, 9 mm, and by its "
-         "relative steps from there. Give it a step to 1.23 mm, or change the move."),
+         "relative steps from there. Store a step to 1.23 mm in the controller, or change the move."),
         ((5.0, 10.0), "The move to 5 mm must not be faster than 10 mm/s, but the slowest step that leads there goes at "
          "20 mm/s: allow that, or give the controller a slower step."),
         ((11.0, 10.0), "The target must lie between 0 and 10 mm, but is 11 mm: nothing was moved."),
         ((5.0, 500.0), "The speed must be at most 400 mm/s, but is 500 mm/s: nothing was moved."),
     ):  # fmt: skip
-        with pytest.raises(FingervisionError) as raised:
+        with pytest.raises(LimitError) as raised:
             bed.actuator.move(*move)
         assert str(raised.value) == said
     assert controller.codes == [0]
 
 
 def test_before_homing_only_absolute_steps_lead_anywhere(bed: Bed, controller: MotorController) -> None:
-    with pytest.raises(FingervisionError, match=r"^The position must be known before the relative step 3, but is not"):
+    with pytest.raises(StateError, match=r"^The position must be known before the relative step 3, but is not"):
         bed.actuator.run_step(3)
     bed.actuator.move(5.0, 50.0)
     assert stands(bed) == 5.0
@@ -170,7 +170,7 @@ def test_a_stop_drops_the_drive_line_and_the_position_is_unknown_until_an_absolu
     emulated.wait_for(lambda edge: edge.level(6) == 0, since=since)
     assert 0.0 <= stands(bed) < 9.0
     assert bed.actuator.alarm is None
-    with pytest.raises(FingervisionError, match=r"^The position must be known before the relative step 3"):
+    with pytest.raises(StateError, match=r"^The position must be known before the relative step 3"):
         bed.actuator.run_step(3)
     bed.actuator.run_step(2)
     assert stands(bed) == 5.0
@@ -199,9 +199,9 @@ def test_an_alarm_stops_the_motion_and_is_cleared_by_homing(
     emulated.outside(Role.ALARM, True)
     wait_until(bed, lambda: bed.actuator.alarm is not None)
     stands(bed)
-    with pytest.raises(FingervisionError, match=r"^The actuator must have no alarm, but has alarm"):
+    with pytest.raises(DeviceError, match=r"^The actuator must have no alarm, but has alarm"):
         bed.actuator.move(5.0, 50.0)
-    with pytest.raises(FingervisionError, match=r"^The motor controller must have no alarm, but its alarm line is act"):
+    with pytest.raises(DeviceError, match=r"^The motor controller must have no alarm, but its alarm line is act"):
         bed.actuator.home()
     emulated.outside(Role.ALARM, False)
     wait_until(bed, lambda: bed.actuator.alarm is not None and bed.actuator.alarm.code == "dropped")
@@ -247,7 +247,9 @@ def test_a_jog_repeats_relative_steps_until_the_limit_of_the_bed(bed_toml: Path,
 
 def test_a_jog_from_an_unknown_position_is_refused(bed_toml: Path, controller: MotorController) -> None:
     done = CliRunner().invoke(cli, ["bed", "jog", "20", "--bed", str(bed_toml)])
-    assert str(done.exception).startswith("The position must be known before the relative step 3, but is not")
+    assert str(done.exception).startswith(
+        "The stage's position must be known before the relative step 3, but is unknown"
+    )
     assert controller.codes == []
 
 
@@ -309,7 +311,7 @@ def test_a_recipe_that_the_steps_cannot_do_is_refused_before_anything_moves(
     recipe.write_text('schema = 1\nbelow_force_n = 2.0\n[[step]]\nkind = "move"\nto_mm = 0.7\nspeed_mm_s = 50.0\n')
     done = CliRunner().invoke(cli, ["bed", "run", str(recipe), "--bed", str(bed_toml), "--out", str(tmp_path / "run")])
     assert str(done.exception).startswith(
-        f"to_mm in line 5 of {recipe} cannot be done: A step must lead to 0.7 mm, but "
+        f"to_mm in line 5 of {recipe} cannot be executed: A step must lead to 0.7 mm, but "
     )
     assert controller.codes == []
     assert not (tmp_path / "run").exists()

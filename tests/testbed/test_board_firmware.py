@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fingervision.domain.board_settings import SELECT, Role
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 from fingervision.testbed.board.board import Board, opened
 from fingervision.testbed.board.link import ASK_EVERY_S
 from fingervision.testbed.board.wire import Levels
@@ -100,7 +100,7 @@ def test_busy_and_alarm_are_read_back(emulated: EmulatedBoard, board: Board) -> 
     while board.dropped is None:
         board.wait(0.01)
     assert board.dropped == "the motor controller raised its alarm"
-    with pytest.raises(FingervisionError, match=r"^The board must be cleared before it moves again, because the motor"):
+    with pytest.raises(DeviceError, match=r"^The board must be cleared before it moves again, because the motor"):
         board.run(3, 1.0)
 
 
@@ -213,7 +213,7 @@ def test_a_reset_in_the_middle_is_said_and_lets_go_of_every_line(emulated: Emula
     board.run(3, 10.0)
     wait_for(emulated, board, Levels.DRIVE)
     emulated.say("reset")
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(DeviceError) as raised:
         until_lost(board)
     assert str(raised.value) == (
         f"The board on {emulated.port} was reset in the middle, by its button, its supply or another program; all its "
@@ -229,12 +229,12 @@ def test_a_pulled_cable_is_said_and_drops_the_drive_line(emulated: EmulatedBoard
     pulled_s = emulated.done_s(emulated.say("unplug"))
     down = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 0, since=since)
     assert down.host_s - pulled_s <= 0.1
-    with pytest.raises(FingervisionError, match=rf"^The board on {emulated.port} was lost \(.*\): is its cable in\?"):
+    with pytest.raises(DeviceError, match=rf"^The board on {emulated.port} was lost \(.*\): is its cable in\?"):
         until_lost(strict_board)
 
 
 def test_two_programs_on_one_port(emulated: EmulatedBoard, board: Board) -> None:
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(DeviceError) as raised:
         opened(emulated.settings(), emulated.clock)
     # The emulator holds the other end open too; on a real port the process is that of the other program.
     assert re.fullmatch(
@@ -249,7 +249,7 @@ def test_another_firmware_is_refused(
     sketch: tuple[Path, Path], emulated: EmulatedBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fingervision.testbed.board.wire.PROTOCOL", 2)
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(DeviceError) as raised:
         opened(emulated.settings(), emulated.clock)
     assert str(raised.value) == (
         f"The board on {emulated.port} must speak protocol 2, but its firmware 1.0 speaks 1: upload the sketch of this "
@@ -260,7 +260,7 @@ def test_another_firmware_is_refused(
 def test_an_unknown_port_is_answered_with_those_there_are(emulated: EmulatedBoard) -> None:
     settings = emulated.settings()
     with pytest.raises(
-        FingervisionError,
+        DeviceError,
         match=r"^There is no serial port /dev/ttyACM99; (those of this machine are|this machine has none)",
     ):
         opened(type(settings)("/dev/ttyACM99", settings.lines), emulated.clock)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from fingervision.domain.board_settings import SELECT, Line, Role
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.board_toml import read_board
 
 GOOD = """schema = 1
@@ -71,6 +71,6 @@ def test_a_force_sensor_alone_is_a_board_too(tmp_path: Path) -> None:
 def test_what_cannot_be_wired_is_said_in_a_sentence(old: str, new: str, said: str, tmp_path: Path) -> None:
     path = tmp_path / "board.toml"
     path.write_text(GOOD.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(DataError) as raised:
         read_board(path)
     assert str(raised.value) == said.format(path=path)

@@ -5,7 +5,7 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import LimitError, StateError
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.actuators.hand_screw import HandScrew
 from fingervision.testbed.clocks.clock import VirtualClock
@@ -48,7 +48,7 @@ def test_enter_alone_means_that_it_stands_there() -> None:
 
 def test_a_slip_of_the_finger_is_asked_for_again() -> None:
     actuator, screen = screw("12.5\none\n3.5\n")
-    with pytest.raises(FingervisionError, match=r"^The reading must be typed in mm, but was not, 3 times"):
+    with pytest.raises(StateError, match=r"^The reading must be typed in mm, but was not, 3 times"):
         actuator.move(1.25, 1.0)
     assert "A reading must lie between -1 and 6 mm, but is 12.5.\n" in screen.getvalue()
     assert "A reading must be a number in mm, but is 'one'.\n" in screen.getvalue()
@@ -58,7 +58,7 @@ def test_a_slip_of_the_finger_is_asked_for_again() -> None:
 
 def test_nobody_at_the_terminal_is_said() -> None:
     actuator, _ = screw("")
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(StateError) as raised:
         actuator.home()
     assert str(raised.value) == (
         "The hand screw must be turned by an operator, but there is no terminal to ask one: "
@@ -68,12 +68,10 @@ def test_nobody_at_the_terminal_is_said() -> None:
 
 def test_what_a_hand_cannot_do_is_refused() -> None:
     actuator, screen = screw("0\n")
-    with pytest.raises(FingervisionError, match=r"a jog at 2 mm/s"):
+    with pytest.raises(LimitError, match=r"a jog at 2 mm/s"):
         actuator.jog(2.0)
-    with pytest.raises(
-        FingervisionError, match=r"^Step 3 must be stored in a motor controller, but a hand screw has none"
-    ):
+    with pytest.raises(LimitError, match=r"^Step 3 must be stored in a motor controller, but a hand screw has none"):
         actuator.run_step(3)
-    with pytest.raises(FingervisionError, match=r"^The target must lie between -1 and 6 mm, but is 7 mm: nothing was"):
+    with pytest.raises(LimitError, match=r"^The target must lie between -1 and 6 mm, but is 7 mm: nothing was"):
         actuator.move(7.0, 1.0)
     assert screen.getvalue() == ""

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, LimitError
 from fingervision.testbed.actuator import Alarm
 from fingervision.testbed.actuators.simulated import SimulatedActuator
 from fingervision.testbed.bed import Bed
@@ -47,7 +47,7 @@ def test_a_jog_ends_after_its_time_or_at_the_limit_of_the_bed(bed: Bed) -> None:
     ],
 )  # fmt: skip
 def test_beyond_a_limit_nothing_moves(bed: Bed, to_mm: float, speed_mm_s: float, said: str) -> None:
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(LimitError) as raised:
         manual_control.move(bed, to_mm, speed_mm_s)
     assert str(raised.value) == said
     assert not bed.actuator.busy
@@ -65,7 +65,7 @@ def test_an_alarm_in_the_middle_stops_and_is_said(bed: Bed, monkeypatch: pytest.
             actuator.raise_alarm(Alarm("E-42", "the motor is hot"))
 
     monkeypatch.setattr(bed.clock, "wait_until", fail_later)
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(DeviceError) as raised:
         manual_control.move(bed, 1.0, 1.0)
     assert str(raised.value) == "The actuator has an alarm (E-42: the motor is hot): the motor was stopped."
     assert actuator.readings()[-1].value < 0.5

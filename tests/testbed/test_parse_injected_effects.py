@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.effects import catalogue
 from fingervision.testbed.simulation.parse_injected_effects import hidden_from, usual_values
 
@@ -52,5 +52,5 @@ def test_what_cannot_be_hidden_is_said(word: str, sentence: str) -> None:
 def test_a_sealed_file_without_an_effect_is_said(tmp_path: Path) -> None:
     sealed = tmp_path / "sealed.toml"
     sealed.write_text("schema = 1\n")
-    with pytest.raises(FingervisionError, match="must have at least one"):
+    with pytest.raises(DataError, match="must have at least one"):
         hidden_from((str(sealed),))

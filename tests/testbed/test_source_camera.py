@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, InputFileError
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.samples_csv import read_samples
 from fingervision.testbed.bed_factory import open_bed
@@ -52,9 +52,7 @@ def test_a_camera_that_ends_is_said_and_the_motor_stands(tmp_path: Path) -> None
     bed = open_bed(str(live_camera_at(tmp_path)))
     assert bed.camera is not None
     bed.camera.close()
-    with pytest.raises(
-        FingervisionError, match="must give frames while the test bed works, but it ended: the motor was"
-    ):
+    with pytest.raises(DeviceError, match="must give frames while the test bed works, but it ended: the motor was"):
         run_recipe(read_recipe(recipe_at(tmp_path, TWO_MOVES)), bed, tmp_path / "run")
     assert not bed.actuator.busy
 
@@ -62,5 +60,5 @@ def test_a_camera_that_ends_is_said_and_the_motor_stands(tmp_path: Path) -> None
 def test_a_recording_is_no_camera(tmp_path: Path) -> None:
     config = live_camera_at(tmp_path)
     config.write_text(config.read_text().replace('source = "simulated"', 'source = "away.mp4"'))
-    with pytest.raises(FingervisionError, match=r"away\.mp4"):
+    with pytest.raises(InputFileError, match=r"away\.mp4"):
         open_bed(str(config))

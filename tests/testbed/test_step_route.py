@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, LimitError
 from fingervision.domain.step_data import Coordinates, Operation, SpeedEntry, Step
 from fingervision.testbed.motion.step_route import SAME_MM, jog_step, nominal_speed_mm_s, route
 
@@ -51,16 +51,16 @@ def test_the_direct_way_is_taken_and_of_two_the_faster() -> None:
 
 def test_without_a_known_position_only_absolute_steps_begin_a_route() -> None:
     assert route(STEPS, None, 5.1, 50.0, TOP_MM_S) == (2, 4)
-    with pytest.raises(FingervisionError, match=r"^The move to 5.1 mm must not be faster than 1 mm/s, but the slowest"):
+    with pytest.raises(LimitError, match=r"^The move to 5.1 mm must not be faster than 1 mm/s, but the slowest"):
         route(STEPS, None, 5.1, 1.0, TOP_MM_S)
 
 
 def test_a_jog_takes_the_fastest_step_of_its_direction_that_is_slow_enough() -> None:
     assert jog_step(STEPS, 2.0, TOP_MM_S) in (4, 5)
     assert jog_step(STEPS, -2.0, TOP_MM_S) == 6
-    with pytest.raises(FingervisionError) as raised:
+    with pytest.raises(LimitError) as raised:
         jog_step(STEPS, -0.5, TOP_MM_S)
     assert str(raised.value) == (
         "A jog at -0.5 mm/s must have a relative step with a negative target that is no faster, but the controller has "
-        "none: give it one."
+        "none: store one in it."
     )

@@ -9,7 +9,7 @@ from time import monotonic, sleep
 
 import pytest
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import StateError
 from fingervision.testbed.terminal import Terminal
 
 SOON_S = 60.0
@@ -66,7 +66,7 @@ def test_a_stop_ends_the_waiting_for_an_answer(keyboard: tuple[int, Terminal, St
     stopped.set()
     with (
         terminal.listening(lambda line: None, stopped.is_set),
-        pytest.raises(FingervisionError, match=r"^The operator gave no answer before the run was stopped\."),
+        pytest.raises(StateError, match=r"^The operator gave no answer before the run was stopped\."),
     ):
         terminal.ask(QUESTION)
 

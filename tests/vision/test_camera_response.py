@@ -5,7 +5,7 @@ import pytest
 
 from calib.camera_response import CameraResponse, standard_response
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
@@ -72,5 +72,5 @@ def test_depths_stored_in_sixteen_bits(bits: int, shift: int) -> None:
 def test_a_response_of_another_depth_is_refused() -> None:
     response = CameraResponse("mine", SHARE, SHARE, 255)
     picture = np.full((64, 64), 3000, dtype=np.uint16)
-    with pytest.raises(FingervisionError, match=r"255.*4095"):
+    with pytest.raises(DataError, match=r"255.*4095"):
         measure_frame(Frame(picture, 0), Settings(BELOW_PX, response=response))

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction, known_channels
 from fingervision.diagnosis.bodies.place_candidates import Candidate, candidates_of
-from fingervision.diagnosis.bodies.place_search import PlaceFindings, PlaceSearch
+from fingervision.diagnosis.bodies.place_findings import PlaceFindings
+from fingervision.diagnosis.bodies.place_search import PlaceSearch
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
@@ -51,7 +52,7 @@ class BodyEvidence:
 
 
 def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
-    """Return the predictions of a model's drawing; None if the model has no drawing."""
+    """Return the object that predicts from a model's drawing; None if the model has no drawing."""
     # isinstance would work the answers out to look for them.
     return cast(DrawnMechanism, model.base).places if hasattr(type(model.base), "places") else None
 
@@ -59,7 +60,7 @@ def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
 def body_evidence(
     table: MeasuredTable, answers: PlaceAnswers, input_mm: Array, rng: np.random.Generator
 ) -> tuple[BodyEvidence | None, tuple[str, ...]]:
-    """Search for the hinge, link or pivot that explains a table's channels.
+    """Search for the hinge, link or pivot whose change explains the measured channels of a table.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def _runs_among(runs: tuple[slice, ...], rows: NDArray[np.intp]) -> tuple[slice,
 def added_everywhere(answers: PlaceAnswers, input_mm: Array, sizes: Mapping[str, float]) -> dict[str, Array] | None:
     """Change of every channel caused by given explanations of the drawing, by the key of the explanation.
 
-    None is returned if the drawing does not contain the place of one of the explanations.
+    The function returns None if the drawing does not contain the place of one of the explanations.
 
     Parameters
     ----------

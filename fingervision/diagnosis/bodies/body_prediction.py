@@ -45,7 +45,7 @@ class BodyPrediction:
         return [self.answers.channels.index(name) for name in self.channels]
 
     def linear(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
-        """Small-displacement prediction of all channels with some hinges or links changed; cached."""
+        """Predict all channels for small displacements, with some hinges or links changed; results are cached."""
         key = (
             tuple(sorted(changes.stiffness.items())),
             tuple(sorted(changes.moved_mm.items())),
@@ -57,7 +57,7 @@ class BodyPrediction:
 
     @cached_property
     def drawn(self) -> Array:
-        """Prediction of the unchanged drawing, by small displacements; shape (n, channels)."""
+        """Predict all channels with the unchanged drawing, for small displacements; shape (n, channels)."""
         return np.outer(self.input_mm, self.linear().by_input[self._places])
 
     def changed(self, changes: PlaceChanges) -> Array:
@@ -66,7 +66,7 @@ class BodyPrediction:
 
     @cached_property
     def bent(self) -> Array:
-        """Change of the prediction by equilibrium in the deformed shape, shape (n, channels).
+        """Change of the prediction if equilibrium is computed in the deformed shape, shape (n, channels).
 
         The change is interpolated by a polynomial of order 2 to 4 in the input.
         """
@@ -102,7 +102,7 @@ class BodyPrediction:
         return np.asarray(np.stack([w**2, w**3, w**4], axis=1)[:, : shape.shape[0]] @ shape)
 
     def _angle_of(self, found: dict[str, float], body: int) -> float:
-        """Rotation of a body, given by its number; 0 for a fixed body."""
+        """Rotation of a body (rad), which is given by its number; 0 for a fixed body."""
         assembly = self.answers.model.assembly
         nodes = np.flatnonzero(assembly.piece == body)
         middle = assembly.plate.nodes_mm[:, nodes].mean(axis=1)
@@ -116,7 +116,7 @@ class BodyPrediction:
         return np.outer(self.input_mm, self.answers.by_edges[self._places])
 
     def slipped(self, flexure: int, play_mm: float) -> Array:
-        """Change of the prediction by play in a pivot, shape (n, channels); see `slip_mm`."""
+        """Change of the prediction caused by play in a pivot, shape (n, channels); see `slip_mm`."""
         slip = slip_mm(self.linear(), flexure, self.input_mm, play_mm)
         return np.asarray(slip @ self.linear().by_slip[flexure][self._places].T)
 

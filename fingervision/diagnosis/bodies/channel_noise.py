@@ -1,4 +1,4 @@
-"""Joint noise of many channels: its common part (error of the input, camera shake) and its correlation in time."""
+"""Joint noise of many channels: the part shared by all channels (such as camera shake), and correlation in time."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ exactly by the others."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelNoise:
-    """Whitening transformation of all channels, after which the noise has unit variance and is independent.
+    """Whitening transformation of all channels: afterwards, the noise has unit variance and is independent.
 
     Parameters
     ----------

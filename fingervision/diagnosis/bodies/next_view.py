@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.bodies.body_evidence import GAP, BodyEvidence
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction
 from fingervision.diagnosis.bodies.place_candidates import candidates_of
-from fingervision.diagnosis.bodies.place_search import ALIKE, Fitted
+from fingervision.diagnosis.bodies.place_findings import Fitted
+from fingervision.diagnosis.bodies.place_search import ALIKE
 from fingervision.models.place_answers import PlaceAnswers
 
 Array = NDArray[np.float64]
@@ -93,7 +94,7 @@ def _distinct(members: Sequence[Fitted]) -> list[Fitted]:
 
 
 def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
-    """Distance in the measured data and the new view together, with the other explanation's size refitted."""
+    """Whitened distance of two explanations in the measured data plus the new view, with the second refitted."""
     norm = float(other.signature @ other.signature + two @ two)
     shared = float(best.signature @ other.signature + one @ two)
     total = float(best.signature @ best.signature + one @ one)
@@ -101,7 +102,7 @@ def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
 
 
 def _views(answers: PlaceAnswers, evidence: BodyEvidence) -> list[tuple[str, tuple[str, ...]]]:
-    """List the views that were not measured: poses of bodies, displacements of points, and the force."""
+    """List the views that were not measured yet: poses of bodies, displacements of points, and the force."""
     measured = set(evidence.prediction.channels)
     views: list[tuple[str, tuple[str, ...]]] = []
     for body in answers.moving_bodies:

@@ -1,4 +1,4 @@
-"""Candidate explanations: a faulty hinge, link or pivot, and effects of stage or camera that look similar."""
+"""Candidate explanations: a faulty hinge, link or pivot, and effects of stage or camera with a similar signature."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
+from fingervision.diagnosis.bodies.mirror_image import mirror_of
 from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import effect_key
 from fingervision.domain.parameter import Parameter
@@ -23,9 +24,6 @@ PAIRS = (DrawnPart.LINKS_ALIKE, DrawnPart.LINKS_OPPOSITE)
 _LEAST_SCALE = 0.05
 """Least relative change of the opening per relative change of a link's length; with less, the link does not act as a
 lever of the opening."""
-_MIRRORED = 1e-3
-"""Largest distance between a place and another's mirror image, as a share of the drawing's size, at which the two are
-partners."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,12 +61,12 @@ class Candidate:
 
     @property
     def key(self) -> str:
-        """Name and place in the form used in a report: `hinge_stiffness_error@right hinge 2`."""
+        """Name of the effect and its place, in the form used in a report: `hinge_stiffness_error@right hinge 2`."""
         return effect_key(self.name, self.place)
 
     @property
     def full_key(self) -> str:
-        """Key that includes the misplaced end of a link, in the form used in a `model.toml`."""
+        """Key as in a report, extended by the misplaced end of a link, in the form used in a `model.toml`."""
         return effect_key(self.name, self.place, self.detail)
 
 
@@ -80,7 +78,7 @@ def candidates_of(prediction: BodyPrediction) -> tuple[Candidate, ...]:
 
 
 def _forms(*parts: DrawnPart) -> list[tuple[str, DrawingForm]]:
-    """Names and forms of the effects that change one of these parts of a drawing, in the catalogue's order."""
+    """Names and forms of the effects that change a given kind of part of a drawing, in the catalogue's order."""
     forms = [(name, effect.in_drawing) for name, effect in catalogue().items()]
     return [(name, form) for name, form in forms if form is not None and form.part in parts]
 
@@ -178,7 +176,7 @@ def _slipping(prediction: BodyPrediction, flexure: int) -> Added:
 
 
 def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Candidate]:
-    """Candidates of a link together with its mirror image: equal changes alter the ratio, opposite the symmetry."""
+    """Candidates of a link and its mirror image together: equal changes alter the ratio, opposite ones the symmetry."""
     found = []
     mirrored = mirror_of(prediction)
     by_key = {(each.place, each.detail): each for each in singles if each.part is DrawnPart.LINK}
@@ -197,7 +195,7 @@ def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Can
 
 
 def _by_length(prediction: BodyPrediction, one: Candidate, other: Candidate, sign: float) -> float:
-    """Ratio of the openings, or share of the right finger, per relative change of both links' lengths."""
+    """Change of the motion ratio, or of the right finger's share, per relative change of the lengths of both links."""
     answers = prediction.answers
     if GAP not in answers.mechanism.pairs:
         return 0.0
@@ -216,46 +214,8 @@ def _together(one: Candidate, other: Candidate, sign: float, scale: float) -> Ad
     return lambda size: one.added(size / scale) + other.added(sign * size / scale)
 
 
-def mirror_of(prediction: BodyPrediction) -> Callable[[str], str]:
-    """Return a function that replaces each hinge, probe or body in a text by its mirror image about x = 0."""
-    answers = prediction.answers
-    size = answers.mechanism.region.size_mm
-    at = {flexure.name: flexure.at_mm for flexure in answers.mechanism.flexures} | answers.mechanism.probes
-    at |= {face.name: (0.5 * (face.box_mm[0] + face.box_mm[1]), 0.5 * (face.box_mm[2] + face.box_mm[3]))
-           for face in answers.mechanism.fixed}  # fmt: skip
-    at |= {body.name: (float(body.centroid_mm[0]), float(body.centroid_mm[1])) for body in answers.model.bodies}
-    twins = {}
-    for name, (x, y) in at.items():
-        for other, (there_x, there_y) in at.items():
-            if other != name and hypot(there_x + x, there_y - y) < _MIRRORED * size:
-                twins[name] = other
-
-    def mirrored(text: str) -> str:
-        parts = [", ".join(sorted_pair.split(", ")) for sorted_pair in [text]]
-        body, _, rest = parts[0].partition(", ")
-        if not rest:
-            name = body.removesuffix(" sits off")
-            return twins.get(name, name) + body.removeprefix(name)
-        ends = [twins.get(end, end) for end in rest.split(" to ")]
-        order = sorted(ends) if all(end not in answers.mechanism.probes for end in ends) else ends
-        return f"{twins.get(body, body)}, {' to '.join(order)}"
-
-    return mirrored
-
-
-def mirrored_channels(prediction: BodyPrediction) -> dict[str, tuple[str, float]]:
-    """Channels whose mirror image was measured too, with the sign that relates the two."""
-    mirrored, found = mirror_of(prediction), {}
-    for name in prediction.channels:
-        body, dot, part = name.rpartition(".")
-        twin = f"{mirrored(body)}{dot}{part}"
-        if dot and twin != name and twin in prediction.channels:
-            found[name] = twin, 1.0 if part == "y_mm" else -1.0
-    return found
-
-
 def _without_place(prediction: BodyPrediction) -> list[Candidate]:
-    """Errors of the recorded input and of the picture's scale."""
+    """Candidates without a place in the drawing: errors of the recorded input and of the picture's scale."""
     is_mm = np.array([name.endswith("_mm") for name in prediction.channels])
     added: dict[DrawnPart, Added] = {
         DrawnPart.INPUT: lambda ratio: ratio * prediction.drawn,

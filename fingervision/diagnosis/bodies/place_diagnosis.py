@@ -15,16 +15,13 @@ from fingervision.diagnosis.bodies.body_evidence import (
     drawing_of,
 )
 from fingervision.diagnosis.bodies.body_prediction import FORCE, known_channels
-from fingervision.diagnosis.bodies.next_view import next_view
-from fingervision.diagnosis.bodies.place_search import Fitted
-from fingervision.diagnosis.bodies.place_words import body_places, set_words
+from fingervision.diagnosis.bodies.composed_report import composed, measured_bodies
+from fingervision.diagnosis.bodies.place_words import body_places
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE
 from fingervision.domain.effect import DriveEffect, split_key
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
-from fingervision.domain.parameter import Estimate
-from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Verdict
-from fingervision.effects import catalogue
+from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.drawn_mechanism import GAP as GAP_PAIR
 from fingervision.models.place_answers import PlaceAnswers
@@ -51,8 +48,8 @@ def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[Measure
     added = None if answers is None else added_everywhere(answers, table.input_mm, placed)
     if answers is None or added is None:
         raise DataError(
-            f"The effects of the model must have places that {model.base_path} draws, but {' and '.join(placed)} "
-            "have not: diagnose again, or leave them out."
+            f"Every effect at a hinge or link must name a part that {model.base_path} contains, but "
+            f"{' and '.join(placed)} do not: diagnose again, or remove these effects from the model."
         )
     rest = {key: values for key, values in model.effects.items() if key not in placed}
     return _less(table, added, answers), replace(model, effects=rest)
@@ -88,7 +85,7 @@ def diagnose_with_bodies(
     first = replace(first, report=replace(first.report, where=_where(first.report, evidence, answers)))
     if not findings.members or findings.structure:
         notes = (*notes, _nothing_named(evidence))
-        return _measured_bodies(_noted(first, notes), evidence)
+        return measured_bodies(_noted(first, notes), evidence)
     best = findings.members[0]
     added = added_everywhere(answers, driven_mm, {best.candidate.full_key: best.size})
     if added is None:
@@ -99,11 +96,11 @@ def diagnose_with_bodies(
     if left_mm < STANDING_SHARE * whole_mm:
         # The form of an explanation is off by that much of it: no second cause is named for the rest.
         second = _place_alone(second)
-    return _measured_bodies(_composed(first, second, evidence, answers, notes), evidence)
+    return measured_bodies(composed(first, second, evidence, answers, notes), evidence)
 
 
 def _place_alone(done: "Diagnosis") -> "Diagnosis":
-    """Return a diagnosis that contains the faulty place only."""
+    """Return a diagnosis that names the faulty place only, without effects of the gap."""
     d = done.report.disagreement
     report = replace(
         done.report,
@@ -119,7 +116,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
 
 
 def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: PlaceAnswers) -> MeasuredTable:
-    """Correct the gap for the difference between condensed bodies and bars joined at points, some 0.1 %."""
+    """Correct the gap for the difference (about 0.1 %) between condensed bodies and bars that are joined at points."""
     u = np.array([0.0, 1.0])
     bare = model.base.respond(u)
     drawn = answers.answer().by_input
@@ -133,7 +130,7 @@ def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: Plac
 
 
 def _driven_input(done: "Diagnosis") -> Array:
-    """Input that the mechanism receives: the recorded input after the drive effects that poses do not decide on."""
+    """Input that the mechanism receives: the recorded input after the drive effects that the poses do not determine."""
     chain = done.data.chain
     history = chain.history if chain.path is None else chain.path.history
     input_mm = history.input_mm
@@ -145,7 +142,7 @@ def _driven_input(done: "Diagnosis") -> Array:
 
 
 def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:
-    """Subtract the changes caused by an explanation from the channels of a table."""
+    """Subtract the changes that an explanation causes from the channels of a table."""
     changes: dict[str, object] = {"gap_mm": table.gap_mm - added[GAP]}
     if table.midline_mm is not None:
         first, last = answers.mechanism.pairs[GAP_PAIR]
@@ -184,77 +181,3 @@ def _nothing_named(evidence: BodyEvidence) -> str:
 
 def _where(report: DiagnosisReport, evidence: BodyEvidence, answers: PlaceAnswers) -> tuple:  # type: ignore[type-arg]
     return (*report.where, *body_places(evidence, answers))
-
-
-def _measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
-    """Add the channels' results to the tables of a report: disagreement by channel, detection limits by place."""
-    report, findings = done.report, evidence.findings
-    channels: dict[str, Mapping[str, float]] = dict(report.disagreement.by_channel)
-    for place, name in enumerate(evidence.names):
-        unit = "mrad" if name.endswith("_mrad") else "mm"
-        kept = findings.noise.kept
-        channels[name] = {
-            f"before_rms_{unit}": float(np.sqrt(np.mean(findings.before[kept, place] ** 2))),
-            f"after_rms_{unit}": float(np.sqrt(np.mean(findings.after[kept, place] ** 2))),
-        }
-    smallest = dict(report.smallest_seen) | {
-        key: {"parameter": candidate.parameter.name, "size": size, "unit": candidate.parameter.unit}
-        for key, (candidate, size) in findings.smallest.items()
-        if candidate.place and size <= candidate.parameter.upper
-    }
-    disagreement = replace(report.disagreement, by_channel=channels)
-    return replace(done, report=replace(report, disagreement=disagreement, smallest_seen=smallest), bodies=evidence)
-
-
-def _composed(
-    first: "Diagnosis", second: "Diagnosis", evidence: BodyEvidence, answers: PlaceAnswers, notes: tuple[str, ...]
-) -> "Diagnosis":
-    """Combine the diagnosis from the poses and that from the gap into one report."""
-    members, rest = evidence.findings.members, second.report
-    best = members[0]
-    keys = list(dict.fromkeys(member.candidate.key for member in members))
-    beside = rest.alternatives or ((),)
-    alternatives = tuple((key, *names) for key in keys for names in beside)
-    verdict = Verdict.NAMED
-    if rest.verdict is Verdict.UNKNOWN:
-        verdict = Verdict.UNKNOWN
-    elif len(alternatives) > 1:
-        verdict = Verdict.AMBIGUOUS
-    before, after = first.report.disagreement, rest.disagreement
-    disagreement = Disagreement(
-        before.before_rms_mm, after.after_rms_mm, after.noise_rms_mm, before.unseen_before_rms_mm,
-        after.unseen_after_rms_mm, before.by_channel,
-    )  # fmt: skip
-    share = float(np.clip(1.0 - (after.after_rms_mm / max(before.before_rms_mm, 1e-300)) ** 2, 0.0, 1.0))
-    view = next_view(evidence, answers)
-    said = set_words(members)
-    sentence = f"Poses of the bodies tell the place: {said} (95 %)."
-    if len(keys) > 1:
-        sentence = f"Poses of the bodies tell the place but for this set: {said} (95 % each)."
-    if rest.verdict is not Verdict.AGREES:
-        sentence += f" Beside it: {rest.sentence}"
-    report = replace(
-        rest,
-        verdict=verdict,
-        sentence=sentence,
-        effects=(_named(best), *rest.effects),
-        alternatives=alternatives,
-        where=first.report.where,
-        disagreement=disagreement,
-        explained_share=share,
-        standing_share=float(np.sqrt(1.0 - share)),
-        runners_up=first.report.runners_up,
-        notes=(*rest.notes, *notes, *(() if view is None else (f"next view: {view.words}",))),
-        seconds=first.report.seconds + rest.seconds,
-    )
-    return replace(second, report=report, data=first.data, before_mm=first.before_mm)
-
-
-def _named(best: Fitted) -> NamedEffect:
-    candidate = best.candidate
-    estimates = {candidate.parameter.name: Estimate(best.size, best.u_stated, candidate.parameter.unit)}
-    for parameter in catalogue()[candidate.name].parameters:
-        estimates.setdefault(parameter.name, Estimate(parameter.neutral or 0.0, None, parameter.unit))
-    shown = {p.name: p.words for p in (*catalogue()[candidate.name].parameters, candidate.parameter)}
-    return NamedEffect(candidate.name, str(catalogue()[candidate.name].stage), estimates, (), candidate.place,
-                       candidate.detail, shown)  # fmt: skip

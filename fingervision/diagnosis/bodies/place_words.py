@@ -6,7 +6,7 @@ import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_candidates import PAIRS
-from fingervision.diagnosis.bodies.place_search import Fitted
+from fingervision.diagnosis.bodies.place_findings import Fitted
 from fingervision.domain.drawing_form import DrawnPart
 from fingervision.domain.report import Place
 from fingervision.models.place_answers import PlaceAnswers
@@ -23,7 +23,7 @@ MOST = 6
 
 
 def fitted_words(fitted: Fitted) -> str:
-    """Sentence on a fitted explanation: `right hinge 2: 14 +- 3 % too soft`."""
+    """Sentence on a fitted explanation, such as `right hinge 2: 14 +- 3 % too soft`."""
     candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
     if candidate.part is DrawnPart.PIVOT:

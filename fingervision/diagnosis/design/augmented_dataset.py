@@ -9,7 +9,8 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Prob
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.uncertain_dimensions import tangent
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.model import PhysicalModel
 
@@ -45,7 +46,7 @@ class AugmentedDataset:
 
     @classmethod
     def of(cls, data: Observations, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "AugmentedDataset":
-        """Append a run with the same noise, later on the same clock; the stage may be re-zeroed before the run."""
+        """Append a proposed run with the same noise, later on the same clock; it may begin with a re-zeroing."""
         old = data.chain.history
         n, more = old.input_mm.size, input_mm.size
         time = float(old.times.max()) + PAUSE_S + old.sample_time_s * np.arange(more)
@@ -82,11 +83,11 @@ class AugmentedDataset:
 
     @property
     def input_mm(self) -> Array:
-        """Input of the appended run alone (mm)."""
+        """Input of the proposed run alone (mm)."""
         return self.both.chain.history.input_mm[self.first.chain.history.input_mm.size :]
 
     def moved(self, names: tuple[str, ...], values: Settings) -> Point:
-        """Parameter values for data and run together; an end stop outside the data's range is placed outside both."""
+        """Parameter values for data plus proposed run; an end stop outside the data's range is placed outside both."""
         out: Point = {name: dict(values[name]) for name in names}
         before = {(name, parameter.name): parameter for name, parameter in self.first.parameters(names)}
         for name, now in self.both.parameters(names):
@@ -124,7 +125,7 @@ class AugmentedDataset:
     def score(
         self, target: Array, explanation: Explanation, starts: Sequence[Settings], sigma_mm: tuple[float, ...] | None
     ) -> float:
-        """Chi-square of an explanation refitted to a target, the smallest from several starting points.
+        """Chi-square of an explanation refitted to a target signal, the smallest from several starting points.
 
         Run offsets are treated as in `distance`.
         """
@@ -137,12 +138,12 @@ class AugmentedDataset:
 
 
 def _behind(old: Array, new: Array, channels: int) -> Array:
-    """Append the channels of the run to those of the data; both stacked, shape (channels * n,)."""
+    """Append each channel of the proposed run to that channel of the measured data; shape (channels * n,)."""
     return np.concatenate([old.reshape(channels, -1), new.reshape(channels, -1)], axis=1).ravel()
 
 
 def _longer(path: InputPath | None, history: History, first_rows: int) -> InputPath | None:
-    """Append the rows of a second run to a path; `history` holds the rows of both."""
+    """Append the rows of a second run to the path of the input; `history` holds the rows of both runs."""
     if path is None:
         return None
     old, new = path.history, slice(first_rows, history.input_mm.size)

@@ -35,8 +35,9 @@ MODERATE, SURELY = 75.0, 0.8
 class ExpectedGain:
     """Predicted chi-square gain of a run: its most probable value, an interval, and the probability of that value.
 
-    Either explanation may be true, and the two often lead to different gains; the median of all draws would lie between
-    these two, where hardly any gain occurs. `modest` is the most probable gain below `MODERATE`.
+    Either of two explanations may be true, and the two cases often lead to different gains; the median over both cases
+    would lie between these gains, where hardly any gain occurs. `modest` is the most probable gain (chi-square) below
+    `MODERATE`.
     """
 
     gain: float
@@ -46,12 +47,12 @@ class ExpectedGain:
 
     @property
     def sound(self) -> bool:
-        """Whether the predicted gain is moderate, or else probably reached."""
+        """Whether the predicted gain is moderate or, if it is large, will probably be reached."""
         return self.gain < MODERATE or self.kept >= SURELY
 
     @property
     def stated(self) -> float:
-        """The gain that can be relied on."""
+        """The gain in chi-square that the report states for the proposed run."""
         return self.gain if self.sound else self.modest
 
 
@@ -113,9 +114,9 @@ def expected_gain(
 
 
 def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
-    """The gain, below a limit, near which most draws lie, and the share of draws near it.
+    """The gain, below a limit, near which most posterior draws lie, and the share of draws near it.
 
-    If no draw is below the limit, the gain is the median.
+    If no draw is below the limit, the median of all draws is returned.
     """
     come = np.sort(come)
     named = come[(come > 0.0) & (come < below)]
@@ -127,7 +128,7 @@ def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
 
 
 def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:
-    """Draw the spread of the runs' offsets for each channel; from its prior if there is only one run.
+    """Draw the standard deviation of the runs' offsets for each channel; from its prior if there is only one run.
 
     The prior is zero in half of the draws, because the stage need not be re-zeroed before the run, and otherwise the
     half-Cauchy prior with which a diagnosis of both runs judges the offsets (`RunOffsets.spread`). With several runs,
@@ -140,9 +141,9 @@ def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generato
 
 
 def _score(problem: Problem, explanation: Explanation, sigma_mm: tuple[float, ...] | None) -> float:
-    """Chi-square of an explanation refitted to the data alone.
+    """Chi-square of an explanation that is refitted to the measured data alone.
 
-    The spread of the run offsets is fitted unless one is given.
+    The standard deviation of the run offsets is fitted unless one is given.
     """
     sigma = explanation.sigma_mm if sigma_mm is None else sigma_mm
     return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED).score

@@ -50,7 +50,7 @@ ALIKE = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSet:
-    """Explanations that the data cannot distinguish.
+    """Explanations that the data cannot distinguish, with what is needed to compare them on a proposed run.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class OpenSet:
 
     @property
     def truths(self) -> int:
-        """Number of members that are taken as the truth when a run is chosen."""
+        """Number of explanations that are taken as the truth in turn when a run is chosen."""
         return len(self.before)
 
 
@@ -86,15 +86,15 @@ class RunPlan:
 
     @property
     def uneven(self) -> float:
-        """Largest ratio of a pair's two gains (one or the other explanation true).
+        """Largest ratio between the two gains of a pair (the first or the second explanation being true).
 
-        The larger this ratio, the wider the interval of the predicted gain.
+        The larger this ratio is, the wider is the interval of the predicted gain.
         """
         ahead, back = (np.maximum(g, 1.0) for g in (self.gains[0, 1 : self.gains.shape[0]], self.gains[1:, 0]))
         return float(np.max(np.maximum(ahead / back, back / ahead), initial=1.0))
 
     def apart(self, j: int, k: int) -> float:
-        """Gain between two members, the first an assumed truth; the smaller gain if either may be true."""
+        """Gain between two explanations, the first being an assumed truth; the smaller gain if either may be true."""
         back = self.gains[k, j] if k < len(self.gains) else np.inf
         return float(min(self.gains[j, k], back))
 
@@ -105,7 +105,7 @@ class RunPlan:
         return sorted(found, key=lambda pair: self.apart(*pair))
 
     def worst(self, floor: float) -> float:
-        """Smallest separation that is at least `floor`; 0 if there is none."""
+        """Smallest gain among those that are at least `floor`; 0 if there is none."""
         settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
         return float(settled.min()) if settled.size else 0.0
 
@@ -124,7 +124,7 @@ class RunChoice:
         return self.data.chain.history.sample_time_s
 
     def planned(self, name: str, steps: list[Step], iterations: int, times: int = 1) -> RunPlan | None:
-        """Evaluate a run; return None if it takes too long."""
+        """Evaluate a run; the result is None if the run takes too long."""
         history = self.data.chain.history
         inputs = driven(steps, self.step_s, rounding_s(self.data.table.input_mm, self.step_s, history.runs))
         if inputs.size > MOST_SAMPLES:
@@ -141,13 +141,13 @@ class RunChoice:
         return RunPlan(name, steps, times, inputs, gains, minutes)
 
     def settled(self, gains: Array, needed: float = NEEDED) -> float:
-        """Share of the open pairs that given gains decide, with each assumed truth weighted by its probability."""
+        """Share of the pairs of explanations that given gains decide, weighted by each truth's probability."""
         part = np.where(np.isfinite(gains), np.minimum(gains / needed, 1.0), 0.0)
         odds = self.open.odds[: self.open.truths]
         return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))
 
     def shown(self, run: RunPlan, second: AugmentedDataset, j: int, k: int) -> float:
-        """Expected gain between two members, if the more probable is true and the runs have no offsets."""
+        """Expected gain between two explanations if the more probable one is true and the runs have no offsets."""
         if REZERO in run.steps:
             return run.apart(j, k)
         true, other = (j, k) if self.open.odds[j] >= self.open.odds[k] or k >= self.open.truths else (k, j)
@@ -155,10 +155,10 @@ class RunChoice:
         return second.distance(truth.values, rival, sigma_mm=rival.sigma_mm) - float(self.open.before[true, other])
 
     def least(self, run: RunPlan) -> tuple[float, tuple[int, int]] | None:
-        """The separated pair with the smallest gain, and this gain; None if no pair is separated.
+        """The separated pair of explanations with the smallest gain, and this gain; None if no pair is separated.
 
-        Pairs that are separated within the run come first, because a separation by an offset between run and data could
-        also be due to re-zeroing.
+        Pairs that are separated within the new run come first; a difference in offset between the new run and the old
+        data could also be due to re-zeroing the stage.
         """
         second = AugmentedDataset.of(self.data, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
         found = [(self.shown(run, second, *pair), pair) for pair in run.pairs()[:COMPARED]]
@@ -201,7 +201,7 @@ class RunChoice:
 
 
 def open_set(problem: Problem, members: list[Explanation]) -> OpenSet:
-    """Order the members by their probability given the data; the best one stays first."""
+    """Order the indistinguishable explanations by their probability given the data; the best one stays first."""
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     cost = {id(e): e.bic(rows) + surprise(problem, e) for e in members}
     best, others = members[0], sorted(members[1:], key=lambda e: cost[id(e)])[:MOST_RIVALS]

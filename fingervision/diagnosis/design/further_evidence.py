@@ -1,7 +1,7 @@
-"""Other evidence than stage motion that distinguishes explanations: one sentence of advice per pair of effects.
+"""Evidence other than stage motion that distinguishes explanations: one sentence of advice per pair of effects.
 
-Each effect states in which checks it is visible and in which it is not; a check distinguishes two effects if only one
-of them is visible in it.
+Each effect declares the checks in which it is visible; a check distinguishes two effects if only one of them is visible
+in it.
 """
 
 from fingervision.diagnosis.inference.hypothesis import Explanation

@@ -22,7 +22,7 @@ def next_run(
     """Choose the run that decides most of the open pairs in the least experiment time.
 
     Runs within the measured range are tried first: outside it an explanation's formula is not verified, so that a
-    predicted gain is not reliable. The stated gain is that of the pair that the run separates least.
+    predicted gain is not reliable. The stated gain is that of the pair of explanations that the run separates least.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def next_run(
 def _promised(
     choose: RunChoice, plan: RunPlan, members: list[Explanation], found: tuple[Point, ...], rng: np.random.Generator
 ) -> NextRun | None:
-    """Predict the gain of a run, and reduce the run if a large predicted gain would be unreliable."""
+    """Predict the gain of a run; if a large predicted gain would be unreliable, reduce the run."""
     listed, odds = choose.open.members, choose.open.odds
     walks: dict[int, tuple[Point, ...]] = {0: found}
 

@@ -55,10 +55,10 @@ def _driven(step: Step, start: float, step_s: float) -> Array:
 
 
 def rounding_s(input_mm: Array, step_s: float, runs: tuple[slice, ...]) -> float:
-    """Time that the stage takes to reverse (s), from the sharpest reversal in a record.
+    """Time that the stage takes to reverse its motion (s), from the sharpest reversal in a record.
 
-    A reversal from speed v spread over T seconds has the acceleration 2 v / T. For a record without reversals the value
-    of an ordinary stage, a third of a second, is used.
+    A reversal from speed v spread over T seconds has the acceleration 2 v / T. For a record without reversals, the
+    value of an ordinary stage (a third of a second) is used.
     """
     speeds = np.concatenate([np.diff(input_mm[run]) for run in runs]) / step_s
     bends = np.concatenate([np.abs(np.diff(input_mm[run], 2)) for run in runs]) / step_s**2
@@ -97,7 +97,7 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
 
 
 def measured_ends(input_mm: Array, within_mm: tuple[float, float]) -> tuple[float, float]:
-    """The measured range, extended so that a run starts or reverses at the stage's zero if that is near.
+    """The measured range of the input (mm), extended to the stage's zero if a run would start or reverse near it.
 
     A stage position only one or two encoder steps from zero would be poorly known.
 

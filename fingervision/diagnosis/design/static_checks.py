@@ -1,4 +1,4 @@
-"""Next steps without another motion: re-zeroing the stage, or a slot of known width in front of the camera."""
+"""Next measurements without another motion: re-zeroing the stage, or a slot of known width in front of the camera."""
 
 import numpy as np
 
@@ -23,8 +23,8 @@ gauge block."""
 def static_check(data: Observations, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
     """Propose a check without another motion, for the first rival that it separates from the best explanation.
 
-    Without times no motion can be evaluated for effects with memory, and re-zeroing is proposed here; with times it is
-    one of the protocols.
+    Without times, no motion can be evaluated for effects with memory, and re-zeroing is proposed here; with times,
+    re-zeroing is one of the protocols.
     """
     for rival in rivals:
         pair = (best, rival)
@@ -40,7 +40,7 @@ def _one_shows(check: FurtherCheck, pair: tuple[Explanation, Explanation]) -> bo
 
 
 def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
-    """Propose re-zeroing the stage: an offset of the input disappears, an offset of the gap remains."""
+    """Propose re-zeroing the stage, after which an offset of the input disappears and an offset of the gap remains."""
     zeroed = that_show(FurtherCheck.REZERO)
     offset = next(e for e in pair if not set(e.names).isdisjoint(zeroed))
     history, offsets = data.chain.history, problem.offsets
@@ -58,7 +58,7 @@ def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Exp
 
 
 def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
-    """Propose a slot of known width: a camera error changes gap and slot, a gripper error only the gap."""
+    """Propose a slot of known width: a camera error changes gap and slot width, a gripper error only the gap."""
     slot = np.full(1, round(data.chain.history.rest_gap_mm, 1))
     response = Response(-0.5 * slot, 0.5 * slot)
     for name in that_show(FurtherCheck.SLOT):
@@ -75,7 +75,7 @@ def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explana
 def _still(
     name: str, steps: list[Step], size: float, spread: float, pair: tuple[Explanation, Explanation]
 ) -> NextRun | None:
-    """Proposal whose result is one number with uncertainty `spread`, which no parameter of the rival can reproduce."""
+    """Proposal of a check that gives one number with uncertainty `spread`, which the rival cannot reproduce."""
     gain = (size / spread) ** 2
     if gain <= WORTH:
         return None

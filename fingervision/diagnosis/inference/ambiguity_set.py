@@ -22,6 +22,9 @@ SPARE = 3.0
 ADMISSIBLE = 15.0
 """Largest chi-square by which an explanation at distance 4 from the truth is worse than the best: 4 + SURELY * 2 *
 sqrt(4) + SPARE."""
+OUT_OF_REACH = (400.0, 200.0)
+"""Squared distance from the best explanation, and chi-square above it, from which no refit is tried: 20 standard
+deviations away, and farther behind than any refit has gained (`INDISTINGUISHABLE` and `ADMISSIBLE` times ten)."""
 IDLE_SHARE = 0.3
 """Share of the best explanation's gain below which another explanation counts as explaining nothing."""
 PLAIN = 50.0
@@ -44,7 +47,7 @@ def ambiguity_set(
         if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
             return
         near = problem.offsets.squared(target - problem.whitened(other.values), metric)
-        if near > 400.0 and other.score - best.score > 200.0:
+        if near > OUT_OF_REACH[0] and other.score - best.score > OUT_OF_REACH[1]:
             return
         distance = near
         if near >= INDISTINGUISHABLE:
@@ -82,16 +85,16 @@ def ambiguity_set(
 
 
 def _net(nothing: Explanation, explanation: Explanation) -> float:
-    """Gain in chi-square over the model without effects, minus the gain expected from noise for its free parameters."""
+    """Gain in chi-square over the model without effects, minus the gain that noise alone would give on average."""
     return nothing.score - explanation.score - 2.0 * explanation.free
 
 
 def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
-    """Whether the best explanation may lead only because its richer formula contains the other's prediction.
+    """Whether the best explanation may fit better only because its richer formula includes the other's prediction.
 
     An example is a delay and a well-damped resonance, both of which round corners: the formula of a delay is inexact
-    where the stage reverses between two samples. A lead of this size is attributed to the inexact formula; a larger
-    lead counts as evidence for the richer formula.
+    where the stage reverses between two samples. A difference of this size is attributed to the inexact formula; a
+    larger difference is evidence for the richer formula.
     """
     worse = other.score - best.score
     return (
@@ -103,7 +106,7 @@ def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, oth
 
 
 def _least_refuted(distance: float) -> float:
-    """Difference in chi-square above which an explanation counts as rejected in favour of another.
+    """Difference in chi-square above which an explanation counts as refuted in favour of another.
 
     If an explanation is true, the other's chi-square is larger by `distance` on average, with a standard deviation of 2
     sqrt(distance) (Cox 1961). Two explanations that such data could distinguish are both kept if the present data
@@ -113,7 +116,7 @@ def _least_refuted(distance: float) -> float:
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
-    """Fit one explanation to another's prediction; its score is D_jk, the remaining squared whitened distance.
+    """Fit one explanation to another's prediction; its score is D_jk, the squared whitened distance that remains.
 
     In both directions the run offsets have the spread found for the best explanation, because a worse explanation would
     hide its misfit in a larger spread.
@@ -123,10 +126,10 @@ def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_m
 
 
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
-    """Drop explanations that only imitate an effect predicted by the drawing and found as predicted.
+    """Drop explanations that only imitate an effect that the drawing predicts and that is found as predicted.
 
-    The agreement would otherwise be a coincidence. For example, an end stop at exactly the input at which the drawn
-    fingers meet is the contact of these fingers.
+    Without this effect, the agreement with the drawing's prediction would be a coincidence. For example, an end stop at
+    exactly the input at which the drawn fingers meet is the contact of these fingers.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:
@@ -160,7 +163,7 @@ def choices(problem: Problem, explanation: Explanation) -> float:
 
 
 def surprise(problem: Problem, explanation: Explanation) -> float:
-    """-2 log of the ratio of the parameters' prior density to its value at the prior's centre."""
+    """-2 log of the ratio of the parameters' prior density to the density at the prior's centre."""
     return sum(
         (FREEDOM + 1.0) * float(np.log1p(((value - (p.neutral or 0.0)) / p.typical) ** 2 / FREEDOM))
         for name, p in problem.parameters(explanation.names)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from fingervision.diagnosis.inference.cross_validation import rms_mm
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.position_map import NAME
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import Standing, standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
@@ -35,12 +35,12 @@ class Answer:
     stands: Standing
 
     def values(self) -> Settings:
-        """Parameters of everything that was found: the effects, and the curve of a position map."""
+        """Parameters of everything that the search found: the effects, and the curve of a position map."""
         return _values(self.data, self.found)
 
 
 def judged(data: Observations, found: Findings) -> Answer:
-    """Compare the result with the disagreement; effects that increase the disagreement are withdrawn.
+    """Compare the result with the disagreement; effects that increase the disagreement are removed from the result.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def judged(data: Observations, found: Findings) -> Answer:
 
 
 def without_names(data: Observations, found: Findings, unknown: str | None) -> tuple[Observations, Findings]:
-    """Withdraw all named effects, including a position map.
+    """Remove all named effects from the result, including a map of position errors.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def without_names(data: Observations, found: Findings, unknown: str | None) -> t
 
 
 def _values(data: Observations, found: Findings) -> Settings:
-    """Parameters of everything that was found: the effects, and the curve of a position map."""
+    """Parameters of everything that the search found: the effects, and the curve of a position map."""
     if data.position_map is None:
         return found.best.values
     return {**found.best.values, NAME: data.position_map.values()}

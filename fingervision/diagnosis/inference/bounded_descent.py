@@ -28,10 +28,10 @@ class LeastSquares(Protocol):
         """Weighted sum of squares of a residual."""
 
     def linearised(self, x: Array, residual: Array) -> tuple[Array, Array]:
-        """Normal matrix, shape (p, p), and gradient of the sum of squares, shape (p,)."""
+        """Normal matrix, shape (p, p), and gradient of the sum of squares, shape (p,), at given parameters."""
 
     def reweighted(self, residual: Array) -> Self:
-        """Return the function with weights chosen for a residual."""
+        """Return the same function with weights chosen for a given residual."""
 
 
 Weighted = TypeVar("Weighted", bound=LeastSquares)
@@ -65,7 +65,7 @@ class Descent(Generic[Weighted]):
     free: NDArray[np.bool_]
 
     def covariance(self) -> Array:
-        """Covariance of the parameters, shape (p, p); zero rows for those at a bound."""
+        """Covariance of the parameters, shape (p, p); rows of parameters at a bound are zero."""
         out = np.zeros_like(self.normal)
         if self.free.any():
             part, scale = _in_own_units(self.normal, self.free)
@@ -119,8 +119,8 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
 def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Array:
     """Minimise a quadratic form within bounds, to the accuracy that a search step needs.
 
-    A parameter that would exceed its bound is fixed at the bound, and the others are solved for again. If it were only
-    clipped, the others would keep values that belong to a step that is not taken.
+    A parameter that would exceed its bound is fixed at the bound, and the others are solved for again. If that
+    parameter were only clipped, the others would keep values that belong to a step that is not taken.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
 
 
 def _free(x: Array, pull: Array, normal: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Which parameters are free: those that no bound blocks and that the data determine."""
+    """Mask of the free parameters: those that no bound blocks and that the data determine."""
     near = AT_BOUND * (upper - lower)
     held = ((x <= lower + near) & (pull <= 0.0)) | ((x >= upper - near) & (pull >= 0.0))
     return np.asarray(~held & (np.diag(normal) > 1e-12), dtype=bool)

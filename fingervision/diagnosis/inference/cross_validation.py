@@ -1,4 +1,4 @@
-"""Cross-validation: residual for a run left out of the fit, and for the fitted runs."""
+"""Cross-validation: prediction error for each run that is left out of the fit."""
 
 from dataclasses import replace
 
@@ -7,12 +7,12 @@ import numpy as np
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array
 
 
 def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
-    """RMS over left and right if both are measured, else over the gap; without the midline's constant (mm).
+    """RMS residual (mm) of left and right finger if both are measured, else of the gap; without the midline's constant.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
 
 
 def left_out_rms_mm(data: Observations, problem: Problem, best: Explanation) -> tuple[float | None, float | None]:
-    """Leave each run out of the fit in turn and predict it; RMS without and with effects, None for a single run."""
+    """RMS prediction error (mm) of runs left out of the fit in turn, without and with effects; None for one run."""
     history = data.chain.history
     n, channels = history.input_mm.size, len(data.channels)
     if len(history.runs) < 2:

@@ -62,7 +62,7 @@ def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins:
 
 
 def _finely(problem: Problem, parameter: Parameter) -> Array:
-    """Sizes of a jump, spaced so closely that the last jump of a stroke moves by one sample; shape (k,)."""
+    """Trial sizes of a jump, spaced so closely that the last jump of a stroke moves by one sample; shape (k,)."""
     history = problem.chain.history
     steps = np.concatenate([np.diff(history.input_mm[run]) for run in history.runs])
     moving = np.abs(steps[np.abs(steps) > 0.0])
@@ -136,7 +136,7 @@ def extended(
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Replace each effect of the best explanation by every other effect; the rest start at their fitted values.
+    """Replace each effect of the best explanation by every other effect; the others start at their fitted values.
 
     An effect that was fitted alone has absorbed the influence of both effects; its parameters are then so far from the
     joint optimum that a joint search starting there would not find it.
@@ -154,7 +154,7 @@ def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> li
 
 
 def different(problem: Problem, explanations: list[Explanation], most: int) -> list[Explanation]:
-    """Keep the best of explanations with equal predictions, such as offsets of input, gap and edge."""
+    """Keep the best of several explanations with equal predictions, such as offsets of input, gap and edge."""
     found, predicted = list[Explanation](), list[Array]()
     for explanation in explanations:
         curve = problem.whitened(explanation.values)
@@ -168,7 +168,7 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of the additional part of the larger explanation, as a share of its whole change of the prediction in mm."""
+    """Size of the additional part of the larger explanation, as a share of its total change of the prediction."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
     if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
@@ -176,7 +176,7 @@ def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> 
 
 
 def within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether one of the effects acts, like rounding, by less than an encoder step, on few rows or at stroke ends."""
+    """Whether one of the effects acts like rounding: by less than an encoder step, on few rows or at stroke ends."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
@@ -196,6 +196,20 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
     return False
 
 
+def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explanation]) -> list[Explanation]:
+    """Keep the explanations that change the prediction by more than the error of the recorded input does.
+
+    The explanations that are dropped only follow the rounding errors of an encoder. For example, a delay within one
+    step of an encoder gained 225 in chi-square in this way, and hid an offset beside a play that changed the prediction
+    by twenty times as much. If even the best explanation only follows the rounding errors, explanations with other
+    effects may do so as well: then only additions to the smaller explanation are kept.
+    """
+    beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
+    if beyond[:1] == larger[:1]:
+        return beyond
+    return [explanation for explanation in beyond if set(smaller.names) <= set(explanation.names)]
+
+
 def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
     """Choose the explanation with the smallest BIC (Schwarz 1978)."""
     return min(candidates, key=lambda explanation: explanation.bic(samples))
@@ -204,7 +218,7 @@ def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
 def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
     """Choose one effect; prefer a simpler formula if the richer one gains no more than formulas are inexact.
 
-    For example, such a small difference is no reason to prefer a resonance to a delay by a fraction of a sample.
+    For example, a small gain is no reason to prefer a resonance to a delay by a fraction of a sample.
     """
     best = likeliest(singles, samples)
     within = FORM_SHARE**2 * (nothing.score - best.score)

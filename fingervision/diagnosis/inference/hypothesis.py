@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Effect
 from fingervision.domain.parameter import Parameter
 
@@ -99,7 +100,7 @@ class Problem:
         return found
 
     def only_run(self, column: Array, run: int | None) -> Array:
-        """Keep the rows of one run in a column of shape (m,), or all rows if `run` is None."""
+        """Keep the rows of one run in an array of shape (m,), or all rows if `run` is None."""
         if run is None or len(self.chain.history.runs) == 1:
             return column
         rows = self.chain.history.runs[run]
@@ -110,7 +111,7 @@ class Problem:
         return out
 
     def whitened(self, settings: Mapping[str, Mapping[str, float]]) -> Array:
-        """Predict and whiten; the result has shape (m,)."""
+        """Predict all channels with given parameters, and whiten the prediction; the result has shape (m,)."""
         return self.whitener.one(self.chain.stacked(settings))
 
     def score(self, settings: Mapping[str, Mapping[str, float]]) -> float:
@@ -122,12 +123,11 @@ class Problem:
     def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
         """-2 log of the posterior up to a constant, marginalised over the spreads of the run offsets."""
         residual = self.measured - self.whitened(settings)
-        sigma, penalty = self.offsets.spread(residual)
-        metric = self.offsets.metric(sigma)
-        return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
+        sigma, penalty, doubt = self.offsets.spread_and_doubt(residual)
+        return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty + doubt
 
     def nothing(self) -> Explanation:
-        """The model without any effect, with its score."""
+        """The model without any effect, with its score: the explanation from which gains are counted."""
         residual = self.measured - self.whitened({})
         sigma, penalty = self.offsets.spread(residual)
         score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty

@@ -1,7 +1,7 @@
 """Fit a hypothesis: the effects are placed in the measuring chain and fitted jointly by generalised least squares."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,6 +36,8 @@ class _JointSquares:
         Metric that accounts for the run offsets.
     sigma_mm : tuple of float or None
         Fixed spread of the run offsets; None to estimate it from the residual.
+    latest : dict of bytes to ndarray
+        Last prediction, by its parameters: a step that is accepted is where the next derivatives begin.
     """
 
     problem: Problem
@@ -44,6 +46,7 @@ class _JointSquares:
     listed: list[tuple[str, Parameter]]
     metric: Array
     sigma_mm: tuple[float, ...] | None
+    latest: dict[bytes, Array] = field(default_factory=dict)
 
     def settings(self, x: Array) -> Point:
         """Parameter values by name, from a vector of shape (p,)."""
@@ -54,14 +57,22 @@ class _JointSquares:
 
     def residual(self, x: Array) -> Array:
         """Whitened target minus prediction."""
-        return self.aim - self.problem.whitened(self.settings(x))
+        return self.aim - self.problem.whitener.one(self._predicted(x))
+
+    def _predicted(self, x: Array) -> Array:
+        """Prediction of the stacked channels before whitening, shape (m,)."""
+        key = x.tobytes()
+        if key not in self.latest:
+            self.latest.clear()
+            self.latest[key] = self.problem.chain.stacked(self.settings(x))
+        return self.latest[key]
 
     def squared(self, residual: Array) -> float:
-        """Chi-square with the best run offsets."""
+        """Chi-square of a residual with the best run offsets."""
         return self.problem.offsets.squared(residual, self.metric)
 
     def reweighted(self, residual: Array) -> "_JointSquares":
-        """Adapt the spread of the run offsets to the residual, unless it is fixed."""
+        """Adapt the standard deviation of the run offsets to the residual, unless it is fixed."""
         offsets = self.problem.offsets
         spread = self.sigma_mm if self.sigma_mm is not None else offsets.spread(residual)[0]
         return replace(self, metric=offsets.metric(spread))
@@ -78,7 +89,7 @@ class _JointSquares:
     def _derivatives(self, x: Array) -> Array:
         problem = self.problem
         lower, upper = _bounds(self.listed)
-        base = problem.chain.stacked(self.settings(x))
+        base = self._predicted(x)
         columns = np.empty((base.size, x.size))
         steps = np.maximum(1e-4 * np.abs(x), 1e-6 * np.minimum(upper - lower, 10.0 * np.abs(x) + 1e-2))
         for group in _together(self.listed):
@@ -166,7 +177,7 @@ def _bounds(listed: list[tuple[str, Parameter]]) -> tuple[Array, Array]:
 
 
 def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
-    """Group parameters that can be differentiated by one prediction: start states of runs affect separate rows."""
+    """Group parameters whose derivatives one prediction gives: start states of different runs affect separate rows."""
     groups: dict[object, list[int]] = {}
     for i, (name, parameter) in enumerate(listed):
         groups.setdefault(i if parameter.run is None else name, []).append(i)

@@ -1,7 +1,7 @@
 """Effects that a map of position errors can represent: functions of position alone, except a straight line.
 
-If a map is fitted too, no data can distinguish such an effect from the map, whatever the effect's size. Effects with
-reversal, memory or dependence on time can be distinguished.
+If a map is fitted too, no data can distinguish such an effect from the map, however large the effect is. Effects with
+reversal, memory or dependence on time can be distinguished from a map.
 """
 
 from dataclasses import replace
@@ -93,7 +93,7 @@ def _reason(problem: Problem) -> str:
 
 
 def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[Flags, Flags]:
-    """Whether a straight line represents each whitened column, and whether a map's curve represents the rest."""
+    """Whether a straight line represents each whitened column, and whether a map's curve represents the remainder."""
     nodes_mm = position_map.nodes_mm
     raw = map_columns(problem.chain, nodes_mm)
     line = np.stack([np.ones_like(nodes_mm), nodes_mm - nodes_mm.mean()], axis=1)
@@ -101,7 +101,7 @@ def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[
     offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
 
     def left(beside: Array) -> Array:
-        """Squared lengths after projection off the run offsets and the columns `beside`; shape (k,)."""
+        """Squared lengths of columns after projection off the run offsets and the columns `beside`; shape (k,)."""
         moved = beside - offsets.design @ (metric @ (offsets.design.T @ beside))
         rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
         shared = offsets.design.T @ rest

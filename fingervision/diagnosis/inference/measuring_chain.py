@@ -58,13 +58,13 @@ class MeasuringChain:
 
     @cached_property
     def _stages(self) -> tuple[tuple[DriveEffect, ...], tuple[PointEffect, ...]]:
-        """Effects of the drive, and effects of mechanism and camera, each in the catalogue's order."""
+        """Effects of the drive, and effects of mechanism and camera, each group in the catalogue's order."""
         effects = self.effects.values()
         drives = tuple(effect for effect in effects if isinstance(effect, DriveEffect))
         return drives, tuple(effect for effect in effects if isinstance(effect, PointEffect))
 
     def with_input(self, input_mm: Array) -> "MeasuringChain":
-        """Replace the input of the measured rows, and of the points of the path that repeat it.
+        """Replace the recorded input of the measured rows, and of the points of the path that repeat these rows.
 
         `input_mm` of shape (n,).
         """
@@ -72,7 +72,7 @@ class MeasuringChain:
         return replace(self, history=replace(self.history, input_mm=input_mm), path=path)
 
     def with_rest_gap(self, rest_gap_mm: float) -> "MeasuringChain":
-        """Set the model's gap at input zero."""
+        """Return the chain with another gap of the model at input zero."""
         path = self.path
         if path is not None:
             path = replace(path, history=replace(path.history, rest_gap_mm=rest_gap_mm))
@@ -106,7 +106,7 @@ class MeasuringChain:
         return seen(self.midline_mm + self.seen_midline_mm - float(np.median(first.midline_mm)))
 
     def driven_mm(self, settings: Settings) -> Array:
-        """Input that the mechanism receives at the measured rows, after the drive effects; shape (n,) (mm)."""
+        """Input (mm) that the mechanism receives at the measured rows, after the drive effects; shape (n,)."""
         along = self._driven_mm({**self.fixed, **settings})
         return along if self.path is None else along[self.path.rows]
 
@@ -130,7 +130,7 @@ class MeasuringChain:
 
 
 def own_laws(model: Model) -> Mapping[str, PhysicalLaw]:
-    """Formulas of the model's own for effects, by name: a drawn gripper has such formulas, a table has none."""
+    """Formulas for effects that the model itself provides, by the effect's name; a simulation table provides none."""
     return model.laws if isinstance(model, PhysicalModel) else {}
 
 

@@ -14,7 +14,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.map_imitators import LINE_SHARE
 from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
-from fingervision.diagnosis.inference.signatures import tangents
+from fingervision.diagnosis.inference.signatures import derivatives, tangents
 from fingervision.diagnosis.input.input_uncertainty import below_the_input
 from fingervision.domain.effect import Array, Flags
 
@@ -29,14 +29,14 @@ STAND_INS = 2
 
 
 def shapes_of(problem: Problem) -> Probes:
-    """Probes for a problem; fewer of them for a long record."""
+    """Choose the generic shapes (probes) for a problem; fewer of them for a long record."""
     history = problem.chain.history
     return probes(history, problem.whitener, 2400 if history.input_mm.size <= LONG else 800)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Basis:
-    """Whitened columns, shape (m, k), with their squared lengths and their overlap with run offsets."""
+    """Whitened columns, shape (m, k), with their squared lengths and their inner products with the run offsets."""
 
     columns: Array
     squares: Array
@@ -48,12 +48,12 @@ class _Basis:
         return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
 
     def beside_offsets(self, metric: Array) -> Array:
-        """Squared lengths after projection off the run offsets that a metric allows; shape (k,)."""
+        """Squared lengths of columns after projection off the run offsets that a metric allows; shape (k,)."""
         return np.asarray(self.squares - np.einsum("ij,ij->j", self.shared, metric @ self.shared))
 
 
 def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
-    """Reduction of chi-square by each column, in the residual of an explanation and of columns already used.
+    """Reduction of chi-square by each column, in the residual of an explanation and of the columns already used.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def _explained(problem: Problem, found: Explanation) -> float:
 
 
 def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[Explanation]) -> str | None:
-    """Sentence that names generic shapes which effects only imitate; None if the effects themselves are the cause.
+    """Name the generic shapes that effects only imitate, in a sentence; None if the effects themselves are the cause.
 
     Three effects can fit almost any shape, and must therefore explain the data much better than generic shapes do. One
     or two effects count as imitations only if the shapes fit much better, by more than the inexactness of the effects'
@@ -110,20 +110,48 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     for base in fewer:
         taken = np.zeros((rows, 0))
         cost = base.bic(rows) + choices(problem, base)
-        words: list[str] = []
+        words, added = list[str](), list[Array]()
         for _ in range(STAND_INS):
             gain = np.where(barred, 0.0, _gains(problem, basis, base, taken)[0])
             top = int(np.argmax(gain))
             taken = np.hstack([taken, columns[:, top : top + 1]])
+            added.append(shapes.before_whitening(top))
             words.append(f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)")
             cost += each - float(gain[top])
-            if cost < least:
+            if cost < least and not _differs_by_rounding(problem, found, base, np.stack(added, axis=1)):
                 least, best = cost, " and ".join(words)
     return best
 
 
+def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation, shapes: Array) -> bool:
+    """Whether an explanation with added shapes differs from that of the effects by less than the input's error.
+
+    For example, a step over the input at the first line of an encoder is an offset: beyond this line, where the strokes
+    reverse, the mean position of the stage is not that of the line. Differences in the constants of the runs are
+    ignored.
+
+    Parameters
+    ----------
+    found, base : Explanation
+        The effects, and the explanation to which the shapes are added.
+    shapes : ndarray of float, shape (m, k)
+        Generic shapes, before whitening.
+    """
+    history = problem.chain.history
+    if history.input_sigma_mm == 0.0:
+        return False
+    moves = np.hstack([derivatives(problem, base), shapes]) if base.names else shapes
+    whitened, metric = problem.whitener.columns(moves)[0], problem.offsets.metric(base.sigma_mm)
+    bent = _beside(problem.offsets.design, metric, whitened)
+    size = np.linalg.pinv(whitened.T @ bent) @ (bent.T @ base.residual)
+    differs = problem.chain.stacked(base.values) + moves @ size - problem.chain.stacked(found.values)
+    gap = differs[: history.input_mm.size]
+    apart = np.concatenate([gap[run] - gap[run].mean() for run in history.runs])
+    return below_the_input(problem, float(np.sqrt(np.mean(apart**2))))
+
+
 def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
-    """Mark probes that have the shape of one of the effects, or are straight lines; shape (k,).
+    """Mark the probes that have the shape of one of the effects, or are straight lines; shape (k,).
 
     For example, in readings at rest, play is merely a difference between the two directions, and the probe with this
     shape is not another explanation. A ramp over time in addition to an offset has the shape of warming; in addition to
@@ -152,7 +180,7 @@ def _beside(design: Array, metric: Array, columns: Array) -> Array:
 def own_shapes(problem: Problem, explanation: Explanation) -> list[Array]:
     """Change of the whitened prediction by each effect of an explanation, with the other effects present.
 
-    Each change has shape (m,).
+    Each of these changes has shape (m,).
     """
     whole, values = problem.whitened(explanation.values), explanation.values
     others = [{other: values[other] for other in explanation.names if other != name} for name in explanation.names]
@@ -169,7 +197,7 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
-    """Largest gain of a probe that is caused by errors of the recorded input at jumps alone."""
+    """Largest gain of a probe that errors of the recorded input at jumps alone can cause."""
     most, basis = [], _Basis.of(problem, columns)
     for _ in range(FEWEST):
         shaken, target = noise_alone(problem, best, rng)
@@ -182,12 +210,12 @@ def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: n
 def remaining_structure(
     problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
 ) -> tuple[str | None, str | None]:
-    """Test the largest of many probes; return unknown structure, or structure that remains but is small."""
+    """Test the largest gain among many probes; return unknown structure, or structure that is known to be small."""
     own = harmonics(problem, best)
     gain, dot, norm = _gains(problem, _Basis.of(problem, shapes.columns), best, own.columns)
     usable = norm > 0.0
-    family = ("probe",) * int(usable.sum())
-    threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng).get("probe", np.inf)
+    family = ("probe",) * usable.size
+    threshold = linear_thresholds(problem, family, shapes.columns, best.sigma_mm, rng, usable).get("probe", np.inf)
     top = int(np.argmax(gain))
     if gain[top] > threshold and jumps_astray(problem, best.names):
         threshold = max(threshold, _of_jumps_astray(problem, shapes.columns, best, rng))

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, Flags
 
 QUANTILE = 0.98
 """Quantile of the largest excess over all families: one table of noise in fifty leads to a claim (one in forty would
@@ -21,6 +21,9 @@ SURELY = 3.0
 """Distance from the quantile in standard errors above which no further draw would change the decision."""
 LONG = 6000
 """Number of samples above which fewer draws are made."""
+THINNED = 4000
+"""Number of rows at least kept of a record longer than `LONG`: the quantile of a maximum hardly depends on the number
+of rows, and 300 draws of them take a tenth of a second per thousand columns."""
 OWN_QUANTILE = 0.95
 """Quantile of one family's gain in noise: as high as the number of draws permits."""
 LINEAR_DRAWS = 300
@@ -39,7 +42,7 @@ def noise_doubt(problem: Problem) -> float:
 
     The power at zero frequency is proportional to (1 + rho) / (1 - rho), and an autoregression determines rho with
     standard uncertainty sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). If a spectrum is fitted without its
-    slowest part, the power there is less well determined (`noise_by_spectrum`).
+    lowest frequencies, the noise power there is less well determined (`noise_by_spectrum`).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
@@ -51,13 +54,18 @@ def noise_doubt(problem: Problem) -> float:
 
 
 def linear_thresholds(
-    problem: Problem, names: tuple[str, ...], columns: Array, sigma: tuple[float, ...], rng: np.random.Generator
+    problem: Problem,
+    names: tuple[str, ...],
+    columns: Array,
+    sigma: tuple[float, ...],
+    rng: np.random.Generator,
+    among: Flags | None = None,
 ) -> dict[str, float]:
-    """Thresholds: gains that the best column of a family seldom exceeds in noise alone.
+    """Significance thresholds: gains that the best column of a family of shapes seldom exceeds in noise alone.
 
-    A family of many shapes gains more from noise than a single column does; a common threshold would be that of the
-    largest family. Therefore each family is compared with its own upper quantile, and the probability of an excess in
-    any family is limited: the families have equal shares of the false positives (Beran 1988).
+    A family of many shapes gains more from noise than a single shape does; a threshold for all families together would
+    be that of the largest family. Therefore each family is compared with its own upper quantile, and the probability of
+    an excess in any family is limited: the families have equal shares of the false positives (Beran 1988).
 
     Parameters
     ----------
@@ -67,9 +75,11 @@ def linear_thresholds(
         Whitened signatures or probes.
     sigma : tuple of float
         Spread of the run offsets for each channel.
+    among : ndarray of bool, shape (k,), or None
+        Columns that count; None for all.
     """
     offsets, metric = problem.offsets, problem.offsets.metric(sigma)
-    kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
+    kept = columns if columns.shape[0] <= LONG else columns[:: columns.shape[0] // THINNED]
     noise = rng.standard_normal((kept.shape[0], LINEAR_DRAWS))
     if kept.shape[0] == columns.shape[0]:
         shared = offsets.design.T @ columns
@@ -79,7 +89,7 @@ def linear_thresholds(
         norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
     else:
         norm = np.einsum("ij,ij->j", kept, kept)
-    usable = norm > 1e-9
+    usable = norm > 1e-9 if among is None else among & (norm > 1e-9)
     owner = np.array(names)
     # The noise itself is estimated, from as many samples as there are.
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
@@ -133,18 +143,18 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
 
 
 def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
-    """Whether an explanation jumps at inputs that are poorly known, so that one wrong jump shifts all later ones."""
+    """Whether an explanation contains jumps at poorly known inputs, so that a misplaced jump shifts all later ones."""
     unsure = problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()
     return bool(unsure) and any(parameter.rugged for _, parameter in problem.parameters(names))
 
 
 def rare(values: Sequence[float]) -> float:
-    """Estimate, from a few draws, the quantile of a maximum that is exceeded once in 50 draws."""
+    """Estimate, from a few draws, the value of a maximum that is exceeded once in 50 draws."""
     return float(np.mean(values)) + GUMBEL * float(np.std(values))
 
 
 def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
-    """Simulate the noise of the pictures only; channels are stacked, shape (m,), in mm."""
+    """Simulate only the noise of the pictures (mm) for the stacked channels, shape (m,)."""
     out = []
     for noise in problem.whitener.noises:
         for run in problem.chain.history.runs:
@@ -164,7 +174,7 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
 def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
     """Smallest gain required of the effects that are added to those of `base`.
 
-    It is infinite for an effect that run offsets can imitate completely.
+    This gain is infinite for an effect that run offsets can imitate completely.
     """
     return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
 
@@ -178,7 +188,7 @@ def exceeds_noise(
     suspects: list[dict[str, Mapping[str, float]]],
     rng: np.random.Generator,
 ) -> bool:
-    """Whether an excess over the thresholds is larger than that of a further effect in noise alone.
+    """Whether a gain above the thresholds is also larger than the gain of one more effect in noise alone.
 
     Linear signatures on a grid of shapes gain less from noise than refitted effects do, because a fit also finds the
     best period between two grid values, or the best position of an end stop. Each draw is therefore fitted like the

@@ -7,7 +7,7 @@ import numpy as np
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array, DriveEffect
 from fingervision.effects.play_operator import play
 
@@ -84,7 +84,7 @@ def gross_mistake(data: Observations) -> Finding | None:
 
 
 def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Finding | None:
-    """Check whether the residual is one noise: rows that are right and rows that are wrong make two.
+    """Check whether the residual has one noise level: a mixture of right and wrong rows would have two levels.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
 
 
 def _in_stretches(values: Array) -> bool:
-    """Whether neighbouring rows are alike in lying near the median: a stage that moves and rests, and no wrong rows."""
+    """Whether rows near the median are neighbours, as for a stage that moves and rests; wrong rows are scattered."""
     near = (np.abs(values - np.median(values)) < NARROW * np.std(values)).astype(np.float64)
     near -= near.mean()
     power = float(near @ near)
@@ -183,13 +183,13 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
 
 
 def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) -> Array:
-    """Project whitened values off the given columns; same shape."""
+    """Project whitened values off the given columns; the shape is unchanged."""
     moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
     return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])
 
 
 def _later(data: Observations) -> list[Array]:
-    """Predicted gap for a stage without delay, and with delays up to a second."""
+    """Predicted gap for a stage without delay, and for delays up to a second."""
     late = [name for name, effect in data.effects.items() if isinstance(effect, DriveEffect) and effect.act_curved]
     if not late:
         return [data.chain.respond({}).gap_mm]

@@ -39,7 +39,7 @@ SLOPE_STEP = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionMap:
-    """A map of position errors as a random effect.
+    """A map of position errors of the stage as a random effect.
 
     Parameters
     ----------
@@ -81,12 +81,12 @@ class PositionMap:
         return described | curve_values(self.nodes_mm.tolist(), self.curve_mm.tolist())
 
     def is_like(self, other: "PositionMap") -> bool:
-        """Whether size and length agree with those of another map within the uncertainties."""
+        """Whether the map's size and correlation length agree with those of another map within the uncertainties."""
         pairs = ((self.rms_mm, other.rms_mm), (self.length_mm, other.length_mm))
         return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
-        """Estimate the curve for an explanation; in the problem, `behind` columns follow those of the map."""
+        """Estimate the map's curve for an explanation; in the problem, `behind` columns follow those of the map."""
         best, covariance_of_best = estimated_coefficients(problem, explanation, self.coefficients.size, behind)
         curve = self.root_mm @ best
         rms = float(np.sqrt(np.mean(curve**2)))
@@ -200,7 +200,7 @@ def _basis(nodes_mm: Array, inputs_mm: Array) -> Array:
 
 
 def _places(history: History, nodes_mm: Array) -> Array | None:
-    """Positions over which a map has zero mean and slope: the set-points, or the whole range of a continuous motion."""
+    """Positions over which a map has zero mean and zero slope: the set-points, or the range of a continuous motion."""
     if nodes_mm.size != NODES and history.dwell_s > 0.0:
         return None
     return _basis(nodes_mm, np.linspace(nodes_mm[0], nodes_mm[-1], EVENLY))

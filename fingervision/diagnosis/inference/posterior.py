@@ -7,7 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 
@@ -43,7 +43,7 @@ class _Coordinates:
 
     @classmethod
     def about(cls, problem: Problem, explanation: Explanation) -> "_Coordinates":
-        """Coordinates of the effects' own parameters; start states are fixed (see `beside_starts`)."""
+        """Coordinates of the parameters of the effects themselves; start states are fixed (see `beside_starts`)."""
         listed = problem.parameters(explanation.names)
         starts: dict[str, dict[str, float]] = {}
         for name, parameter in listed:
@@ -52,11 +52,11 @@ class _Coordinates:
         return cls(tuple(entry for entry in listed if entry[1].run is None), starts)
 
     def of(self, values: Mapping[str, Mapping[str, float]]) -> Array:
-        """Convert parameters to coordinates; shape (p,)."""
+        """Convert parameters to the sampler's coordinates; shape (p,)."""
         return np.array([_forth(parameter, values[name][parameter.name]) for name, parameter in self.listed])
 
     def at(self, coordinates: Array) -> Point:
-        """Convert coordinates to parameters, clipped to the bounds."""
+        """Convert the sampler's coordinates to parameters, clipped to the bounds."""
         out: Point = {name: dict(values) for name, values in self.starts.items()}
         for (name, parameter), x in zip(self.listed, coordinates, strict=True):
             value = _back(parameter, float(x))
@@ -65,7 +65,7 @@ class _Coordinates:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds, each of shape (p,)."""
+        """Lower and upper bounds in the sampler's coordinates, each of shape (p,)."""
         ends = [sorted((_forth(p, p.lower), _forth(p, p.upper))) for _, p in self.listed]
         return np.array([low for low, _ in ends]), np.array([high for _, high in ends])
 
@@ -87,7 +87,7 @@ def _back(parameter: Parameter, x: float) -> float:
 
 
 def _curvature(problem: Problem, explanation: Explanation, walk: _Coordinates, best: Array, step: Array) -> Array:
-    """Half of the score's second derivatives, shape (p, p), from differences of the prediction over `step`."""
+    """Half of the second derivatives of the score, shape (p, p), from differences of the prediction over `step`."""
     upper = walk.bounds[1]
     base = problem.whitened(explanation.values)
     columns = []
@@ -141,7 +141,7 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
     inverse = np.linalg.inv(root)
 
     def far(at: Array) -> float:
-        """Log density of the independent proposals, up to a constant."""
+        """Log density of the sampler's independent proposals, up to a constant."""
         z = inverse @ (at - best)
         return -0.5 * (FREEDOM + best.size) * float(np.log1p(z @ z / FREEDOM))
 
@@ -197,7 +197,7 @@ def beside_starts(problem: Problem, explanation: Explanation) -> Problem:
 def settled(
     problem: Problem, explanation: Explanation, rng: np.random.Generator
 ) -> tuple[Explanation, tuple[Point, ...]]:
-    """Give an explanation the spread of its posterior, and for parameters at a bound also the posterior mean.
+    """Give an explanation its posterior standard deviations, and parameters at a bound also the posterior mean.
 
     A best fit at a bound is a corner of the region that the data allow; the posterior mean predicts better.
 

@@ -13,15 +13,36 @@ SPAN = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probes:
-    """Whitened unit shapes with descriptions; columns of shape (m, k), and RMS of each before whitening."""
+    """Whitened unit shapes with descriptions.
+
+    Parameters
+    ----------
+    words : tuple of str, length k
+        Descriptions.
+    columns : ndarray of float, shape (m, k)
+        Whitened shapes.
+    rms : ndarray of float, shape (k,)
+        RMS of each shape before whitening.
+    bare : ndarray of float, shape (n, b)
+        The different shapes before whitening; column i of `columns` has shape i modulo b.
+    shares : ndarray of float, shape (k / b, channels)
+        Size of a shape in each channel; column i of `columns` has row i // b.
+    """
 
     words: tuple[str, ...]
     columns: Array
     rms: Array
+    bare: Array
+    shares: Array
+
+    def before_whitening(self, index: int) -> Array:
+        """One generic shape before whitening, with channels stacked; shape (m,)."""
+        kind, shape = divmod(index, self.bare.shape[1])
+        return np.outer(self.shares[kind], self.bare[:, shape]).ravel()
 
 
 def _speed(input_mm: Array, time_s: Array) -> Array:
-    """Speed as the slope over `SPAN` samples, because differences of neighbours contain the input's errors."""
+    """Speed (mm/s) as the slope over `SPAN` samples: differences of neighbours would contain the input's errors."""
     if input_mm.size <= SPAN:
         return np.full(input_mm.size, float(np.ptp(input_mm)) / max(float(np.ptp(time_s)), 1e-9))
     ahead = np.minimum(np.arange(input_mm.size) + SPAN // 2 + 1, input_mm.size - 1)
@@ -32,7 +53,7 @@ def _speed(input_mm: Array, time_s: Array) -> Array:
 
 
 def probes(history: History, whitener: Whitener, most: int) -> Probes:
-    """Make steps, bumps, waves and slopes over time, input, direction and run; in gap, midline, left and right.
+    """Make generic shapes (steps, bumps, waves, slopes) over time, input, direction and run, for each measured channel.
 
     Parameters
     ----------
@@ -115,4 +136,4 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         for k, share in enumerate(shares[:, channel]):
             np.multiply(whitened, share, out=rows[:, k * count : (k + 1) * count])
     power = np.outer(np.sum(shares**2, axis=1) / shares.shape[1], np.mean(bare**2, axis=0))
-    return Probes(words, columns, np.sqrt(power.ravel()))
+    return Probes(words, columns, np.sqrt(power.ravel()), bare, shares)

@@ -15,7 +15,7 @@ LEAST_GAIN = 10.0
 
 
 def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) -> tuple[Array, Array]:
-    """Normal equations of columns in addition to an explanation, with the runs' offsets integrated out.
+    """Normal equations for the columns of a random effect and an explanation, with the runs' offsets integrated out.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) 
 
 
 def estimated_coefficients(problem: Problem, explanation: Explanation, count: int, behind: int) -> tuple[Array, Array]:
-    """Estimate the coefficients of a random effect in addition to an explanation.
+    """Estimate the coefficients of a random effect, given an explanation.
 
     Parameters
     ----------

@@ -14,11 +14,11 @@ from fingervision.diagnosis.inference.map_repeatability import foretells_other_p
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, likeliest_gains
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
 BESIDE = 3
 """Number of the most probable single effects with which run gains and maps are tried; each costs a hundredth of a
@@ -32,9 +32,9 @@ Effected = TypeVar("Effected", bound=RunGains | PositionMap)
 def beside_gains(state: Searched, look: Look) -> Searched:
     """Search with run-to-run gains included, and keep the result if it is much more probable.
 
-    Beside an effect that changes the prediction more than they do, such gains are nuisance parameters; alone they are
-    structure without a name. If further effects are not much more probable than such gains, the gains are kept, because
-    naming an effect claims more than stating a scatter.
+    If a named effect changes the prediction more than the gains do, the gains are nuisance parameters; if there is no
+    such effect, they are structure without a name. If further effects are not much more probable than such gains, the
+    gains are kept, because naming an effect claims more than stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
@@ -147,7 +147,7 @@ def _likelier(
 
 
 def _line(problem: Problem) -> Explanation:
-    """Fit a straight line over the input, as an offset and a ratio where both can be named.
+    """Fit a straight line over the input, as an offset of the gap and a ratio if both effects can be named.
 
     A map of position errors contains no straight line.
     """
@@ -177,7 +177,7 @@ def _does_more(beside: Searched) -> bool:
 
 
 def _gained(state: Searched, beside: Searched, effect: RunGains | PositionMap) -> float:
-    """By how much -2 log of the likelihood falls by a random effect and what was found beside it, the price paid."""
+    """Decrease of -2 log likelihood by a random effect and the effects found with it, minus the penalty for it."""
     plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
     rivals = [_refitted(plain, one) for one in (state.found.best, state.found.nearest)]
@@ -185,7 +185,7 @@ def _gained(state: Searched, beside: Searched, effect: RunGains | PositionMap) -
 
 
 def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:
-    """Exclude effects from the search, each with its reason."""
+    """Exclude effects from the search, and record the reason for each."""
     kept = {name: effect for name, effect in data.effects.items() if name not in reasons}
     return replace(data, effects=kept, excluded={**data.excluded, **reasons})
 
@@ -197,7 +197,7 @@ def _left(problem: Problem, explanation: Explanation) -> Explanation:
 
 
 def _without(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """The problem without a random effect's columns, which are the first columns if the effect was added last."""
+    """Return the problem without a random effect's columns, which come first if that effect was added last."""
     count, drawing = effect.coefficients.size, problem.whitener.drawing
     kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
     return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=kept)))

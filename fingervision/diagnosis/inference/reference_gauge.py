@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.further_check import FurtherCheck

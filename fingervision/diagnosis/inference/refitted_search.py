@@ -8,15 +8,16 @@ from scipy.stats import t as student
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.needed_effects import with_simpler_parts, without_unneeded_effects
 from fingervision.diagnosis.inference.position_map import (
     NAME,
 )
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched, problem_of
-from fingervision.diagnosis.inference.verdict import standing_of, with_simpler_parts, without_unneeded_effects
+from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 
@@ -56,7 +57,7 @@ def refitted_search(
     without: frozenset[str],
     progress: Progress,
 ) -> Refitted:
-    """Search in stages: interpolation between samples, a map of position errors, run gains, refitted dimensions.
+    """Search with interpolation between samples, a position map, gains of runs, and refitted dimensions, in turn.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def refitted_search(
 
 
 def _over_the_ends(state: Searched, look: Look) -> Searched:
-    """Search along a path with overshoots; keep the result if an effect with memory then fits better."""
+    """Search along a path that includes overshoots; keep the result if an effect with memory then fits better."""
     data = state.data.with_overshoots()
     if data is state.data:
         return state
@@ -98,10 +99,10 @@ def _over_the_ends(state: Searched, look: Look) -> Searched:
 
 
 def _common_offset(state: Searched, look: Look) -> Searched:
-    """Search again for a constant common to all runs, which had been absorbed by the run offsets.
+    """Search again for a constant that is the same in all runs, which the run offsets had absorbed.
 
-    If all runs have nearly the same offset, this has a common cause; the spread of the offsets is then limited to their
-    deviation from the mean.
+    If all runs have nearly the same offset, the offset has a single cause; the spread of the run offsets is then
+    limited to the deviations from their mean.
     """
     runs = len(state.data.chain.history.runs)
     found = state.found

@@ -57,7 +57,7 @@ class RunGains:
 
     @property
     def words(self) -> str:
-        """The result as a sentence."""
+        """Sentence with the estimated scatter of the runs' gains."""
         each = ", ".join(f"{100.0 * self.sd * number:+.2g}" for number in self.coefficients - self.coefficients.mean())
         return (
             f"the gain differs from run to run (by {each} %): taken as the runs' own scatter, like their offsets, and "
@@ -65,7 +65,7 @@ class RunGains:
         )
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
-        """Estimate the gains for an explanation; in the problem, `behind` columns follow those of the gains."""
+        """Estimate the runs' gains for an explanation; in the problem, `behind` columns follow those of the gains."""
         return replace(
             self, coefficients=estimated_coefficients(problem, explanation, self.coefficients.size, behind)[0]
         )

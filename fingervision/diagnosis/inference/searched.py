@@ -8,7 +8,8 @@ import numpy as np
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
-from fingervision.diagnosis.inference.search import Findings, search
+from fingervision.diagnosis.inference.search import search
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 
 QUIET = 3.0 * 2.0**0.5
@@ -19,7 +20,7 @@ MOST_REPEATS = 2
 
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
-    """Estimation problem with the noise from an explanation's residual, or from the disagreement if there is none."""
+    """Estimation problem whose noise is estimated from an explanation's residual, or else from the disagreement."""
     values = {} if explanation is None else explanation.values
     free = 0 if explanation is None else explanation.free
     return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)
@@ -43,7 +44,7 @@ class Look:
     progress: Progress
 
     def again(self, data: Observations, known: Explanation | None = None) -> Searched:
-        """Search once more, the noise estimated beside what is known already."""
+        """Search once more, with the noise estimated from the residual of the effects found so far."""
         look = partial(search, partial(problem_of, data), self.rng, self.forced, self.progress)
         found = look(known)
         for _ in range(MOST_REPEATS):
@@ -55,10 +56,10 @@ class Look:
 
 
 def _noise_is_too_large(found: Findings) -> bool:
-    """Whether the answer leaves far less than the noise by which it was judged.
+    """Whether the result leaves a residual far smaller than the noise by which it was judged.
 
-    The noise is estimated beside a rough first fit. Where that fit is poor, its errors count as correlated noise, and
-    under so large a noise a second effect is never seen.
+    The noise is estimated beside a rough first fit. If that first fit is poor, its errors count as correlated noise,
+    and with so large a noise a second effect is never found.
     """
     rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
     return bool(found.best.score < rows - QUIET * rows**0.5)

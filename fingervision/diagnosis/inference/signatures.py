@@ -6,16 +6,24 @@ from itertools import product
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array, History, start_key
 
 START_MOVES = 1e-3
 """Least size of a first motion, as a share of the range, that determines from which side a run starts."""
 
 
+SAME_SIZE = (0.2, 3.0)
+"""Coefficients of a column without an amplitude that still mean its own size: beyond them a neighbour on the grid of
+sizes, which is a factor of two to three away, describes the residual better."""
+BEYOND_BOUNDS = 0.3
+"""Share of a parameter's range by which a linear estimate may exceed it: the refit, which is not linear, may come back
+within the bounds."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Signatures:
-    """Whitened columns with the parameters that produced them.
+    """Whitened signatures as columns, with the parameters that produced each of them.
 
     Parameters
     ----------
@@ -37,7 +45,7 @@ class Signatures:
     def gains(
         self, residual: Array, offsets: RunOffsets, metric: Array, along: Array | None = None
     ) -> tuple[Array, Array]:
-        """Reduction of chi-square that each column alone achieves in a residual, and its coefficient; shape (k,).
+        """Reduction of chi-square by each column alone in a residual, and the column's fitted coefficient; shape (k,).
 
         Parameters
         ----------
@@ -64,17 +72,16 @@ class Signatures:
         out = np.zeros(coefficient.size, dtype=bool)
         for i, grow in enumerate(self.grows):
             if grow is None:
-                out[i] = 0.2 < coefficient[i] < 3.0
+                out[i] = SAME_SIZE[0] < coefficient[i] < SAME_SIZE[1]
             else:
                 _, neutral, step, lower, upper = grow
                 value = neutral + coefficient[i] * step
-                out[i] = lower - 0.3 * (upper - lower) <= value <= upper + 0.3 * (upper - lower) and (
-                    lower < neutral or value >= neutral
-                )
+                room = BEYOND_BOUNDS * (upper - lower)
+                out[i] = lower - room <= value <= upper + room and (lower < neutral or value >= neutral)
         return out
 
     def begin(self, index: int, coefficient: float) -> dict[str, float]:
-        """Parameters from which a search starts, with the amplitude scaled by the coefficient."""
+        """Parameters from which a search starts; the amplitude is scaled by the fitted coefficient of the signature."""
         start, grow = dict(self.starts[index]), self.grows[index]
         if grow is not None:
             name, neutral, step, lower, upper = grow
@@ -113,7 +120,7 @@ def signatures(problem: Problem) -> Signatures:
 
 
 def start_patterns(history: History) -> tuple[dict[str, float], ...]:
-    """Start states from which to search: in the middle, as left by the first motion, and at the other end."""
+    """Start states from which to search: the middle of the play, the end left by the first motion, the other end."""
     first = []
     for run in history.runs:
         moves = np.diff(history.input_mm[run])
@@ -122,8 +129,8 @@ def start_patterns(history: History) -> tuple[dict[str, float], ...]:
     return tuple({start_key(run): end * way for run, way in enumerate(first)} for end in (0.0, -1.0, 1.0))
 
 
-def tangents(problem: Problem, explanation: Explanation) -> Array:
-    """Derivatives of the whitened prediction by an explanation's parameters, scaled to unit length; shape (m, p)."""
+def derivatives(problem: Problem, explanation: Explanation) -> Array:
+    """Derivatives of the prediction with respect to an explanation's parameters, before whitening; shape (m, p)."""
     base = problem.chain.stacked(explanation.values)
     columns = []
     for name, parameter in problem.parameters(explanation.names):
@@ -132,5 +139,10 @@ def tangents(problem: Problem, explanation: Explanation) -> Array:
         step = step if value + step <= parameter.upper else -step
         moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
         columns.append((problem.chain.stacked(moved) - base) / step)
-    whitened = problem.whitener.columns(np.stack(columns, axis=1))[0]
+    return np.stack(columns, axis=1)
+
+
+def tangents(problem: Problem, explanation: Explanation) -> Array:
+    """Derivatives of the whitened prediction by an explanation's parameters, scaled to unit length; shape (m, p)."""
+    whitened = problem.whitener.columns(derivatives(problem, explanation))[0]
     return np.asarray(whitened / np.maximum(np.linalg.norm(whitened, axis=0), 1e-300))

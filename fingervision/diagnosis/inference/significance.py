@@ -36,12 +36,12 @@ class Evidence:
 
     @classmethod
     def of(cls, problem: Problem, atoms: Signatures, nothing: Explanation, rng: np.random.Generator) -> "Evidence":
-        """Compute the thresholds from simulated noise."""
+        """Compute the significance thresholds from simulated noise."""
         columns, sigma = atoms.columns, nothing.sigma_mm
         return cls(problem, atoms, linear_thresholds(problem, atoms.names, columns, sigma, rng), rng)
 
     def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
-        """Whether the best of some explanations gains more over `base` than noise alone would."""
+        """Whether the best of some explanations gains more in chi-square over `base` than noise alone would."""
         asked = {e.names: price(self.thresholds, base, e.names) for e in found}
         ranked = sorted(found, key=lambda e: e.score + asked[e.names])
         if not ranked:

@@ -5,10 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as fisher
 
-from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.hypothesis import Problem
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import FORM_SHARE_OF_RIGS, Observations
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
 from fingervision.diagnosis.noise.replicates import resolution
@@ -24,11 +22,6 @@ STANDING_NOISES = 3.0
 TRUSTED = 10.0
 """Largest ratio of the estimated noise to the measurement's own random uncertainty; above it, structure was mistaken
 for noise."""
-NEEDED = 1.1
-"""Factor by which dropping an effect may increase the residual (RMS); an effect that reduces it by more is kept."""
-AS_MUCH = 2.0**0.5
-"""Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
-power, because a richer formula also fits part of that structure."""
 MANY_ASIDE = 0.1
 """Largest share of rows that may be gross errors if the model agrees; a larger share must have a cause."""
 COMMON = 2.0
@@ -39,7 +32,7 @@ LACK_OF_FIT = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """Share of the disagreement that an explanation leaves unexplained.
+    """The residual that an explanation leaves, as a share of the disagreement.
 
     All values are RMS over left and right if both are measured, else over the gap; the midline's constant, the runs'
     deviations from their common mean, and outliers are removed.
@@ -80,10 +73,10 @@ class Standing:
 
     @property
     def is_little(self) -> bool:
-        """Whether the remaining residual is noise, or a small part of the disagreement.
+        """Whether the remaining residual is only noise, or a small part of the disagreement.
 
-        Where repeats tell the noise, structure beyond it is known for what it is, and may be no more than the forms of
-        effects leave over on real stages.
+        If repeated readings determine the noise, any residual beyond it is structure; a small structure may still be
+        the usual inexactness of the effects' formulas on real stages.
         """
         if self.after_mm <= STANDING_SHARE * self.before_mm:
             return True
@@ -105,7 +98,7 @@ class Standing:
 
 
 def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
-    """Compute the unexplained share; `before_mm` and `after_mm` have shape (channels * n,)."""
+    """Compute the share of the disagreement that remains; `before_mm` and `after_mm` have shape (channels * n,)."""
     if data.run_gains is not None:
         after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
@@ -146,7 +139,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
-    """Subtract each run's deviation from the mean of all runs; a significant common constant remains.
+    """Subtract each run's deviation from the mean of all runs; a significant offset shared by all runs remains.
 
     The mean is not significant if random zeroing of the runs, judged by their scatter, would cause as large a mean.
     """
@@ -169,68 +162,6 @@ def standing_of(data: Observations, found: Findings) -> Standing:
     if data.run_gains is not None:
         data = replace(data, run_gains=data.run_gains.refitted(found.problem, found.best, data.behind(data.run_gains)))
     return standing(data, found.problem, before, left)
-
-
-def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
-    """Drop effects that explain less than the remaining residual, because they may only imitate a part of it.
-
-    If structure remains in addition to several effects, each effect is fitted to part of that structure as well.
-    """
-    rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
-    while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):
-        best = found.best
-        less = min((_without(found, name) for name in best.names), key=lambda explanation: explanation.score)
-        fewer = replace(found, best=less, alternatives=(less,))
-        needed = standing_of(data, fewer).after_mm > NEEDED * standing_of(data, found).after_mm
-        if less.score - best.score > best.score - rows or needed:
-            break
-        found = fewer
-    return found
-
-
-def with_simpler_parts(data: Observations, found: Findings) -> Findings:
-    """If there is unknown structure, replace an effect by a straight line that leaves about as much residual.
-
-    A richer formula gains by fitting unexplained structure: an apparent warming within two seconds may only be an
-    offset and one unusual part of the record.
-    """
-    most_mm = AS_MUCH * standing_of(data, found).after_mm if found.unknown is not None else 0.0
-    while found.unknown is not None:
-        simpler = [e for e in _with_a_line(found) if _stands(data, found, e) <= most_mm]
-        if not simpler:
-            break
-        best = min(simpler, key=lambda e: e.score)
-        found = replace(found, best=best, alternatives=(best,))
-    return found
-
-
-def _with_a_line(found: Findings) -> list[Explanation]:
-    """Explanations in which one curved effect of the best one is replaced by a straight line over the input."""
-    best, problem = found.best, found.problem
-    curved = [n for n, s in zip(best.names, own_shapes(problem, best), strict=True) if not is_a_line(problem, s)]
-    out = []
-    for name in curved:
-        kept = {other: best.values[other] for other in best.names if other != name}
-        for other in set(problem.effects) - set(best.names):
-            listed = problem.parameters((other,))
-            if len(listed) != 1 or listed[0][1].starts != 1:
-                continue
-            fitted = fit(problem, (*kept, other), {**kept, other: {}}, iterations=20)
-            shapes = dict(zip(fitted.names, own_shapes(problem, fitted), strict=True))
-            if is_a_line(problem, shapes[other]):
-                out.append(fitted)
-    return out
-
-
-def _stands(data: Observations, found: Findings, explanation: Explanation) -> float:
-    return standing_of(data, replace(found, best=explanation, alternatives=(explanation,))).after_mm
-
-
-def _without(found: Findings, name: str) -> Explanation:
-    kept = {other: found.best.values[other] for other in found.best.names if other != name}
-    refit = fit(found.problem, tuple(kept), kept, iterations=20)
-    known = [e for e in found.singles if e.names == refit.names]
-    return min([refit, *known], key=lambda e: e.score)
 
 
 def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict, str | None]:

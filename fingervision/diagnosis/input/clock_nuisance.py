@@ -1,4 +1,4 @@
-"""Clock offset between input and pictures as a random effect, if it was estimated from the same motion."""
+"""Error of a clock offset that was estimated from the same motion, as a random effect."""
 
 import numpy as np
 

@@ -1,8 +1,8 @@
 """A dynamic model along a measured path, split into its static response and a dynamic remainder.
 
-The chain of effects is evaluated thousands of times, and a function of time takes seconds. It is therefore split into
-its static response, a table on which drive effects act, and a dynamic remainder computed once along the driven path.
-The remainder is computed again along the path as changed by the effects found.
+The chain of effects is evaluated thousands of times, whereas one evaluation of a dynamic model takes seconds. The model
+is therefore split into its static response, a table on which drive effects act, and a dynamic remainder computed once
+along the driven path. The dynamic remainder is computed again along the path after the effects that were found.
 """
 
 from dataclasses import replace
@@ -22,7 +22,7 @@ PREPARED_S = HOLDS_S[0]
 
 
 def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[CorrectedModel, FunctionModel | None]:
-    """Replace a dynamic model by its static response, for the inputs of a table.
+    """Replace a dynamic model by its static response at the inputs of a table.
 
     Raises
     ------

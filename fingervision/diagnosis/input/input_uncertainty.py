@@ -10,7 +10,7 @@ positions are rounded equally, noise is smoothed."""
 
 
 def below_the_input(problem: Problem, size_mm: float) -> bool:
-    """Whether a change of the gap is smaller than that caused by the input's remaining error or its encoder's step."""
+    """Whether a change of the gap is smaller than the change that the input's error or its encoder step may cause."""
     history = problem.chain.history
     gap = problem.chain.stacked({})[: history.input_mm.size]
     slope = float(np.ptp(gap)) / history.input_span_mm

@@ -17,7 +17,8 @@ from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
-from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Effect, Flags
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
@@ -108,13 +109,13 @@ class Observations:
         return (*own, *clock, *drawing)
 
     def behind(self, effect: object) -> int:
-        """Number of columns that follow those of a given random effect."""
+        """Number of columns that follow the columns of a given random effect in the problem."""
         order = [one for one, _ in self.random_effects_mm]
         return sum(columns.shape[1] for _, columns in self.random_effects_mm[order.index(effect) + 1 :])
 
     @property
     def stalled(self) -> frozenset[str]:
-        """Effects that are suggested by readings that stay constant at an end of the range."""
+        """Effects that are suggested by readings that stay constant at an end of the input's range."""
         history = self.chain.history
         return stalled_ends(history.input_mm, self.chain.respond({}).gap_mm, self.table.gap_mm)
 
@@ -187,7 +188,7 @@ class Observations:
     def with_overshoots(self) -> "Observations":
         """Return the observations with an overshoot wherever two readings at one target indicate a reversal.
 
-        Without such readings they are returned unchanged.
+        Without such pairs of readings, the observations are returned unchanged.
         """
         if not turning_readings(self.table).size:
             return self
@@ -211,9 +212,9 @@ class Observations:
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
     def driven_again(self, explanation: Explanation, noise_mm: float) -> "Observations | None":
-        """Recompute a dynamic model along the path of an explanation.
+        """Recompute a dynamic model along the path that the input takes after an explanation's drive effects.
 
-        None is returned if that changes nothing significantly.
+        The function returns None if the recomputed model does not differ significantly.
         """
         if self.function is None or self.chain.dynamics is None:
             return None
@@ -222,7 +223,7 @@ class Observations:
         return replace(self, chain=chain) if float(np.sqrt(np.mean(changed**2))) > OF_NOISE * noise_mm else None
 
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
-        """Whether the linearisation at other dimensions predicts this prediction within the noise."""
+        """Whether a prediction linearised at other dimensions agrees with this prediction within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
         bent -= drawn.refit.columns @ (
             np.array(list(self.refit.moved.values())) - np.array(list(drawn.refit.moved.values()))

@@ -69,7 +69,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
 
 
 def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None:
-    """Refuse inputs in another unit, or outside the range of the model."""
+    """Refuse a table whose inputs are in another unit than the model's, or outside the model's range."""
     (low, high), span = range_mm, float(np.ptp(input_mm))
     for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
         if UNIT_SHARES[0] < span / (high - low) / factor < UNIT_SHARES[1]:
@@ -109,7 +109,7 @@ def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInpu
 
 
 def _seen(table: MeasuredTable, chain: MeasuringChain) -> tuple[MeasuringChain, Array]:
-    """Set the chain's midline to the measured one, and stack the measured gap, midline and force."""
+    """Set the chain's midline to the measured one, and stack measured gap, midline and force into one column."""
     stacked = [table.gap_mm]
     if table.midline_mm is not None:
         bare: Response = chain.respond({})
@@ -152,7 +152,7 @@ def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
 
 
 def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
-    """Fit the start states of the model's own effects in each run, because they are not stated."""
+    """Fit the start states of the model's own effects in each run, because a table does not state them."""
     catalogued = chain.effects
     for name in [name for name in chain.fixed if catalogued[name].start]:
         tried = [
@@ -166,7 +166,7 @@ def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
     """Whether each run follows a re-zeroing, recognised by its name.
 
-    The result is empty if all runs do, because then no run shows the earlier zero.
+    The result is empty if every run follows a re-zeroing, because then no run shows the earlier zero.
     """
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()

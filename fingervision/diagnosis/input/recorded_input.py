@@ -62,14 +62,14 @@ class RecordedInput:
 
     @classmethod
     def exact(cls, table: MeasuredTable, *, is_motion: bool = False, commanded: bool = False) -> "RecordedInput":
-        """Use a table's record as it is, without smoothing."""
+        """Use the recorded input of a table as it is, without smoothing."""
         u, along_mm = table.input_mm, recorded(table)[0]
         still = np.zeros(u.size, dtype=bool)
         return cls(u, along_mm, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion, commanded)
 
     @classmethod
     def of(cls, table: MeasuredTable, model: CorrectedModel) -> "RecordedInput":
-        """Smooth a table's record, unless it has commands or set-points, or the gap follows its fluctuations."""
+        """Smooth the recorded input, unless it has commands or set-points, or the gap follows its fluctuations."""
         along_mm, time_s, runs = recorded(table)
         if time_s is None or np.mean(readings_at_rest(table)) > AT_REST_SHARE:
             return cls.exact(table)
@@ -99,7 +99,7 @@ class RecordedInput:
 
 
 def standing_still(history: History) -> tuple[slice, ...]:
-    """Stretches of at least `LEAST_RUN` samples in which the stage is at rest, within the recorded input's error."""
+    """Stretches of `LEAST_RUN` samples or more in which the stage is at rest, within the recorded input's error."""
     reach = max(3.0 * history.input_sigma_mm, STANDING_SHARE * history.input_span_mm)
     found: list[slice] = []
     for run in history.runs:
@@ -145,7 +145,7 @@ def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: fl
 
 
 def _is_motion(table: MeasuredTable, model: CorrectedModel, smooth: Array) -> bool:
-    """Whether the gap follows the input's fluctuations: the slope of the regression is then one, otherwise zero."""
+    """Whether the gap follows the input's fluctuations: the slope of gap over input is then one, otherwise zero."""
     expected = model.base.respond(table.input_mm).gap_mm - model.base.respond(smooth).gap_mm
     residual = table.gap_mm - model.base.respond(smooth).gap_mm
     a = np.concatenate([np.diff(expected[run]) for run in table.runs])

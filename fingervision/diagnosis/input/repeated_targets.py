@@ -57,14 +57,14 @@ class RepeatedTargets:
 
 @dataclass(frozen=True, slots=True)
 class NoRepeatedTargets:
-    """Reason why a table has no repeated visits of targets, as the end of a sentence."""
+    """Reason why a table has no repeated visits of targets; the text completes a sentence."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class _Visit:
-    """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after (None: none).
+    """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after the visit.
 
     `places` contains all of these rows, including those without a reading.
     """
@@ -83,10 +83,10 @@ def repeated_targets(
     """Find targets, directions of approach and cycles in a path.
 
     The direction of approach of a visit follows from the last earlier row at another position, with or without a
-    reading (such as an overshoot or an approach). If the table lacks these rows, two assumptions are made and reported.
-    First, if a target at an end of the range has two successive readings where all other targets have one, the stage
-    reversed with an overshoot between the two. Second, a run that starts at an end of the range, in such a table or in
-    one whose runs all have the same direction, came from beyond that end.
+    reading (such as an overshoot or an approach). If the table lacks rows without a reading, two assumptions are made
+    and reported. First, if a target at an end of the range has two successive readings where all other targets have
+    one, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range, in such
+    a table or in one whose runs all have the same direction, came from beyond that end.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def repeated_targets(
 
 
 def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
-    """Targets in ascending order, and the largest distance of an input that belongs to a target."""
+    """Targets in ascending order, and the largest distance from a target at which an input still belongs to it."""
     ordered = np.sort(inputs)
     if ordered.size < 4 or ordered[0] == ordered[-1]:
         return NoRepeatedTargets("there are fewer than four readings, or the input never changes")
@@ -168,7 +168,7 @@ def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
 
 
 def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwidth: float) -> list[_Visit]:
-    """Visits of a run in the order of travel, including those without a reading."""
+    """Visits of a run in the order of travel, including visits without a reading."""
     path = input_mm[run]
     nearest = np.clip(np.searchsorted((centres[1:] + centres[:-1]) / 2.0, path), 0, centres.size - 1)
     at = np.where(np.abs(path - centres[nearest]) <= halfwidth, nearest, -1)
@@ -197,7 +197,7 @@ def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[sli
 
 
 def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str, ...]]:
-    """Split pairs of readings at the ends of the range, and assign a direction to runs that start there."""
+    """Split pairs of readings at the ends of the range into two visits; give a direction to runs that start there."""
     last = centres.size - 1
     inner = [len(visit.places) for visit in visits if 0 < visit.target < last]
     usual = int(np.median(inner)) if inner else 0

@@ -1,4 +1,4 @@
-"""Ends of the range at which the reading stays constant while the command moves on, by a stop or a contact."""
+"""Ends of the range at which the reading stays constant while the command continues, because of a stop or contact."""
 
 from itertools import pairwise
 

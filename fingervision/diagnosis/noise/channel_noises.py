@@ -62,9 +62,9 @@ def channel_noises(
 
 
 def noises_of_repeats(errors: list[PureError], floors: list[float]) -> tuple[Noise, ...]:
-    """Use the scatter of repeats as white noise, because readings seconds apart have independent errors.
+    """Use the scatter of repeated readings as white noise, because readings seconds apart have independent errors.
 
-    The relative standard uncertainty of the variance is sqrt(2 / degrees).
+    The variance then has the relative standard uncertainty sqrt(2 / degrees), with `degrees` its degrees of freedom.
     """
     found = []
     for error, floor in zip(errors, floors, strict=True):

@@ -23,7 +23,7 @@ BY_CHANCE = 2e-3
 class Noise:
     """Standard deviations of the white and the correlated part, and correlation of neighbouring samples.
 
-    `slow_doubt` is the standard uncertainty of the logarithm of the power at low frequency.
+    `slow_doubt` is the standard uncertainty of the logarithm of the noise power at low frequency.
     """
 
     white_mm: float
@@ -33,8 +33,16 @@ class Noise:
 
     @property
     def total_mm(self) -> float:
-        """Standard deviation of one sample (mm)."""
+        """Standard deviation of the total noise of one sample (mm)."""
         return float(np.hypot(self.white_mm, self.correlated_mm))
+
+
+MEDIAN_SAMPLES, FEWEST_SAMPLES = 7, 9
+"""Samples of the running median, which a pair of outliers cannot move, and the least number of samples of a run for
+which its ends do not make up most of it."""
+CROWDED = 4
+"""Outliers among five successive samples that are a motion: a real reversal moves neighbours too, and an outlier stands
+alone or in a pair."""
 
 
 def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
@@ -50,9 +58,9 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
     rest = residual.copy()
     for run in runs:
         values = residual[run]
-        if ordered and values.size >= 9:
-            padded = np.pad(values, 3, mode="reflect")
-            windows = np.lib.stride_tricks.sliding_window_view(padded, 7)
+        if ordered and values.size >= FEWEST_SAMPLES:
+            padded = np.pad(values, MEDIAN_SAMPLES // 2, mode="reflect")
+            windows = np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_SAMPLES)
             rest[run] = values - np.median(windows, axis=1)
         else:
             rest[run] = values - np.median(values)
@@ -63,16 +71,15 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
         out = np.abs(rest) > sigmas * sigma
         if ordered:
             there = _recurring(out, [*_places(input_mm), *_after_steps(input_mm, runs)])
-            # A real reversal moves neighbours too; an outlier stands alone or in pairs.
             for i in range(2, residual.size - 2):
-                if out[i - 2 : i + 3].sum() >= 4:
+                if out[i - 2 : i + 3].sum() >= CROWDED:
                     out[i - 2 : i + 3] = False
             out &= ~there
     return out
 
 
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
-    """Parts in which more samples deviate than gross errors, which occur at any input and any time, would explain."""
+    """Mark parts of the range in which more samples deviate than gross errors, which occur anywhere, would explain."""
     there = np.zeros(out.size, dtype=bool)
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
@@ -81,14 +88,14 @@ def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
 
 
 def _places(input_mm: Array) -> list[NDArray[np.intp]]:
-    """Samples near the same input, and at the ends of its range, where a contact or a stop acts."""
+    """Group samples near the same input, and those at the ends of the range, where a contact or a stop acts."""
     order = np.argsort(input_mm, kind="stable")
     ends = [part for count in ENDS for part in (order[:count], order[-count:])]
     return [*np.array_split(order, min(PLACES, order.size)), *ends]
 
 
 def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.intp]]:
-    """Samples at equal times after steps of a held input, when the stage is still moving."""
+    """Group samples at equal times after a step of a held input, when the stage is still moving."""
     steps = np.concatenate([run.start + 1 + np.flatnonzero(np.diff(input_mm[run])) for run in runs])
     if not 0 < steps.size <= input_mm.size // (2 * AFTER_A_STEP):
         return []
@@ -97,7 +104,7 @@ def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.in
 
 
 def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) -> Noise:
-    """Treat the scatter about the median as white noise, because without times nothing else can be estimated.
+    """Treat the scatter of the values about their median as white noise: without times nothing else can be estimated.
 
     Parameters
     ----------

@@ -11,16 +11,16 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.channel_noises import SHORT_RUN
 from fingervision.diagnosis.noise.noise_model import Noise, without_input
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
-from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
 
 def problems_of_drawn_noise(
     data: Observations, problem: Problem, explanation: Explanation, count: int, rng: np.random.Generator
 ) -> Iterator[Problem]:
-    """Yield the problem with `count` random draws of its noise parameters.
+    """Yield the estimation problem with `count` random draws of its noise parameters.
 
     Short runs determine neither level nor correlation of the noise well: both are drawn from their posterior, given the
-    residual of an explanation. For long records the power of the slow part is drawn.
+    residual of an explanation. For long records, the noise power at low frequency is drawn.
 
     Parameters
     ----------

@@ -5,17 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.diagnosis.noise.repeat_trends import (
+    TREND_DEGREE,
+    TREND_SIGMAS,
+    drift_sigmas,
+    trend_sigmas,
+    wandering,
+    without_trend,
+)
 from fingervision.domain.effect import Array, Flags
 
 SAME_PLACE = 1e-6
 """Distance, as a share of the input's range, within which two set-points are equal: rounding in a file."""
 FEWEST_DEGREES = 4
 """Least degrees of freedom of a scatter; with fewer it is uncertain by more than a factor of 1.4."""
-TREND_SIGMAS = 2.33
-"""Standard deviations by which neighbouring visits must agree better than distant ones before a trend is assumed: by
-chance in one table in a hundred."""
-TREND_DEGREE = 3
-"""Degree of the polynomial in time that removes a drift or a run-in from the repeats, sufficient for some cycles."""
 APART = 0.25
 """Largest remaining share of the scatter's power for which different drifts of positions or sides, or zeros of runs,
 are accepted as its cause: they have many coefficients for a few dozen repeats, and without them the noise is at most a
@@ -29,8 +32,6 @@ FEWEST_STEPS = 8
 LEVELS = 4096
 """Assumed number of levels of a reading without visible digits: 12 bits, as in servo encoders and inexpensive
 converters."""
-MOST_WANDERING = 0.95
-"""Largest correlation of successive readings; above it, correlated reading noise is a drift."""
 ORDINARY_SIGMAS = 6.0
 """Robust standard deviations beyond which a single visit is a gross error."""
 
@@ -59,12 +60,12 @@ class PureError:
 
     @property
     def has_trend(self) -> bool:
-        """Whether the repeats show a drift or a run-in."""
+        """Whether the repeated readings show a drift or a run-in."""
         return self.trend_sigmas > TREND_SIGMAS
 
 
 def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Number the combinations of position and side of approach that were visited.
+    """Number the combinations of position and side of approach that the stage visited.
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def pure_error(
     place_mm: Array | None = None,
     runs: tuple[slice, ...] = (),
 ) -> PureError | None:
-    """Estimate the scatter of repeats; None if there are too few repeats.
+    """Estimate the scatter of repeated readings; None if there are too few repeated readings.
 
     Parameters
     ----------
@@ -134,28 +135,28 @@ def pure_error(
         return None
     rest = np.concatenate([values[group] - values[group].mean() for group in groups])
     pooled = float(rest @ rest) / degrees
-    trend = _trend_sigmas([values[group] for group in groups], pooled)
+    trend = trend_sigmas([values[group] for group in groups], pooled)
     rows = np.concatenate(groups)
-    straight, taken = _without_trend(rest, groups, time_s), TREND_DEGREE
+    straight, taken = without_trend(rest, groups, time_s), TREND_DEGREE
     if place_mm is not None and degrees - 3 * TREND_DEGREE >= FEWEST_DEGREES:
         ends = np.cumsum([group.size for group in groups])[:-1]
         left = float(straight @ straight) / (degrees - TREND_DEGREE)
-        if _trend_sigmas(np.split(straight, ends), left) > TREND_SIGMAS:
+        if trend_sigmas(np.split(straight, ends), left) > TREND_SIGMAS:
             # Places that drift apart, as a gain does, or sides that do, as a play that runs in.
             centred = (place_mm - place_mm.mean()) / max(float(np.ptp(place_mm)), 1e-300)
-            apart = _without_trend(rest, groups, time_s, centred, np.where(label % 2, 0.5, -0.5))
+            apart = without_trend(rest, groups, time_s, centred, np.where(label % 2, 0.5, -0.5))
             if float(apart @ apart) / (degrees - 3 * TREND_DEGREE) < APART * left:
                 straight, taken = apart, 3 * TREND_DEGREE
     if trend <= TREND_SIGMAS and degrees - TREND_DEGREE >= FEWEST_DEGREES:
-        trend = max(trend, _drift_sigmas(rest, straight, rows))
+        trend = max(trend, drift_sigmas(rest, straight, rows))
     if trend <= TREND_SIGMAS or degrees - taken < FEWEST_DEGREES:
-        return PureError(_without_gross_errors(rest, degrees), degrees, trend, _wandering(rest, rows))
+        return PureError(_without_gross_errors(rest, degrees), degrees, trend, wandering(rest, rows))
     sd_mm = _without_gross_errors(straight, degrees - taken)
-    return PureError(sd_mm, degrees - taken, trend, _wandering(straight, rows))
+    return PureError(sd_mm, degrees - taken, trend, wandering(straight, rows))
 
 
 def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
-    """Subtract each run's own zero if it causes most of the scatter; return also the number of zeros estimated."""
+    """Subtract each run's own zero if it causes most of the scatter; return also the number of subtracted zeros."""
     if len(runs) < 2 or not groups:
         return values, 0
     number = np.zeros(values.size, dtype=np.intp)
@@ -174,75 +175,10 @@ def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tu
     return out, int(rank)
 
 
-def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
-    """Significance, in standard deviations, of a drift in successive readings; 0 if correlated noise is more probable.
-
-    A drift (a smooth curve in time) and correlated reading noise both make successive readings similar, whatever their
-    positions. The more probable of the two, by BIC (Schwarz 1978), is taken as the cause: the log residual variances of
-    the curve, and of predicting each reading from the previous one, are compared with penalties for the parameters.
-    """
-    share, sigmas = _follows_sigmas(rest, rows)
-    if sigmas <= TREND_SIGMAS:
-        return 0.0
-    pairs, parameter = int(np.sum(np.diff(np.sort(rows)) == 1)), float(np.log(rest.size))
-    wanders = pairs * float(np.log1p(-(min(share, MOST_WANDERING) ** 2))) + parameter
-    power, left = float(np.sum(rest**2)), float(np.sum(straight**2))
-    drifts = rest.size * float(np.log(max(left, 1e-12 * power) / power)) + TREND_DEGREE * parameter
-    return sigmas if drifts < wanders else 0.0
-
-
-def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Subtract a polynomial in time common to all groups from the repeats' residuals, and one for each of `shares`."""
-    at = np.concatenate([time_s[group] for group in groups])
-    powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
-    own_rows = np.concatenate(groups)
-    powers = np.hstack([powers, *(powers * share[own_rows, None] for share in shares)])
-    begin = 0
-    for group in groups:
-        own = slice(begin, begin + group.size)
-        powers[own] -= powers[own].mean(axis=0)
-        begin += group.size
-    return np.asarray(rest - powers @ np.linalg.lstsq(powers, rest, rcond=None)[0], dtype=np.float64)
-
-
-def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of the repeats' residuals in successive rows; 0 if independent readings could show as much."""
-    share, sigmas = _follows_sigmas(rest, rows)
-    return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
-
-
-def _follows_sigmas(rest: Array, rows: NDArray[np.intp]) -> tuple[float, float]:
-    """Correlation of the repeats' residuals in successive rows, and its significance in standard deviations.
-
-    For k independent pairs, the standard deviation of the correlation is 1 / sqrt(k) (Bartlett 1946,
-    doi:10.2307/2983611).
-    """
-    ordered = rest[np.argsort(rows)]
-    follows = np.diff(np.sort(rows)) == 1
-    pairs = int(follows.sum())
-    power = float(np.mean(rest**2))
-    if pairs == 0 or power == 0.0:
-        return 0.0, 0.0
-    share = float(np.mean((ordered[:-1] * ordered[1:])[follows])) / power
-    return share, share * float(np.sqrt(pairs))
-
-
 def _without_gross_errors(rest: Array, degrees: int) -> float:
     robust = 1.4826 * float(np.median(np.abs(rest)))
     kept = np.abs(rest) <= ORDINARY_SIGMAS * robust if robust > 0.0 else np.ones(rest.size, dtype=bool)
     return float(np.sqrt(np.sum(rest[kept] ** 2) / max(1, degrees - int(np.sum(~kept)))))
-
-
-def _trend_sigmas(groups: list[Array], pooled: float) -> float:
-    """Von Neumann's ratio over all groups, in standard deviations below its expectation (von Neumann 1941)."""
-    if pooled <= 0.0:
-        return 0.0
-    neighbours = sum(float(np.sum(np.diff(group) ** 2)) for group in groups)
-    pairs = sum(group.size - 1 for group in groups)
-    ratio = 0.5 * neighbours / pairs / pooled
-    # Of one group of k: variance (k - 2) / (k^2 - 1); groups count by their pairs.
-    variance = sum((group.size - 1) ** 2 * (group.size - 2) / (group.size**2 - 1) for group in groups) / pairs**2
-    return (1.0 - ratio) / float(np.sqrt(variance)) if variance > 0.0 else 0.0
 
 
 def resolution(values: Array) -> float:

@@ -33,9 +33,16 @@ class _Likelihood:
     rows: Array
 
 
+FEWEST_SAMPLES = 4
+"""Least number of samples of a run that tell more than the straight line taken from them and one correlation."""
+CORRELATIONS = np.linspace(0.0, 0.95, 39)
+"""Correlations that are tried, in steps of a quarter of what a hundred samples determine; beyond 0.95 noise cannot be
+told from a drift in so short a run."""
+
+
 def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags]) -> _Likelihood:
-    """Subtract a straight line from each run, and evaluate every correlation."""
-    grid = np.linspace(0.0, 0.95, 39)
+    """Subtract a straight line from each run, and evaluate the likelihood at every tabulated correlation."""
+    grid = CORRELATIONS
     cost = np.empty((len(residuals_mm), grid.size))
     spread = np.empty_like(cost)
     degrees = np.empty(len(residuals_mm))
@@ -44,7 +51,7 @@ def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[
             total, rows, determinants = 0.0, 0, 0.0
             for run in runs:
                 place = np.flatnonzero(~out[run])
-                if place.size < 4:
+                if place.size < FEWEST_SAMPLES:
                     continue
                 line = np.stack([np.ones(place.size), place - place.mean(), residual[run][place]], axis=1)
                 keep = rho ** np.diff(place, prepend=place[0] - 1000)
@@ -66,12 +73,12 @@ def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[
 def noise_of_short_runs(
     residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags], floors_mm: list[float], *, explained: bool
 ) -> tuple[Noise, ...]:
-    """Fit the noise of channels that have a common correlation, each with its own level.
+    """Fit the noise of channels that share one correlation in time, each channel with its own level.
 
-    The samples are too few for a spectrum. If their noise were treated as white, every slow effect would seem
-    significant. All channels come from the same pictures, so that they have a common correlation: its posterior mean
-    under a flat prior is used. Before an effect is found, the channel with the smallest correlation determines it,
-    because effects can only increase a correlation.
+    The method is for runs with too few samples for a spectrum. If the noise of short runs were treated as white, every
+    slow effect would seem significant. All channels come from the same pictures, so that they share one correlation:
+    its posterior mean under a flat prior is used. Before an effect is found, the channel with the smallest correlation
+    determines it, because effects can only increase a correlation.
 
     Parameters
     ----------
@@ -101,8 +108,8 @@ def drawn_noises(
 ) -> list[tuple[Noise, ...]]:
     """Draw the noise of short runs from its posterior, `count` times; each draw has one noise per channel.
 
-    The channels have a common correlation, which is zero with prior probability `WHITE`; the level has the scaled
-    inverse chi-square distribution of a variance.
+    The channels share one correlation, which is zero with prior probability `WHITE`; the level has the scaled inverse
+    chi-square distribution of a variance.
     """
     known = _likelihood(residuals_mm, runs, aside)
     cost = known.cost.sum(axis=0)

@@ -29,7 +29,7 @@ def noise_by_spectrum(
     *,
     explained: bool,
 ) -> tuple[Noise, ...]:
-    """Fit the noise of channels whose spectra have a common shape, each with its own level.
+    """Fit the noise of channels whose spectra have the same shape, each channel with its own level.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def _angles(count: int, slow: float) -> Array:
 
 
 def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float) -> Array:
-    """Periodogram of each run after subtraction of a straight line, one after another; outliers are interpolated."""
+    """Periodogram of each run after subtraction of a straight line, run after run; outliers are interpolated."""
     powers = []
     for run in runs:
         values, bad = residual[run].copy(), aside[run]
@@ -87,7 +87,7 @@ def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float)
 
 
 def _shape(angle: Array, share: float, phi: float) -> Array:
-    """Spectrum of unit variance, of which a share `share` has the correlation `phi` between neighbouring samples.
+    """Noise spectrum of unit variance, of which a share `share` has the correlation `phi` between neighbouring samples.
 
     The result has shape (m,).
     """
@@ -96,7 +96,7 @@ def _shape(angle: Array, share: float, phi: float) -> Array:
 
 
 def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[list[float], float, float, float]:
-    """Choose between white noise, an autoregression, and the sum of both.
+    """Choose the most probable noise model: white noise, an autoregression, or the sum of both.
 
     If the sum is fitted to white noise, it can have a correlated part below the frequencies used, and then overstates
     the slow noise by a factor of three. The three kinds of noise therefore have equal prior probabilities, and the

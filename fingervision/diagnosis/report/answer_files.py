@@ -24,7 +24,7 @@ PAGE, REPORT, MODEL, NEXT_RUN = "report.html", "report.json", "model.toml", "nex
 
 
 def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Provenance, table: Path) -> dict[str, object]:
-    """Write the files into a folder, replacing those of an earlier result, and return the content of report.json.
+    """Write the files of a diagnosis into a folder, replacing earlier ones, and return the content of report.json.
 
     Parameters
     ----------

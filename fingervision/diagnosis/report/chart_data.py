@@ -41,7 +41,7 @@ def charts_json(charts: list[Chart]) -> str:
 
 
 def _shown(x: Array) -> tuple[NDArray[np.intp], str]:
-    """Rows in ascending order of `x`, thinned evenly, with a remark if some are omitted."""
+    """Rows in ascending order of `x`, evenly thinned, with a remark if some rows are omitted."""
     step = max(1, -(-x.size // MOST_ROWS))
     rows = np.arange(0, x.size, step)
     return rows[np.argsort(x[rows], kind="stable")], "" if step == 1 else f" (each {step}th row)"

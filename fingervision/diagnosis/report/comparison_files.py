@@ -21,7 +21,7 @@ PAGE, COMPARISON, PICTURE = "compare.html", "compare.json", "compare.png"
 
 
 def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> dict[str, object]:
-    """Compose compare.json: the first model's result at the top level, all of them in `models`.
+    """Compose compare.json: the result of the first model at the top level, the results of all models in `models`.
 
     Parameters
     ----------

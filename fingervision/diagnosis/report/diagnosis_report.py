@@ -11,12 +11,13 @@ from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, r
 from fingervision.diagnosis.inference.hypothesis import Point
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
-from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import verdict
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
+from fingervision.diagnosis.report.dead_band_hint import dead_band_hint
 from fingervision.diagnosis.report.force_hint import force_hint
-from fingervision.diagnosis.report.open_parameters import open_parameters
+from fingervision.diagnosis.report.open_parameters import draws_of, limited, open_parameters
 from fingervision.diagnosis.report.residual_channels import by_channel, places
 from fingervision.diagnosis.report.sentences import (
     answer,
@@ -60,7 +61,7 @@ def diagnosis_report(
     best, mapped = found.best, data.position_map is not None
     decided, unknown = verdict(found, mapped=mapped, stands=stands)
     disagreement = _disagreement(answered)
-    effects = _named(data, found)
+    effects = _named(data, found, posterior)
     errors = data.measured_pure_errors(np.split(found.problem.whitener.aside, len(data.channels)))
     members = tuple(e for e in found.alternatives if e.names)
     alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
@@ -100,6 +101,7 @@ def diagnosis_report(
             *beyond_the_search(best, found.problem),
             *rows_beyond_model(data, best),
             *input_dominates(data, found.problem),
+            *dead_band_hint(data, answered.before_mm, decided),
         ),
         seconds=time.perf_counter() - begin_s,
     )
@@ -128,7 +130,7 @@ def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:
 
 
 def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
-    """Sentence that successive repeats are more similar than their scatter, which indicates a drift or a run-in."""
+    """Sentence for repeated readings that change gradually, which indicates a drift or a run-in."""
     if errors is None or not errors[0].has_trend:
         return ()
     return (
@@ -141,21 +143,26 @@ def _unit(channel: str) -> str:
     return "n" if channel == "force" else "mm"
 
 
-def _named(data: Observations, found: Findings) -> tuple[NamedEffect, ...]:
+def _named(data: Observations, found: Findings, posterior: tuple[Point, ...]) -> tuple[NamedEffect, ...]:
     listed = [entry for entry in found.problem.parameters(found.best.names) if entry[1].run is None]
     root = np.sqrt(np.maximum(np.diag(found.best.covariance), 0.0))
-    open_ended = {name for name, _ in open_parameters(found.best, found.problem)}
+    open_ended = dict(open_parameters(found.best, found.problem))
     out = {}
     for name in found.best.names:
         known = {
             parameter.name: Estimate(
-                found.best.values[name][parameter.name],
-                float(root[i]) if root[i] > 0.0 and name not in open_ended else None,
-                parameter.unit,
+                found.best.values[name][parameter.name], float(root[i]) if root[i] > 0.0 else None, parameter.unit
             )
             for i, (owner, parameter) in enumerate(listed)
             if owner == name
         }
+        if name in open_ended:
+            far = draws_of(posterior, name, open_ended[name].name)
+            known = {
+                p.name: limited(known[p.name].value, p, draws_of(posterior, name, p.name), far)
+                for owner, p in listed
+                if owner == name
+            }
         effect = found.problem.effects[name]
         # What these data cannot show stays at the value at which it does nothing.
         still = {p.name: Estimate(p.neutral or 0.0, None, p.unit) for p in effect.parameters if p.name not in known}

@@ -14,7 +14,7 @@ a run."""
 
 
 def force_hint(data: Observations, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
-    """Name explanations with equal gap but different force, if the force was not measured.
+    """Name explanations with equal gap but different force, if the table has no force.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ MARK = (64, 255, 96)
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A measured row at which the input reversed, with its picture.
+    """A measured row at which the input reversed, with its video frame.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def strip_html(table: Path) -> str:
 
 
 def turning_rows(table: Path) -> tuple[Turn, ...]:
-    """Find the rows of a gaps.csv at which the input reversed, and the first row; none if columns are missing."""
+    """Find the first row of a gaps.csv and the rows at which the input reversed; none if columns are missing."""
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     found: list[Turn] = []
@@ -122,7 +122,7 @@ def _recording_of(table: Path) -> Path | None:
 
 
 def _decoded(recording: Path, turns: tuple[Turn, ...]) -> tuple[Turn, ...]:
-    """Decode the frames at the reversals, and draw the measured edges into them."""
+    """Decode the video frames at the reversals, and draw the measured edges into them."""
     wanted = {turn.frame: turn for turn in turns}
     last = max(wanted, default=-1)
     found: list[Turn] = []

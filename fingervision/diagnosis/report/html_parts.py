@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from fingervision.diagnosis.report.chart_data import Chart, charts_json
-from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
+from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR, limit_words
 from fingervision.domain.parameter import Estimate
 from fingervision.storage.provenance import Provenance
 
@@ -24,12 +24,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def bullets(items: Sequence[str]) -> str:
-    """List of sentences; for an empty list, a sentence says so."""
+    """HTML list of sentences; if there are none, a sentence says so."""
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>" if items else "<p>Nothing.</p>"
 
 
 def number(value: float | None, unit: str = "mm", digits: int = 4) -> str:
-    """Number for a reader, with its full value for programs (HTML's `data` element)."""
+    """HTML of a number: rounded for a reader, and with its full value for programs (the `data` element)."""
     if value is None:
         return "-"
     return f'<data value="{value!r}">{value:.{digits}g}</data> {escape(unit)}'.rstrip()
@@ -42,6 +42,9 @@ def named(name: str) -> str:
 
 def with_uncertainty(e: Estimate) -> list[str]:
     """Value and expanded uncertainty, rounded to a tenth of the standard uncertainty."""
+    limit = limit_words(e)
+    if limit:
+        return [escape(limit), "limited on one side only"]
     if e.u is None:
         return [number(e.value, e.unit, 5), "at a bound"]
     places = max(0, 1 - math.floor(math.log10(e.u))) if e.u > 0.0 else 6
@@ -50,7 +53,7 @@ def with_uncertainty(e: Estimate) -> list[str]:
 
 
 def chart(found: Chart, words: str) -> str:
-    """Placeholder for a chart that the script draws, with a line below it for the value under the cursor."""
+    """HTML placeholder for a chart that the script draws, with a line below it for the value under the cursor."""
     name = escape(str(found["id"]), quote=True)
     return (
         f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{escape(words, quote=True)}. '

@@ -1,6 +1,6 @@
 """Sketch of the mechanism on the page: every body as predicted and as measured, with the difference magnified.
 
-A slider goes through the recording in time, run by run, or through the input's range where rows have no times.
+A slider selects the time within each run, or the input if the rows have no times.
 """
 
 import json
@@ -32,7 +32,7 @@ COLOURS = (("#7a8b99", 3.0), ("#c9a227", 6.0), ("#c1440e", np.inf))
 
 
 def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
-    """Draw the bodies with a measured pose; a slider moves through the input's range.
+    """Draw the bodies whose poses were measured, with a slider that selects the part of the recording.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
 
 
 def _parts(evidence: BodyEvidence) -> tuple[list[NDArray[np.intp]], list[str]]:
-    """Rows of every position of the slider, and when that was, in words."""
+    """Rows of the table at every position of the slider, with a description of each position."""
     u, noise = evidence.prediction.input_mm, evidence.findings.noise
     if evidence.time_s is None:
         order = np.flatnonzero(noise.kept)[np.argsort(u[noise.kept], kind="stable")]
@@ -128,20 +128,20 @@ def _parts(evidence: BodyEvidence) -> tuple[list[NDArray[np.intp]], list[str]]:
 
 
 def _most_off(frames: Sequence[dict[str, Any]]) -> int:
-    """Position of the slider at which a body is farthest off: the page opens there."""
+    """Position of the slider at which a body deviates most from its prediction; the HTML page opens there."""
     worst = [max((own["sigma"] for own in frame["bodies"] if own["measured"]), default=0.0) for frame in frames]
     return int(np.argmax(worst))
 
 
 def _off_words(name: str, evidence: BodyEvidence, mean: Array) -> str:
-    """By how much a body is off where it was measured: `12 um, 0.62 mrad`."""
+    """Deviation of a body from its predicted pose, in words: `12 um, 0.62 mrad`."""
     there = [f"{name}.{part}" in evidence.names for part in PARTS]
     words = [f"{1e3 * float(np.hypot(*mean[:2])):.3g} um"] if there[0] or there[1] else []
     return ", ".join([*words, *([f"{abs(float(mean[2])):.3g} mrad"] if there[2] else [])])
 
 
 def _hinges(evidence: BodyEvidence, answers: PlaceAnswers, size: float) -> str:
-    """Rings at the hinges as drawn, with their names; heavy where a hinge is in the answer."""
+    """Rings at the hinges of the drawing, with names; a hinge that the result names has a heavy ring."""
     places = {member.candidate.place for member in evidence.findings.members}
     told = " ".join(places) if not evidence.findings.structure else ""
     shapes = []

@@ -92,7 +92,7 @@ def positioning_accuracy(
 
 @dataclass(frozen=True, slots=True)
 class _Side:
-    """Means and standard deviations over the targets approached from one side; s is 0 where `scattered` is False."""
+    """Means and standard deviations of the targets approached from one side; s is 0 where `scattered` is False."""
 
     mean: Array
     s: Array
@@ -101,7 +101,7 @@ class _Side:
 
 
 def _checked(*given: ArrayLike) -> tuple[Array, Array, Integers, Integers]:
-    """Check four columns: equal lengths, the first two finite, known directions."""
+    """Check four columns: equal lengths, the first two with finite numbers, and known directions of approach."""
     target, deviation, side, number = (np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in given)
     names = ("target_mm", "deviation_mm", "direction", "cycle")
     for name, column in zip(names, (target, deviation, side, number), strict=True):
@@ -119,7 +119,7 @@ def _checked(*given: ArrayLike) -> tuple[Array, Array, Integers, Integers]:
 
 
 def _by_visit(deviation: Array, number: Integers, chosen: NDArray[np.bool_]) -> dict[int, float]:
-    """Mean deviation of each visit, over the selected readings."""
+    """Mean deviation of each visit of a target, over the selected readings."""
     return {int(visit): float(np.mean(deviation[chosen & (number == visit)])) for visit in np.unique(number[chosen])}
 
 
@@ -131,7 +131,7 @@ def _visits(readings: dict[int, float]) -> Visits | None:
 
 
 def _target(place: float, up: dict[int, float], down: dict[int, float]) -> Target:
-    """Statistics of a target; the reversal's uncertainty is from visits of equal number, or from both scatters."""
+    """Statistics of a target; the uncertainty of the reversal is from paired visits, or else from both scatters."""
     above, below = _visits(down), _visits(up)
     if above is None or below is None:
         return Target(place, below, above, None, None)
@@ -185,7 +185,7 @@ def _figure(
     fewest: int = 2,
     scatter: bool = False,
 ) -> Figure:
-    """Compute a quantity over the targets with sufficient readings, or give the reason why there are too few."""
+    """Compute a quantity over the targets with sufficient readings, or state why there are too few readings."""
     words, targets = sides[0].words, sides[0].mean.size
     if scatter:
         kept = np.logical_and.reduce([side.scattered for side in sides])
@@ -225,7 +225,7 @@ def _reversals(targets: Sequence[Target], by_cycle: Sequence[Sequence[float]]) -
 
 
 def _notes(targets: Sequence[Target]) -> tuple[str, ...]:
-    """Remarks on the figures: fewer targets or cycles than the standard requires, or one side missing."""
+    """Remarks on the quantities: fewer targets or cycles than the standard requires, or one side missing."""
     notes = []
     if len(targets) < FEWEST_TARGETS:
         notes.append(f"ISO 230-2 asks for at least {FEWEST_TARGETS} targets; there are {len(targets)}.")

@@ -80,7 +80,7 @@ def positioning_report(
     reference: str = "target",
     slope_sign: int = 1,
 ) -> PositioningReport:
-    """Compute the quantities as measured, corrected, and without each effect.
+    """Compute the positioning quantities as measured, corrected, and without each effect.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ def _visits(visits: Visits | None) -> dict[str, float | None] | None:
 
 
 def _mm(value_mm: float | None) -> str:
-    """Millimetres to a hundredth of a micrometre, as published reports state them."""
+    """Write a length in millimetres, to a hundredth of a micrometre as in published reports."""
     # Adding zero takes the sign from what rounds to zero.
     return "-" if value_mm is None else f"{round(value_mm, 5) + 0.0:.5f}"
 

@@ -152,9 +152,10 @@ def _next_words(report: DiagnosisReport) -> str:
         return report.next_run.words
     if report.verdict is Verdict.AMBIGUOUS:
         return (
-            "No run that the bed can drive separates what is open; what else would, if anything, stands in the notes."
+            "No run that the test bed can execute separates the remaining explanations; the notes say what else would, "
+            "if anything."
         )
-    return "Nothing is open."
+    return "A next run is not needed: a single explanation remains."
 
 
 def _runners_up(report: DiagnosisReport) -> str:

@@ -10,7 +10,7 @@ from fingervision.domain.report import Place
 
 
 def by_channel(data: Observations, stacked: Array) -> dict[str, Array]:
-    """Split a stacked residual into gap and, where measured, left, right and midline."""
+    """Split a stacked residual into gap and, if they were measured, left, right and midline."""
     n = data.chain.history.input_mm.size
     gap = stacked[:n]
     out = {"gap": gap}

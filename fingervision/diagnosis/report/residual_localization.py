@@ -14,8 +14,7 @@ BINS = 16
 parts."""
 ENDS = 200
 """Number of ends of a region tried on either side."""
-DRAWS = 200
-QUANTILE = 0.99
+DRAWS, QUANTILE = 200, 0.99
 """Number of draws of noise, and quantile of their maximum: a region is reported in one table of noise in a hundred."""
 MOST = 8
 """Most regions reported; the residual after these is too small to be localised."""
@@ -45,11 +44,11 @@ class Axis:
     parts: tuple[np.ndarray[tuple[int], np.dtype[np.intp]], ...]
 
     def scores(self, residual: Array, sd: float) -> Array:
-        """Sum of the residual over each part, divided by its standard deviation."""
+        """Sum of the residual over each part of the range, divided by its standard deviation."""
         return np.array([residual[p].sum() / (sd * np.sqrt(p.size)) for p in self.parts])
 
     def inside(self, residual: Array, first: int, last: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-        """Samples from part `first` to `last`, with the ends moved within these parts to maximise the sum."""
+        """Samples from part `first` to part `last` of the range, with the ends chosen to maximise the sum."""
         order = np.concatenate(self.parts)
         total = np.concatenate([[0.0], np.cumsum(residual[order])])
         bounds = np.concatenate([[0], np.cumsum([p.size for p in self.parts])])
@@ -64,7 +63,7 @@ class Axis:
 
 
 def _scan(score: Array) -> tuple[Array, Array, Array]:
-    """Largest absolute sum over a contiguous stretch, in standard deviations, and the stretch; (...,) from (..., n)."""
+    """Largest absolute sum of a residual over a contiguous stretch, in standard deviations, and that stretch."""
     n = score.shape[-1]
     total = np.concatenate([np.zeros((*score.shape[:-1], 1)), np.cumsum(score, axis=-1)], axis=-1)
     first, end = np.triu_indices(n + 1, 1)
@@ -97,7 +96,7 @@ def _axes(history: History, aside: Flags) -> list[Axis]:
 
 
 def _rounded(value: float, axis: Axis) -> float:
-    """Round a position on an axis to a ten-thousandth of the range; smaller values are remainders of smoothing."""
+    """Round a position on an axis to a ten-thousandth of the range; smaller differences are artefacts of smoothing."""
     decimals = 4 - int(np.floor(np.log10(float(np.ptp(axis.values)))))
     return round(value, decimals) + 0.0
 
@@ -117,7 +116,7 @@ def _words(place: Place, axis: Axis, everywhere: bool, runs: str) -> str:
 
 
 def _standard_deviations(noises: Mapping[str, Noise]) -> dict[str, float]:
-    """Standard deviation per channel of one sample within a mean of many; correlated noise averages out less."""
+    """Standard deviation of one sample within a mean of many, per channel; correlated noise averages out less."""
     out = {}
     for channel, noise in noises.items():
         stretch = (1.0 + noise.correlation) / (1.0 - noise.correlation)
@@ -137,8 +136,8 @@ def where(
     """Find the regions over input, time and speed whose residual is more than noise.
 
     The input is examined in both directions together, and for opening and closing separately. A disagreement is visible
-    in several channels and over several variables. It is reported where it is most significant, then subtracted from
-    all channels, and the remainder is searched again.
+    in several channels and over several variables. Each disagreement is reported where it is most significant, then
+    subtracted from all channels, and the remainder is searched again.
 
     Parameters
     ----------

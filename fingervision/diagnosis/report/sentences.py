@@ -7,12 +7,15 @@ from fingervision.diagnosis.inference.verdict import Standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.report.open_parameters import open_parameters
 from fingervision.domain.effect import Array
+from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import Disagreement, NamedEffect, Verdict
 
 COVERAGE_FACTOR = 2.0
 """Coverage factor of an expanded uncertainty: about 95 % for a normal distribution (JCGM 100:2008, 6.2)."""
 ODD_SIGMAS = 2.5
 """Deviation in standard deviations above which a row of a short table is mentioned, even if it was not excluded."""
+FEW_NAMES = 3
+"""Number of explanations up to which the sentence of an ambiguous result names them; more are only counted."""
 FEW_ROWS = 60
 """Number of rows up to which a table counts as short."""
 
@@ -23,9 +26,18 @@ def phrase(effect: NamedEffect) -> str:
     for key, e in effect.parameters.items():
         unit = f" {e.unit}" if e.unit else ""
         u = "" if e.u is None else f", U = {COVERAGE_FACTOR * e.u:.2g}{unit}"
-        parts.append(f"{effect.display_name(key)} {e.value:.4g}{unit}{u}")
+        size = limit_words(e) or f"{e.value:.4g}{unit}{u}"
+        parts.append(f"{effect.display_name(key)} {size}")
     coverage = "; k = 2" if any(e.u is not None for e in effect.parameters.values()) else ""
     return f"{effect.name} ({'; '.join(parts)}{coverage})"
+
+
+def limit_words(e: Estimate) -> str:
+    """State a one-sided limit in words; the text is empty for a parameter that the data limit on both sides."""
+    unit = f" {e.unit}" if e.unit else ""
+    if e.at_least is not None:
+        return f"at least {e.at_least:.4g}{unit} (95 %)"
+    return "" if e.at_most is None else f"at most {e.at_most:.4g}{unit} (95 %)"
 
 
 def answer(
@@ -35,10 +47,13 @@ def answer(
     alternatives: tuple[tuple[str, ...], ...],
     d: Disagreement,
 ) -> str:
-    """The whole result in one or two sentences."""
+    """The whole result in one or two sentences.
+
+    The sizes of several effects stand in lines of their own (`detail_lines`), so that the sentence stays short.
+    """
     fall = f"the disagreement falls from {d.before_rms_mm:.3g} to {d.after_rms_mm:.3g} mm RMS"
     fall += f" at a random noise of {d.noise_rms_mm:.2g} mm"
-    what = " and ".join(phrase(effect) for effect in effects)
+    what = phrase(effects[0]) if len(effects) == 1 else " and ".join(effect.name for effect in effects)
     if verdict is Verdict.AGREES:
         return (
             f"Simulation and measurement agree within the random noise of {d.noise_rms_mm:.2g} mm "
@@ -47,10 +62,24 @@ def answer(
     if verdict is Verdict.NAMED:
         return f"The model lacks {what}; {fall}."
     if verdict is Verdict.AMBIGUOUS:
-        names = " or ".join("+".join(names) for names in alternatives)
-        return f"This data cannot tell {names} apart; with {what}, {fall}."
-    part = f" {what} explains a part; {fall}." if effects else ""
+        names = "; ".join(" + ".join(names) for names in alternatives)
+        which = f": {names}" if len(alternatives) <= FEW_NAMES else ""
+        return f"These data cannot tell {len(alternatives)} explanations apart{which}. With the best fit, {fall}."
+    part = f" {what} explain{'s' if len(effects) == 1 else ''} a part; {fall}." if effects else ""
     return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
+
+
+def detail_lines(
+    verdict: Verdict, effects: tuple[NamedEffect, ...], alternatives: tuple[tuple[str, ...], ...]
+) -> tuple[str, ...]:
+    """Lines below the printed result: each possible explanation if there are several, and each fitted effect's size.
+
+    A single effect of a result that is not ambiguous has no line, because the sentence of the result states its size.
+    """
+    if verdict is Verdict.AMBIGUOUS:
+        possible = [f"possible: {' + '.join(names)}" for names in alternatives] if len(alternatives) > FEW_NAMES else []
+        return (*possible, *(f"best fit: {phrase(effect)}" for effect in effects))
+    return tuple(f"size: {phrase(effect)}" for effect in effects) if len(effects) > 1 else ()
 
 
 def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, ...]) -> str:
@@ -70,7 +99,7 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
 
 
 def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, ...]:
-    """Sentence with the number of excluded rows; for a short table, with the rows that deviate."""
+    """Sentences with the number of excluded rows and, for a short table, with the rows that deviate."""
     n = data.chain.history.input_mm.size
     aside = np.flatnonzero(problem.whitener.aside[:n])
     out = [f"{aside.size} of {n} samples were set aside as outliers."] if aside.size else []
@@ -94,17 +123,17 @@ def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
 
 
 def beyond_the_search(best: Explanation, problem: Problem) -> tuple[str, ...]:
-    """Sentences on parameters that may lie beyond the range in which they were sought."""
+    """Sentences on parameters that may lie beyond the range in which they were searched."""
     return tuple(
         f"{effect}: the {parameter.words} may lie beyond {parameter.upper:.4g} {parameter.unit}, the end of its search "
-        "range: it is longer than these data can show, and so the effect's other parameters have no uncertainty "
-        "either; only what it does within the table is known."
+        "range: it is longer than these data can show, and so the effect's parameters are limited on one side only; "
+        "what it does within the table is known."
         for effect, parameter in open_parameters(best, problem)
     )
 
 
 def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
-    """Sentence if the recorded input's error is the larger part of the noise."""
+    """Sentence for a table whose noise comes mainly from the error of the recorded input."""
     error = float(np.median(data.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
         return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)

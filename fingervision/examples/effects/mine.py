@@ -1,4 +1,4 @@
-"""An effect of one's own: `--effects ./mine.py` adds it to the catalogue."""
+"""Example of a user-defined effect: `--effects ./mine.py` adds it to the catalogue."""
 
 import numpy as np
 

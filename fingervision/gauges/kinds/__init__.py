@@ -11,7 +11,7 @@ from fingervision.storage.toml_section import Section
 
 
 class Follower(Protocol):
-    """Measures one gauge in the frames of one recording, in order, and stores the object's last position."""
+    """Protocol of an object that measures one gauge in the frames of one recording, in order."""
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
@@ -38,7 +38,7 @@ class Kind(Protocol):
     QUANTITIES: tuple[tuple[str, str], ...]
 
     def read(self, section: Section) -> Spec:
-        """Read the settings of one gauge; an error states which value is not allowed."""
+        """Read the settings of one gauge; the error for a value that is not allowed names the setting."""
         ...
 
 
@@ -57,7 +57,8 @@ def kind_named(name: str) -> Kind:
 def measured_together(followers: Sequence[Follower], picture: Picture) -> list[Reading]:
     """Measure several gauges in one frame.
 
-    If the followers of a kind have the method `measured_with`, all gauges of this kind are measured in one call.
+    If the followers of a kind of gauge have the method `measured_with`, all gauges of this kind are measured in one
+    call.
     """
     readings: dict[int, Reading] = {}
     for number, follower in enumerate(followers):

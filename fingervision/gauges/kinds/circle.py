@@ -46,7 +46,7 @@ MOST_UNROUND = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CircleSpec:
-    """Settings of a circle gauge: centre and diameter in the first frame, how far it may move, and its tone."""
+    """Settings of a circle gauge: centre and diameter in the first frame, largest motion, and dark or light."""
 
     middle_px: tuple[float, float]
     diameter_px: float
@@ -153,7 +153,7 @@ class FollowedCircle:
         return None
 
     def _start(self, picture: Picture) -> tuple[float, float, float, float] | tuple[GaugeStatus, str]:
-        """Rough centre and radius in the next frame, with the uncertainties of centre and radius."""
+        """Initial estimates of centre and radius in the next frame, with their uncertainties."""
         x, y, radius = self._at
         tried = TRIED if self._known is None else (1.0,)
         by = max(1, int(radius / SEARCH_RADIUS_PX))
@@ -191,7 +191,7 @@ class FollowedCircle:
 
 
 def _disc(radius: float) -> NDArray[np.float32]:
-    """Template of a disc with a soft edge and its surroundings."""
+    """Template of a disc: a picture of its soft edge and its surroundings."""
     half = ceil(radius * (1.0 + SURROUNDINGS)) + 1
     y, x = np.mgrid[-half : half + 1, -half : half + 1]
     disc = np.clip(radius + 0.5 - np.hypot(x, y), 0.0, 1.0).astype(np.float32)
@@ -199,7 +199,7 @@ def _disc(radius: float) -> NDArray[np.float32]:
 
 
 def _displaced_px(picture: Picture, found: Circle) -> float:
-    """Uncertainty of centre and radius due to codec errors that are common to the pixels on one side of the outline."""
+    """Uncertainty of centre and radius (px) due to codec errors that all pixels on one side of the outline share."""
     half = found.radius_px + reach_px(found.blur_px)
     # The fit's levels are not kept; an outline of this contrast in the middle of the scale stands for it.
     inside = 0.5 * (picture.top - found.contrast)

@@ -69,7 +69,7 @@ class FollowedGap:
         return Reading(GaugeStatus.OK, (quantity,), (Mark((first, second)),), zone)
 
     def _region(self, picture: Picture) -> Region | None:
-        """The present region, clipped to the picture."""
+        """The present region of the gauge, clipped to the picture."""
         spec, (width, height) = self._spec, picture.size_px
         left = round(spec.middle_px[0] - 0.5 * (spec.width_px - 1.0)) + self._moved[0]
         top = round(spec.middle_px[1] - 0.5 * (spec.height_px - 1.0)) + self._moved[1]

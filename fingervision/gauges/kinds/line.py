@@ -35,8 +35,8 @@ def read(section: Section) -> LineSpec:
 class FollowedLine:
     """Tracks one line through the frames of one recording.
 
-    `position` is measured from the gauge's centre, perpendicular to the direction given in the gauge's settings, so
-    that its direction is the same in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
+    `position` is measured from the gauge's centre, perpendicular to the direction in the gauge's settings, so that its
+    direction is the same in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
     """
 
     def __init__(self, spec: LineSpec) -> None:
@@ -77,14 +77,14 @@ class FollowedLine:
         return Reading(GaugeStatus.OK, quantities, (Mark(ends), Mark((place,))), zone)
 
     def _turn(self, position_px: float, slope: float) -> None:
-        """Turn the search zone to the line's present direction."""
+        """Rotate the search zone to the line's present direction."""
         axes = self._edge.axes
         x, y = axes.point(position_px)
         self._edge.turned_to(Axes(x, y, axes.direction_rad - atan(slope)), 0.0, 0.0)
 
 
 def _crossing(fixed: Axes, axes: Axes, position_px: float, slope: float) -> tuple[float, float]:
-    """Point where the line crosses the axis t of the gauge as given in its settings."""
+    """Point where the line crosses the axis t that the settings of the gauge define."""
     x, y = axes.point(position_px)
     along_x, along_y = (
         cos(axes.direction_rad) * slope - sin(axes.direction_rad),

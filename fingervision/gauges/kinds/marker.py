@@ -171,7 +171,7 @@ class FollowedMarker:
         return found.quarter_turn < -LEAST_QUARTER
 
     def _taken(self, picture: Picture, place: tuple[float, float]) -> tuple[GaugeStatus, str] | None:
-        """Store a template of the mark; return the reason if a similar mark is within reach."""
+        """Store the mark's picture as a template; return the reason if a similar mark is within reach."""
         half = self._half + ceil(GUARD * self._spec.reach_px) + BEYOND_PX
         x, y = round(place[0]), round(place[1])
         own, _ = picture.part(x - self._half, y - self._half, 2 * self._half + 1, 2 * self._half + 1)

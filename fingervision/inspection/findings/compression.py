@@ -15,7 +15,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Look for a codec's blocks, and compare the stated uncertainty with that from the camera's noise alone."""
+    """Look for a codec's block pattern, and compare the stated uncertainty with that from the camera's noise alone."""
     if not sample.looks:
         return None
     blocks = sample.blockiness
@@ -31,6 +31,6 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _cost_px(look: Look, top: int) -> float:
-    """Cost of the codec (pixels): part of the edge fits' residuals that exceeds the camera's noise."""
+    """Cost of the codec (px): the part of the edge fits' residuals that exceeds the camera's noise."""
     camera = min(look.edges.noise, max(look.edges.noise_flat, CAMERA_NOISE * top / 255.0))
     return without(look.outcome.u_gap_px, look.u_camera_px * camera / max(look.edges.noise, 1e-9))

@@ -1,4 +1,4 @@
-"""Gamma: an assumed, not measured, transfer curve of the camera."""
+"""Gamma: the camera's transfer curve is assumed and was not measured."""
 
 from fingervision.inspection.finding import Finding, weighed
 from fingervision.inspection.sample import SURELY, Sample

@@ -49,7 +49,7 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _lost(sample: Sample) -> Finding | None:
-    """Finding for frames without a measured gap because nothing in them exceeds the noise."""
+    """Finding for frames without a measured gap because no contrast in them exceeds the noise."""
     if not sample.is_lost_in_noise:
         return None
     words = "No frame gave a number, and what is in view hardly rises above the noise."

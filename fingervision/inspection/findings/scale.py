@@ -14,7 +14,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare the scale with the best possible one, and determine the calibration's part of the uncertainty."""
+    """Compare the scale with the best possible one, and compute the part of the uncertainty due to the calibration."""
     if not sample.looks:
         return None
     ratio = min(1.0, sample.fill / FILLED)
@@ -33,7 +33,7 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _calibration(sample: Sample) -> tuple[float, str]:
-    """Standard uncertainty of the gap that is common to all frames, in pixels, and its largest source."""
+    """Standard uncertainty of the gap (px) that all frames share, and its largest source."""
     scale = sample.scale
     if not isinstance(scale, Calibration):
         return 0.0, ""

@@ -98,7 +98,7 @@ def corner_px(look: Look, below_px: float) -> float:
 def tilt_deg(sample: Sample) -> float | None:
     """Angle at which the camera looks from the side, from the ratio of the fingers' widths (degrees).
 
-    None is returned if the widths are not known.
+    The function returns None if the widths are not known.
     """
     ratios, spreads, apart = [], [], []
     for look in sample.looks:
@@ -129,7 +129,7 @@ class _Breadth(NamedTuple):
 def _breadth(look: Look, side: int) -> _Breadth | None:
     """Width of a finger, if both of its flanks are visible.
 
-    Errors common to neighbouring rows of a flank (a pattern on the background, the fit's phase error) are the same in
+    Errors shared by neighbouring rows of a flank (a pattern on the background, the fit's phase error) are the same in
     every frame. Only few of a frame's rows are therefore treated as independent when the uncertainty is derived from
     their scatter.
     """

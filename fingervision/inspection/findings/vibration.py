@@ -21,7 +21,7 @@ SIGMAS = 3.0
 
 
 def find(sample: Sample) -> Finding | None:
-    """Estimate the vibration from the background or, if it has no texture, from the common motion of the fingers."""
+    """Estimate the vibration from the background or, if it has no texture, from the motion that both fingers share."""
     if not sample.looks:
         return None
     ground = sample.ground
@@ -41,7 +41,7 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _common_jitter(sample: Sample) -> tuple[float, float] | None:
-    """Jitter common to both fingers, from second differences of their midline, and the noise of the midline."""
+    """Jitter that both fingers share, from second differences of their midline, and the noise of the midline."""
     track = sample.track
     if len(track) < FEWEST:
         return None

@@ -79,7 +79,7 @@ class Bench:
 
     # ---- a live source
     def received(self) -> Iterator[Received]:
-        """Yield frames with the stage's position at the time of exposure, until the test bed is closed or fails."""
+        """Yield frames with the stage's position at their exposure, until the test bed is closed or fails."""
         self._thread.start()
         while True:
             try:
@@ -93,7 +93,7 @@ class Bench:
             yield following
 
     def close(self) -> None:
-        """Stop the motor, then close the test bed."""
+        """Stop the motor, and then close the test bed."""
         if self._ending.is_set():
             return
         self.stop()
@@ -176,7 +176,7 @@ class Bench:
         return Looking(self._look, lambda: self.position_mm, lambda: self.force_n)
 
     def _look(self) -> None:
-        """Acquire one frame, which is kept until the stage's position at its exposure can be interpolated."""
+        """Acquire one frame, and keep it until the stage's position at its exposure can be interpolated."""
         look = self._sight.look()
         self.position_mm, self.force_n = look.encoder_mm, look.force_now_n
         item = look.shot.item()

@@ -15,7 +15,7 @@ __all__ = ["Answer", "Request", "harmless", "modules", "obey", "section"]
 
 @cache
 def modules() -> tuple[ModuleType, ...]:
-    """List the modules of this package that define `COMMANDS`; a new module adds requests without other changes.
+    """List the modules of this package that define `COMMANDS`; a new module adds requests without any other change.
 
     A module may also define `HARMLESS`, the names of requests that change nothing and are allowed for viewers, and
     `section(view)`, which returns the topic's part of the state sent to every page.
@@ -47,7 +47,9 @@ def obey(view: View, request: Request) -> Answer:
     name = request.get("do")
     command = _table().get(name) if isinstance(name, str) else None
     if command is None:
-        raise UsageError(f"The page may ask for {', '.join(sorted(_table()))}, but asked for {shown(name)}.")
+        raise UsageError(
+            f"A request of the browser page must be one of {', '.join(sorted(_table()))}, but is {shown(name)}."
+        )
     return command(view, request)
 
 

@@ -1,4 +1,4 @@
-"""Requests to the test bed: home, move, jog, run a recipe, stop; allowed only with the option `--allow-motion`."""
+"""Requests to the test bed (home, move, jog, run a recipe, stop), which need the option `--allow-motion`."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +13,7 @@ from fingervision.storage.recipe_toml import read_recipe
 BED, MOTION = "bed", "allow_motion"
 LONGEST_JOG_S = 10.0
 """Longest duration of a jog, after which it ends even if the user's button release was not received."""
-READ_ONLY = "This page may look at the bed and not move it: start the live view with --allow-motion to move it."
+READ_ONLY = "This page may only watch the test bed: to move its stage, start the live view with --allow-motion."
 
 
 def _bench(view: View) -> Bench:
@@ -52,7 +52,7 @@ def _jog(view: View, request: Request) -> Answer:
     bench = _movable(view)
     speed_mm_s, for_s = number(request, "speed_mm_s"), number(request, "for_s")
     if not 0.0 < for_s <= LONGEST_JOG_S:
-        raise UsageError(f"A jog must last more than 0 s and at most {LONGEST_JOG_S:g} s, but {for_s:g} was asked.")
+        raise UsageError(f"A jog must last more than 0 s and at most {LONGEST_JOG_S:g} s, but {for_s:g} was requested.")
     bench.jog(speed_mm_s, for_s)
     return Answer()
 
@@ -66,7 +66,7 @@ def _run(view: View, request: Request) -> Answer:
 
 
 def _inside(view: View, name: str) -> Path:
-    """Path of a file that a page may name: below the folder in which the program was started, or the output folder."""
+    """Path of a file that a browser page may name: below the program's start folder or the output folder."""
     path = Path(name).resolve()
     if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
         raise UsageError(
@@ -77,7 +77,7 @@ def _inside(view: View, name: str) -> Path:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return the state of the test bed: position and present task."""
+    """Return the state of the test bed for the browser page: position and present task."""
     bench = view.features.get(BED)
     if not isinstance(bench, Bench):
         return {"bed": None}

@@ -12,7 +12,7 @@ from fingervision.measuring.other_camera import other_camera
 
 
 class CameraError(FingervisionError):
-    """A camera setting cannot be changed; the page shows the error's sentence beside the named setting.
+    """A camera setting cannot be changed; the browser page shows the error's sentence beside the named setting.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ def _set(view: View, request: Request) -> Answer:
 
 def _changed(view: View, name: str, value: float) -> Answer:
     if not isinstance(view, Session):
-        raise StateError("A recording's camera can no longer be set.")
+        raise StateError("The camera settings of a recording cannot be changed.")
     if view.ended.is_set():
-        raise StateError("The source has ended: its camera can no longer be set.")
+        raise StateError("The source has ended: its camera settings cannot be changed.")
     if view.recording is not None and name in MOVES_SCALE:
-        raise StateError(f"The {name} moves the scale, and a run has one: end the recording first.")
+        raise StateError(f"The {name} changes the scale, and a run has a single scale: end the recording first.")
     before, after = view.capture.adjustments.ask(name, value)
     if name == FRAME_RATE:
         view.cadence.restart()
@@ -56,7 +56,7 @@ def _changed(view: View, name: str, value: float) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return the camera's controls that can be changed."""
+    """Return the camera's settings that can be changed, for the browser page."""
     controls = view.capture.adjustments.controls if isinstance(view, Session) else ()
     return {"camera_controls": [asdict(each) for each in controls]}
 

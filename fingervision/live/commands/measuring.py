@@ -8,7 +8,6 @@ from typing import Any
 
 import cv2
 
-from calib.calibration import BareScale
 from fingervision import __version__
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, OutputError, StateError, UsageError
@@ -16,6 +15,7 @@ from fingervision.domain.gap import GapMeasurement
 from fingervision.live.commands.asking import Answer, Request, box, number, number_or_none, seen_of, shown
 from fingervision.live.picture_calibration import calibrated
 from fingervision.live.view import View
+from fingervision.measuring.scale import stated_scale
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.out_folder import make_out_folder
 from fingervision.vision.overlay import in_eight_bits
@@ -47,7 +47,7 @@ def _fingers(view: View, request: Request) -> Answer:
 
 
 def _height_at(view: View, request: Request) -> Answer:
-    """Set the measuring height to that of a point in the picture."""
+    """Set the measuring height to that of a point which the user clicked in the picture."""
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
         raise StateError(
@@ -86,17 +86,17 @@ def _limits(view: View, request: Request) -> Answer:
 
 
 def _scale(view: View, request: Request) -> Answer:
-    px_per_mm = number(request, "px_per_mm")
+    px_per_mm, u_px_per_mm = number(request, "px_per_mm"), number_or_none(request, "u_px_per_mm")
     if px_per_mm <= 0.0:
         raise UsageError(f"px_per_mm must be positive, but is {px_per_mm:g}.")
-    view.choose(scale=BareScale(px_per_mm), scale_file=None)
+    view.choose(scale=stated_scale(px_per_mm, u_px_per_mm), scale_file=None)
     return Answer()
 
 
 def _calibrate(view: View, request: Request) -> Answer:
     kind = request.get("kind")
     if kind not in ("bar", "slot"):
-        raise UsageError(f"The reference must be a bar or a slot, but is {shown(kind)}.")
+        raise UsageError(f"The reference object must be a bar or a slot, but is {shown(kind)}.")
     found = calibrated(
         seen_of(view).frame, box(request), str(kind), number(request, "size_mm"), number(request, "u_size_mm")
     )

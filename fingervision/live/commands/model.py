@@ -15,7 +15,7 @@ MODEL, TYPED = "model", "typed_input"
 def _input(view: View, request: Request) -> Answer:
     if not isinstance(view, Session):
         raise StateError(
-            "The input of a recording is not typed: it is read from its stage's record, named with --drive."
+            "The input of a recording cannot be typed: it is read from the stage's log that --drive names."
         )
     if "bed" in view.features:
         raise StateError(
@@ -31,7 +31,7 @@ def _input(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return prediction, residual and verdict."""
+    """Return prediction, residual and verdict for the browser page."""
     comparison = view.features.get(MODEL)
     return {"model": comparison.state() if isinstance(comparison, Comparison) else None}
 

@@ -13,7 +13,7 @@ RANGE = "measured_range"
 
 def _playback(view: View) -> Playback:
     if not isinstance(view, Playback):
-        raise StateError("One cannot go back and forth in a live source: record it, and open the recording.")
+        raise StateError("Seeking needs a recording, but this source is live: record it, and open the recording.")
     return view
 
 
@@ -52,7 +52,7 @@ def _measure(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return the state of the playback."""
+    """Return the state of the playback for the browser page."""
     if not isinstance(view, Playback):
         return {"playback": None}
     measuring = view.features.get(RANGE)

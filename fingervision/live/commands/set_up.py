@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from calib.calibration import BareScale
 from calib.measured_scale import Calibration
+from calib.stated_scale import is_stated
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import StateError, UsageError
 from fingervision.domain.gap import GapMeasurement
@@ -15,6 +15,7 @@ from fingervision.live.commands.asking import Answer, Request, shown, words
 from fingervision.live.playback.playback import Playback
 from fingervision.live.set_up import SetUp
 from fingervision.live.view import View
+from fingervision.measuring.scale import stated_scale
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.settings_toml import read_settings, write_settings
 from fingervision.vision.grey import full_scale, to_grey
@@ -41,6 +42,7 @@ def _save(view: View, request: Request) -> Answer:
         {
             "calibration": choices.scale_file,
             "px_per_mm": None if scale is None or choices.scale_file is not None else scale.px_per_mm,
+            "u_px_per_mm": scale.u_px_per_mm if isinstance(scale, Calibration) and is_stated(scale) else None,
             "below_tip_mm": choices.below_tip_mm,
             "tips": "auto" if choices.direction is None else choices.direction.value,
             "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
@@ -61,7 +63,7 @@ def _load(view: View, request: Request) -> Answer:
     if "calibration" in found:
         changes |= {"scale": read_calibration(found["calibration"]), "scale_file": found["calibration"]}
     if "px_per_mm" in found:
-        changes |= {"scale": BareScale(found["px_per_mm"]), "scale_file": None}
+        changes |= {"scale": stated_scale(found["px_per_mm"], found.get("u_px_per_mm")), "scale_file": None}
     if "below_tip_mm" in found:
         changes["below_tip_mm"] = found["below_tip_mm"]
     if "tips" in found:
@@ -75,7 +77,7 @@ def _load(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return findings, indicators and uncertainty budget."""
+    """Return findings, indicators and uncertainty budget for the browser page."""
     looked = view.features.get(SET_UP)
     found = looked if isinstance(looked, SetUp) else None
     return {
@@ -107,7 +109,7 @@ def _meters(view: View) -> dict[str, float | None]:
 
 
 def _budget(view: View) -> list[list[Any]] | None:
-    """Contributions to the uncertainty of the displayed gap, largest first: source, micrometres (k = 1), assumption."""
+    """Contributions to the displayed gap's uncertainty, largest first: source, micrometres (k = 1), assumption."""
     seen, scale = view.seen, view.choices.scale
     if seen is None or not isinstance(scale, Calibration) or not isinstance(seen.outcome, GapMeasurement):
         return None

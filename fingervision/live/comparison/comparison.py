@@ -70,7 +70,7 @@ class Comparison:
         self.verdicts.consider(tuple(self._rows), self._moved, at_rest=True)
 
     def _take(self, row: GapRow) -> None:
-        """Keep a row for the comparison.
+        """Keep a measured row for the comparison.
 
         During a long rest of the stage, only some rows are kept, because they would outweigh the motion without adding
         information.

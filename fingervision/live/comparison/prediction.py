@@ -38,7 +38,7 @@ class Prediction:
         self._lock = Lock()
 
     def clear(self) -> None:
-        """Discard all predictions, because the numbering of rows has started again."""
+        """Discard all predictions, because the row numbers have started again."""
         with self._lock:
             self._known.clear()
             self._path.clear()

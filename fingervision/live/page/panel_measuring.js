@@ -25,12 +25,13 @@ panel("tolerance", "Tolerance", `
 panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
   <form id="scale_form" class="row">
     <label><input id="px_per_mm" type="number" step="any" min="0" required> px/mm</label>
+    <label>u <input id="u_px_per_mm" type="number" step="any" min="0" placeholder="unknown"></label>
     <button>Set</button>
   </form>
   <form id="calibrate_form" class="row">
     <select id="kind" aria-label="Kind of reference"><option>bar</option><option>slot</option></select>
-    <label><input id="size_mm" type="number" step="any" min="0" required> mm</label>
-    <label>u <input id="u_size_mm" type="number" step="any" min="0" value="0.001" required> mm</label>
+    <label>size <input id="size_mm" type="number" step="any" min="0" required> mm</label>
+    <label>u (k = 1) <input id="u_size_mm" type="number" step="any" min="0" value="0.001" required> mm</label>
     <button id="drag_reference" type="button" aria-pressed="false">Drag over it</button>
     <button>Calibrate</button>
   </form>`, { open: true, order: 30 });
@@ -46,7 +47,7 @@ on("tips", "change", () => ask({ do: "tips", tips: at("tips").value }));
 on("below_tip", "change", () => ask({ do: "height", below_tip_mm: number("below_tip") }));
 submit("region_form", () => ({ do: "region", box: ["region_x", "region_y", "region_w", "region_h"].map(number) }));
 submit("limits_form", () => ({ do: "limits", least: number("least"), greatest: number("greatest") }));
-submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm") }));
+submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm"), u_px_per_mm: number("u_px_per_mm") }));
 submit("calibrate_form", () => {
   const box = shown.box || (page.state && [0, 0, page.state.width_px, page.state.height_px]);
   shown.box = null;
@@ -54,8 +55,8 @@ submit("calibrate_form", () => {
   return { do: "calibrate", box, kind: at("kind").value, size_mm: number("size_mm"), u_size_mm: number("u_size_mm") };
 });
 listen("state", (state) => {
-  const u = state.u_px_per_mm === null ? " (no uncertainty)" : ` ± ${(2 * state.u_px_per_mm).toFixed(4)}`;
-  say("scale", state.px_per_mm === null ? "not known" : `${state.px_per_mm.toFixed(4)}${u} px/mm`);
+  const u = state.u_px_per_mm === null ? " px/mm (no uncertainty)" : ` ± ${(2 * state.u_px_per_mm).toFixed(4)} px/mm (k = 2)`;
+  say("scale", state.px_per_mm === null ? "not known" : `${state.px_per_mm.toFixed(4)}${u}`);
   if (document.activeElement !== at("tips")) at("tips").value = state.tips;
   if (document.activeElement !== at("below_tip")) at("below_tip").value = state.below_tip_mm;
   const whole = state.region || [0, 0, state.width_px, state.height_px];

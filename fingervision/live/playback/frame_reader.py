@@ -36,7 +36,7 @@ class FrameReader:
         self._seeking: Seeking | None = seeking(name)
 
     def at(self, index: int, time_s: float | None) -> Item | None:
-        """Return the frame with a given number.
+        """Return the frame with a given number in the recording.
 
         Parameters
         ----------

@@ -52,7 +52,7 @@ class _Entry:
 
 
 class GaugeBoard:
-    """Gauges of one recording, and the file in which they are stored.
+    """The gauges of one recording, and the file in which they are stored.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class GaugeBoard:
 
     @property
     def is_saved(self) -> bool:
-        """Whether the file contains exactly the present gauges."""
+        """Whether the gauge file contains exactly the present gauges."""
         return self.tables == self._kept
 
     def snapshot(self) -> tuple[int, tuple[Gauge, ...]]:
@@ -212,7 +212,7 @@ class GaugeBoard:
         for at, entry in enumerate(self._entries):
             if entry.gauge.name == name:
                 return at
-        raise StateError(f"There is no gauge {name!r} any more: load the page again.")
+        raise StateError(f"There is no gauge {name!r} any more: reload the browser page.")
 
     def _entry(self, table: Mapping[str, Any], place: int | None, others: tuple[_Entry, ...]) -> _Entry:
         section = _Typed(self.path, "", "The gauge", table)

@@ -33,8 +33,9 @@ class GaugeFollowing:
     """Measures the gauges of a gauge board in a separate thread.
 
     A gauge tracks its object from frame to frame, and a patch gauge measures the displacement since the first frame;
-    the reading in a frame therefore requires that all earlier frames were measured. Whether a frame is damaged or
-    repeated is taken from the table, as in `measure`. Any change of gauges, scale or settings restarts the measurement.
+    the reading in a frame therefore requires that all earlier frames were measured. The table of the recording states,
+    as in `measure`, whether a frame is damaged or repeated. Any change of gauges, scale or settings restarts the
+    measurement.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ class GaugeFollowing:
             self._told.append(_packed(gauges, readings, plane))
 
     def _status(self, frame: int, key: tuple[int, str]) -> Status | None:
-        """Wait until a frame is requested and present in the table, and return its status.
+        """Wait until a frame is requested and present in the table; return its status (None if none is left).
 
         None if there is nothing left to measure.
         """
@@ -139,12 +140,12 @@ class GaugeFollowing:
 
 
 def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> bytes:
-    """Convert readings for the browser page to a compact form for storage, because a recording has many frames."""
+    """Convert readings to a compact form for storage, because a recording has many frames."""
     return zlib.compress(json.dumps(told(gauges, readings, plane)).encode())
 
 
 def told(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> list[dict[str, Any]]:
-    """Convert the readings in one frame to the form that the browser page shows."""
+    """Convert the readings in one frame to the form that the browser page displays."""
     found: list[dict[str, Any]] = []
     for gauge, reading in zip(gauges, readings, strict=True):
         cells = cells_of(reading.quantities, plane)

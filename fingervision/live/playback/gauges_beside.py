@@ -26,7 +26,7 @@ class Follows(Protocol):
 
     @property
     def trouble(self) -> str:
-        """Reason why there are no readings."""
+        """Reason why the gauges have no readings; empty if they have."""
         ...
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
@@ -35,7 +35,7 @@ class Follows(Protocol):
 
 
 class GaugesBeside:
-    """Data for the panel of gauges in the browser page.
+    """Data for the gauge panel in the browser page.
 
     Parameters
     ----------

@@ -43,9 +43,9 @@ class Playback:
     """
 
     def __init__(self, opened: Recorded, out: Path) -> None:
-        self.recorded, self.out, self.choices = opened, out, opened.choices
+        self.recorded, self.out = opened, out
         self.description: Description = opened.source.description
-        opened.choices.check(self.description)
+        self.choices = opened.choices.for_frames(self.description)
         self.features: dict[str, Any] = {}
         self.seen: Seen | None = None
         self.range: tuple[int, int] | None = None
@@ -138,8 +138,7 @@ class Playback:
             The choice does not fit the recording's frames.
         """
         chosen, unzeroed = self.choices.changed(**changes)
-        chosen.check(self.description)
-        self.choices = chosen
+        self.choices = chosen.for_frames(self.description)
         if unzeroed:
             self.say("zero", ZERO_IS_OFF)
         if MOVES_ZERO & set(changes):
@@ -182,7 +181,7 @@ class Playback:
     oldest_row = shown_from = 0
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows of the frames from `first` to `last` - 1."""
+        """Rows of the table for the frames from `first` to `last` - 1."""
         track = self._track
         return iter(() if track is None else track.rows[first:last])
 
@@ -293,7 +292,7 @@ class Playback:
             self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
-        """Time of a frame; None if the frame has no picture, or if a neighbouring frame has the same time."""
+        """Time of a frame (s); None if the frame has no picture, or if a neighbouring frame has the same time."""
         if row is None or row.time_s is None or row.status in (Status.DAMAGED, Status.DUPLICATE):
             return None
         neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]

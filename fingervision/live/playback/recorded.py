@@ -94,7 +94,7 @@ def _about(folder: Path) -> dict[str, Any]:
 
 
 def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices:
-    """Take scale and settings from a run; those that cannot be read must be chosen by the user."""
+    """Take scale and settings from a run; the user must choose those that cannot be read."""
     try:
         scale, settings = about["scale"], about["settings"]
         file = scale.get("calibration")

@@ -3,6 +3,8 @@
 import tempfile
 from pathlib import Path
 
+from calib.measured_scale import Calibration
+from calib.stated_scale import is_stated
 from fingervision.live.background import BackgroundCommand
 from fingervision.live.choices import Choices
 from fingervision.storage.gaps_csv import GapRow
@@ -27,7 +29,9 @@ def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tup
     """
     region, scale = choices.region, choices.scale
     assert scale is not None  # noqa: S101 - asked before
-    given = ("--px-per-mm", repr(scale.px_per_mm))
+    given: tuple[str, ...] = ("--px-per-mm", repr(scale.px_per_mm))
+    if isinstance(scale, Calibration) and is_stated(scale):
+        given += ("--u-px-per-mm", repr(scale.u_px_per_mm))
     if choices.scale_file is not None:
         given = ("--calibration", str(choices.scale_file))
     where: tuple[str, ...] = ("--below-tip-mm", repr(choices.below_tip_mm))
@@ -59,7 +63,7 @@ class Track:
         self._command: BackgroundCommand | None = BackgroundCommand(*arguments, "--out", self._folder.name)
 
     def refresh(self) -> bool:
-        """Read new rows; return True if all rows must be read again because inputs of the drive were added."""
+        """Read new rows of the table; return True if inputs were added to all rows, so that all must be read again."""
         if self._command is None:
             return False
         ended = self._command.exit_code

@@ -90,7 +90,7 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
-    """Include creep of the gap in the model, if it improves the fit by more than chance would."""
+    """Include creep of the gap in the model if it improves the fit by more than noise would."""
     creeping = replace(motion, creeps=True)
     slow = fit(creeping, found.at, free_play=found.at.play_mm > 0.0)
     gain = min(STRETCHES, found.degrees) * float(np.log(found.squares / slow.squares))
@@ -98,9 +98,9 @@ def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
 
 
 def _information(motion: Motion, found: Fit) -> float:
-    """Logarithm of the likelihood ratio of the fitted motion to a constant gap.
+    """Logarithm of the likelihood ratio between the fitted motion and a constant gap.
 
-    For the same quality of fit it increases with the number of frames.
+    For the same quality of fit, this number increases with the number of frames.
     """
     around = motion.gap_mm - motion.gap_mm.mean()
     return float(motion.time_s.size * np.log(max(float(around @ around), 1e-30) / max(found.squares, 1e-30)))

@@ -1,4 +1,4 @@
-"""Add the drive's state to a finished table of gaps, once the offset between their clocks is known."""
+"""Add the drive's input to a finished table of gaps, once the offset between the clocks is known."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +7,6 @@ from typing import Any
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
-from fingervision.measuring.clock.alignment import find_clock_offset
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.drive_at import DriveState, drive_at
 from fingervision.measuring.series import GapSeries
@@ -21,11 +20,13 @@ def clock_of(series: GapSeries, drive: DriveHistory) -> ClockOffset | NoClockOff
     times = series.times_s()
     if times is None:
         return NoClockOffset("the recording has no times: give --rate-hz, or a times.csv beside the images.")
+    from fingervision.measuring.clock.alignment import find_clock_offset  # slow to import, needed with a drive only
+
     return find_clock_offset(times[0], series.gap_mm, drive)
 
 
 def join_drive(table: Path, drive: DriveHistory, clock: ClockOffset) -> bool:
-    """Write the drive's state at each frame into a table of gaps; return whether any frame received one.
+    """Write the drive's input at each frame into a table of gaps; return whether any frame received an input.
 
     Raises
     ------
@@ -44,7 +45,7 @@ def join_drive(table: Path, drive: DriveHistory, clock: ClockOffset) -> bool:
 
 
 def in_words(clock: ClockOffset | NoClockOffset | None, given_s: float | None) -> dict[str, Any]:
-    """Describe the offset (found, given, or neither) for the settings in the summary."""
+    """Describe the clock offset (found, given, or neither) for the settings in the summary."""
     if isinstance(clock, ClockOffset):
         return {
             "drive_offset": "found",
@@ -71,7 +72,7 @@ def in_words(clock: ClockOffset | NoClockOffset | None, given_s: float | None) -
 
 
 def sentence(clock: ClockOffset) -> str:
-    """Sentence that states the offset and its expanded uncertainty."""
+    """Sentence that states the clock offset and its expanded uncertainty."""
     return (
         f"Clock offset: {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion; it "
         "was added to the drive's times. A lag that is the same at all times is part of it."

@@ -1,4 +1,4 @@
-"""How long a stage takes to turn a corner that lies between two rows of its log, which the frames can tell."""
+"""Duration of a stage's reversal that lies between two rows of its log, estimated from the frames."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ NEAR_PLAYS = (0.02, 0.08)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounding:
-    """Spread of a fit over the durations of a corner that explain the frames.
+    """Spread of the clock fit over the possible durations of the stage's reversals.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Rounding:
 
 
 def rounded(path: LogPath, corner_s: float) -> LogPath:
-    """Let every corner take some time, as a stage that accelerates evenly does: two tangents and a parabola."""
+    """Give every corner of a path a duration, as under constant acceleration: two tangents and a parabola."""
     if corner_s == 0.0 or not path.parts.corner_s.size:
         return path
     time_s, input_mm = path.drive.time_s, path.drive.input_mm.copy()
@@ -48,11 +48,12 @@ def rounded(path: LogPath, corner_s: float) -> LogPath:
 
 
 def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Rounding]:
-    """Choose the duration of all corners that explains the frames best, and the spread of the fit over the others.
+    """Choose the duration of all corners that explains the frames best, and the spread of the fit over other durations.
 
-    Rows before and after a corner lie on two lines, whether the stage turned at once where these meet or over the time
-    between the rows. All turns of a stage are alike, so that its play would be off by twice what each is cut, and with
-    it the offset, however many turns there are. Frames that follow faster than the rows tell the difference.
+    The rows before and after a corner lie on two lines, whether the stage turned at once where these lines meet or over
+    the time between the rows. All reversals of a stage are alike: if each is rounded by some distance, the fitted play
+    is wrong by twice this distance and the offset accordingly, however many reversals there are. If frames follow
+    faster than the log's rows, they show the difference.
     """
     path = motion.path
     row_s = float(np.median(np.diff(path.rows.time_s)))

@@ -31,7 +31,7 @@ play's state and an encoder's step (mm)."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """A fit of the gap's motion to the log.
+    """A joint fit of the gap's motion to the motion in the log.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
 
 
 def squares_at(motion: Motion, at: Alignment) -> float:
-    """Sum of squares that scale, bend and creep leave at an alignment, in mm^2."""
+    """Sum of squares (mm^2) that scale, bend and creep leave at given clock offset, rate and play."""
     return solve(motion, at).squares
 
 
@@ -134,12 +134,12 @@ def allowance_for_creep(motion: Motion, found: Fit) -> tuple[Array, Array]:
 
 
 def prior_of(size: int) -> Array:
-    """Information of the priors on offset, rate, start (and play); shape (size, size)."""
+    """Information (inverse covariance) of the priors on offset, rate, start (and play); shape (size, size)."""
     return np.diag([OFFSET_PRIOR_S**-2, RATE_PRIOR**-2, START_PRIOR**-2, PLAY_PRIOR_MM**-2][:size])
 
 
 def information(motion: Motion, at: Alignment, solved: "Solved", *, free_play: bool) -> tuple[Array, Array]:
-    """Normal matrix divided by the residual's variance, priors included, and the Jacobian."""
+    """Normal matrix divided by the residual's variance, priors included, and the Jacobian of the fit."""
     jacobian = _jacobian(motion, at, solved, free_play=free_play)
     variance = solved.squares / max(solved.degrees, 1)
     return jacobian.T @ jacobian / variance + prior_of(jacobian.shape[1]), jacobian
@@ -147,7 +147,7 @@ def information(motion: Motion, at: Alignment, solved: "Solved", *, free_play: b
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solved:
-    """Scale, bends and creep that fit best at an alignment.
+    """Scale, bends and creep that fit best at given clock offset, rate and play.
 
     Parameters
     ----------

@@ -23,12 +23,12 @@ that slows down unseen, within half a step of a line, is drawn to turn half a st
 
 
 def drawn_paths(path: LogPath) -> Iterator[LogPath]:
-    """Draw paths that the log's rows allow as well.
+    """Draw paths of the stage that are compatible with the log's rows.
 
     Three kinds of error are drawn. A row's noise is averaged by the smoothing over some rows, and common to these. What
     an encoder's rounding leaves open is common to a halt, a turn, or a stretch of a stroke. Between two rows a corner
-    may lie anywhere, and a smooth curve cuts all corners on the same side. Reversals between two of an encoder's lines
-    are cut alike as well, by the rounding and by the smoothing.
+    may lie anywhere, and a smooth curve cuts all corners on the same side. Reversals between two lines of an encoder
+    are cut on the same side as well, by the rounding and by the smoothing.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def drawn_paths(path: LogPath) -> Iterator[LogPath]:
 
 
 def _averaged(white: Array, span: Array) -> Array:
-    """Mean of white noise over `span` rows about each row, with a variance of 1 again."""
+    """Mean of white noise over `span` rows about each row, scaled to a variance of 1."""
     sums = np.append(0.0, np.cumsum(white))
     rows = np.arange(white.size)
     half = 0.5 * (span - 1.0)

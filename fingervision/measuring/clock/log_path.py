@@ -25,14 +25,14 @@ LEAST_LEVERAGE = 1.0 / 241.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """Stretches of the log, each with one error that is common to its rows.
+    """Stretches of the log, each with one error that all of its rows share.
 
     Parameters
     ----------
     begin_s : ndarray of float, shape (g - 1,)
         Start times of the second and the later stretches.
     u_mm : ndarray of float, shape (g,)
-        Standard uncertainty of each stretch's common error.
+        Standard uncertainty of each stretch's shared error.
     halts : ndarray of bool, shape (g,)
         Whether the stretch is a halt or a reversal, whose position determines the state of the play.
     outward : ndarray of float, shape (g,)
@@ -47,7 +47,7 @@ class SharedErrors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorParts:
-    """Where a path's uncertainty comes from, for draws of it with its correlation.
+    """Contributions to the uncertainty of a path, from which correlated errors can be drawn.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class LogPath:
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
-        """Smooth the rows of the log as far as their error is random, and interpolate them by Akima's curve.
+        """Smooth the rows of the log as far as their errors are random, and interpolate them by Akima's curve.
 
         Akima's interpolation is chosen because it preserves corners.
 
@@ -143,18 +143,18 @@ class LogPath:
 def _shared_errors(
     time_s: Array, input_mm: Array, smooth_mm: Array, u_mm: Array, leverage: Array, still_mm: float, step_mm: float
 ) -> tuple[SharedErrors, Array]:
-    """Split an encoder's rounding error into a part common to neighbouring rows and a random part.
+    """Split an encoder's rounding error into a part that neighbouring rows share and a random part.
 
-    Rounding errors do not average out like noise. A stage at rest may be anywhere within a step of the encoder. If a
+    Rounding errors do not average out like noise. A stage at rest may be anywhere within one step of the encoder. If a
     stage moves by whole steps from row to row, the rounding error is the same in each row. For a slower stage, only the
     crossings of the encoder's lines are informative. The path may be shifted as long as every row stays within half a
     step of it; if the rounding errors cover the whole step, no such shift is possible. At the beginning and the end of
-    a stroke, motion within one step is invisible.
+    a stroke, motion within one encoder step is invisible.
 
     Returns
     -------
     shared, u_mm : SharedErrors, ndarray of float, shape (n,)
-        The common errors, and the random standard uncertainty of each row.
+        The shared errors, and the random standard uncertainty of each row.
     """
     rounding_mm = step_mm / float(np.sqrt(12.0))
     direction = np.where(np.abs(np.diff(smooth_mm)) <= still_mm, 0, np.sign(np.diff(smooth_mm))).astype(int)
@@ -206,7 +206,7 @@ def _shared_errors(
 
 
 def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
-    """Step from row to row below which the stage is at rest; 0 if it never moves (mm).
+    """Motion from row to row (mm) below which the stage is at rest; 0 if it never moves.
 
     In a record smoothed over k rows, differences between neighbouring rows scatter by 1/k of the scatter of a smoothed
     row.

@@ -23,7 +23,7 @@ range, where frames are then left out as outliers."""
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """Offset and rate between the clocks of two records, and the play between the two motions.
+    """Offset and rate between the clocks of two records, and the play between their two motions.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ class Noise:
     weights : ndarray of float, shape (n - p,)
         Weights of the whitened rows: below 1 for rows with an uncertain input; empty if all are equal.
     starts : ndarray of int, shape (g,)
-        First whitened row of each stretch in which the input has one common error; empty if there is none.
+        First whitened row of each stretch in which all inputs share an error; empty if there is none.
     unit : ndarray of float, shape (n - p,)
-        Effect of a common error on the whitened rows, normalised to length 1 within each stretch.
+        Effect of the shared error on the whitened rows, normalised to length 1 within each stretch.
     shrink : ndarray of float, shape (g,)
         Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
     variance_mm2 : float
@@ -76,7 +76,7 @@ WHITE = Noise(np.empty(0), np.empty(0))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """The frames that lie within the log's time, and the log.
+    """The frames that lie within the log's time, together with the log.
 
     Parameters
     ----------
@@ -109,9 +109,9 @@ class Motion:
         return np.asarray(self.time_s - at.offset_s - at.rate * (self.time_s - self.middle_s))
 
     def _behind_play(self, at: Alignment) -> tuple[Array, Array]:
-        """Output of the play at the frames, and at the log's points.
+        """Output of the play operator at the frames, and at the log's points.
 
-        The result is exact for a log that is linear between its points.
+        This output is exact for a log that is linear between its points.
 
         Between two samples the input is monotonic, so that the play operator clips the state at the earlier sample
         once.
@@ -142,7 +142,7 @@ class Motion:
         return np.column_stack([np.ones_like(z), z, np.maximum(z[:, None] - knots, 0.0), *lags])
 
     def _lagging(self, at: Alignment, states: Array, tau_s: float) -> Array:
-        """Exponentially weighted mean of the past of `states`, for a given time constant, at the frames; shape (n,)."""
+        """Exponentially weighted mean of past `states` with a given time constant, at the frames; shape (n,)."""
         times_s = self.drive.time_s
         step_s = CREEP_STEP * min(CREEP_S)
         grid_s = times_s[0] + step_s * np.arange(int((times_s[-1] - times_s[0]) / step_s) + 2)
@@ -154,9 +154,9 @@ class Motion:
         return np.asarray(np.interp(self.log_time_s(at), grid_s, mean))
 
     def whitened(self, columns: Array) -> Array:
-        """Remove the autoregression along time, and the errors that are common within stretches, from columns.
+        """Remove the autoregression along time, and the errors that stretches share, from columns.
 
-        The first frames, which have no past, are left out. A common error is whitened by the symmetric square root of
+        The first frames, which have no past, are left out. A shared error is whitened by the symmetric square root of
         the inverse covariance matrix, which is the unit matrix plus a matrix of rank one.
         """
         noise = self.noise
@@ -171,7 +171,7 @@ class Motion:
         return np.asarray(table if out.ndim == 2 else table[:, 0])
 
     def _without_shared(self, table: Array) -> Array:
-        """Take a share of the shared error's course out of whitened columns; shape (m, k)."""
+        """Subtract a share of the shared error's time course from whitened columns; shape (m, k)."""
         noise = self.noise
         if not noise.starts.size:
             return table
@@ -180,9 +180,9 @@ class Motion:
         return np.asarray(table - noise.unit[:, None] * np.repeat(along, counts, axis=0))
 
     def weighed(self, pulls: Array) -> Array:
-        """Weights that sums over whitened frames give to the frames' own noise, white after the autoregression.
+        """Weights of the frames' own noise (white after the autoregression) in sums over whitened frames; shape (m, k).
 
-        The transpose of the weights in `whitened`, which is symmetric in the shared errors; shape (m, k).
+        This is the transpose of the weights in `whitened`, which is symmetric in the shared errors.
         """
         table = self._without_shared(pulls)
         return table * self.noise.weights[:, None] if self.noise.weights.size else table

@@ -1,4 +1,4 @@
-"""Variance of a fit's offset, rate and play: the frames' noise, and the errors of the path through the log's rows."""
+"""Variance of fitted offset, rate and play, due to the frames' noise and the errors of the path between log rows."""
 
 from dataclasses import replace
 
@@ -15,12 +15,13 @@ an ordinary recording holds a move or two."""
 
 
 def inflation(motion: Motion, at: Alignment) -> Array:
-    """Ratio of the variance of offset, rate and play to its value by the fit's own weights; shape (3,).
+    """Ratio of the variance of offset, rate and play to the variance from the fit's own weights; shape (3,).
 
-    The weights take the log's errors for what they are from frame to frame. What they do to the fit is computed here:
-    another path that the log allows (`log_errors`) changes the prediction, and the fit passes a share of that change
-    on to its parameters (sandwich estimator: White 1980, doi:10.2307/1912934). Where the residuals' own pulls, summed
-    over stretches of the recording, scatter by more than this, their scatter counts: something else moves the gap too.
+    The fit's weights treat the log's errors as independent from frame to frame. Their true effect on the fit is
+    computed here: another path that the log allows (`log_errors`) changes the prediction, and the fit passes a share of
+    this change on to its parameters (sandwich estimator: White 1980, doi:10.2307/1912934). If the contributions of
+    stretches of the recording to the parameters scatter by more than this, their scatter is used, because something
+    else moves the gap as well.
     """
     solved = solve(motion, at)
     free_play = at.play_mm > 10.0 * PLAY_STEP

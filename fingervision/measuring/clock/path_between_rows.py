@@ -29,7 +29,7 @@ STANDS = 0.1
 def piece(
     time_s: Array, input_mm: Array, u_mm: Array
 ) -> tuple[Array, Array, Array, Array, NDArray[np.intp], Array, Array]:
-    """Times, inputs, uncertainties, the curve's own part of these and intervals of one run's points; its corners."""
+    """Points of one run (times, inputs, uncertainties, the curve's part of these, intervals), and its corners."""
     if time_s.size < FEWEST:
         none = np.zeros(0)
         return time_s, input_mm, u_mm, np.zeros(time_s.size), np.arange(time_s.size), none, none
@@ -86,7 +86,7 @@ class Corner:
 
 
 def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> list[Corner]:
-    """Corners with no row in them: a reversal lies between two rows."""
+    """Find corners of the path without a row in them: a reversal lies between two rows."""
     k = np.arange(2, time_s.size - 3)
     bend, beside = second[k] + second[k + 1], second[k - 1] + second[k + 2]
     speed = np.diff(input_mm) / np.diff(time_s)
@@ -112,7 +112,7 @@ def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> list
 
 
 def _curve(time_s: Array, input_mm: Array, fine_s: Array, interval: NDArray[np.intp]) -> Array:
-    """Draw Akima's curve; next to an interval in which the stage is at rest it stays between its rows.
+    """Interpolate by Akima's curve; next to an interval in which the stage rests, the curve stays between its rows.
 
     A stage that arrives and stops has not been beyond its position of rest, and the play depends on the extreme
     position.

@@ -30,7 +30,7 @@ NODES = 15
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
-    """Posterior of offset and rate, marginalised over the play.
+    """Posterior of clock offset and rate, marginalised over the play.
 
     Parameters
     ----------
@@ -53,10 +53,11 @@ class Posterior:
 
 
 def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIRST_PLAYS) -> Fit:
-    """Fit from several starting values of the play and keep the best; `plays` are fractions of the largest play.
+    """Fit from several starting values of the play and keep the best fit; `plays` are fractions of the largest play.
 
     The sum of squares has narrow valleys in which play and offset are correlated; a search at a fixed play stops near,
-    but not at, the minimum. The best two fits, and the starting point, are therefore continued with the play free.
+    but not at, the minimum. The best two fits, and the starting point, are therefore refined with the play as a free
+    parameter.
     """
     longest_mm = _longest_mm(motion)
     held = [fit(motion, replace(start, play_mm=share * longest_mm), free_play=False) for share in plays]
@@ -86,8 +87,8 @@ def posterior(motion: Motion, best: Fit) -> Posterior:
     """Integrate the posterior over the play, across the range in which the likelihood is not negligible.
 
     If the stage moves at constant speed, small values of play and offset are indistinguishable, and the likelihood is
-    far from normal. It is therefore evaluated at each value of the play, as a Student distribution, because the
-    residual variance is estimated.
+    far from normal. The likelihood is therefore evaluated at each value of the play, as a Student distribution, because
+    the residual variance is estimated.
     """
     longest_mm, degrees = _longest_mm(motion), best.degrees
     known: dict[float, Fit] = {}

@@ -35,7 +35,7 @@ def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffs
 
 
 def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse an offset that explains the frames only without many of them, as at a wrong step of a staircase."""
+    """Refuse an offset that explains the frames only if many are left out, as at a wrong step of a staircase."""
     left_out = within_log - motion.time_s.size
     if left_out <= MOST_LEFT_OUT * within_log:
         return None
@@ -49,8 +49,8 @@ def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset 
 def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
     """Refuse a log of target positions instead of actual ones.
 
-    A gap that follows later leaves residuals like a random walk, and a fit to their differences may explain nothing;
-    the fit to the gap itself shows how much of the jumps is made in their time.
+    If the gap follows later than the log, the residuals resemble a random walk, and a fit to their differences may
+    explain nothing; the fit to the gap itself shows which share of the jumps the gap completes in time.
     """
     share = gap_arrives(motion, found)
     if share is None:
@@ -98,7 +98,7 @@ def explained(motion: Motion, found: Fit) -> float:
 
 
 def ambiguous(offsets_s: list[float]) -> NoClockOffset:
-    """Refusal that lists the offsets between which a periodic motion does not decide."""
+    """Refuse a periodic motion, and list the offsets between which it does not decide."""
     nearest = np.unique(np.round(offsets_s, 4))
     said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
     apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""

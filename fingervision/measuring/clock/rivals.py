@@ -1,4 +1,4 @@
-"""Other offsets that explain the frames which they have in common with the best offset equally well."""
+"""Find other offsets that explain the frames which both offsets cover as well as the best offset does."""
 
 from dataclasses import dataclass, replace
 
@@ -52,7 +52,7 @@ def _between_runs(log_s: Array, drive: DriveHistory) -> NDArray[np.bool_]:
 
 
 def only(motion: Motion, kept: NDArray[np.bool_]) -> Motion:
-    """Keep the selected frames only; their noise is taken as white until it is estimated again."""
+    """Keep the selected frames only; their noise is assumed to be white until it is estimated again."""
     return replace(motion, time_s=motion.time_s[kept], gap_mm=motion.gap_mm[kept], noise=WHITE)
 
 
@@ -85,7 +85,7 @@ class RunnerUp:
 def unrefuted(
     motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float
 ) -> tuple[list[float], RunnerUp | None]:
-    """Offsets that explain their frames in common with the best offset as well as it does; the best of the others.
+    """Offsets that explain the frames shared with the best offset as well as it does; the best of the others.
 
     An offset is only named as the next best if it explains enough of the gap to be taken, were it the only one.
     """

@@ -1,4 +1,4 @@
-"""Clock offset and its uncertainty as stated to the user; refused if the motion does not determine it."""
+"""Clock offset and its uncertainty for the user; refused if the motion does not determine the offset."""
 
 import numpy as np
 
@@ -32,7 +32,7 @@ COARSE = 2.0
 
 
 def crossed_in_s(path: LogPath) -> float:
-    """Time that the moving stage takes from one line of the encoder to the next (s); 0 without an encoder step."""
+    """Time (s) in which the moving stage passes one encoder step; 0 without an encoder step."""
     steps_mm, steps_s = np.abs(np.diff(path.drive.input_mm)), np.diff(path.drive.time_s)
     moving = steps_mm > 0.1 * float(steps_mm.max())
     return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
@@ -41,7 +41,7 @@ def crossed_in_s(path: LogPath) -> float:
 def stated(
     motion: Motion, at: Posterior, best: Fit, rounding: Rounding, frame_s: float, runner_up: RunnerUp | None
 ) -> ClockOffset | NoClockOffset:
-    """Put the fit into the terms of the log's clock, at the log's first row."""
+    """Convert the fitted offset to the time of the log's first row."""
     first_s = float(motion.drive.time_s[0])
     more = np.sqrt(inflation(motion, best.at))
     offset_s, rate = at.offset_s + float(rounding.shift[0]), at.rate + float(rounding.shift[1])

@@ -1,4 +1,4 @@
-"""Unequal halves: a link of one half differs in length, so that its finger opens by more or less than drawn."""
+"""Unequal halves: a link of one half differs in length, so that this finger opens by more or less than drawn."""
 
 from dataclasses import replace
 

@@ -23,8 +23,9 @@ back."""
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
     """Stop the fingers as the drawn body does, and add the corresponding force at the drive.
 
-    The measuring point lies beside the contact point, so that it keeps moving by a fraction of the closing
-    (`remaining_slope`) even between rigid faces. Soft faces let it move further, and need proportionally less force.
+    The measuring point lies beside the contact point, so that even between rigid faces it continues to move by a
+    fraction of the closing (`remaining_slope`). If the faces are soft, it moves further, and proportionally less force
+    is needed.
     """
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     touch_mm = body.first_touch_mm()

@@ -18,7 +18,7 @@ _LEAST = 1e-3
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change the thickness of all hinges, and the modulus, so that the force changes by the given ratio.
+    """Change the thickness of all hinges and the modulus so that the force changes by the given ratio.
 
     The thickness contributes the factor (1 + ratio)^p to the force. The modulus, which does not affect the gap,
     contributes the remaining factor (1 + ratio)^(1 - p). For the published gripper, hinges thinner by 0.1 mm make the

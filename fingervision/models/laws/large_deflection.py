@@ -74,7 +74,7 @@ def _arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
 
 
 def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
-    """Opening without and with large rotation, and ratio of the forces with to without, over the inputs."""
+    """Openings without and with large rotation, and the ratio of the force with to that without, over the inputs."""
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     paths = []
     for end_mm, count in ((lowest_mm, _BELOW), (highest_mm, _ABOVE)):

@@ -10,7 +10,7 @@ from pathlib import Path
 from fingervision.domain.errors import DataError, InputFileError
 from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry
-from fingervision.tables.raw_table import RawTable
+from fingervision.tables.raw_table import RawTable, check_columns
 
 HEAD_BYTES = 1024
 
@@ -41,7 +41,7 @@ class Format:
 def formats() -> tuple[Format, ...]:
     """List all formats: every module of this package with `ORDER`, `recognises` and `read`.
 
-    A module with `IN_OWN_PROCESS` uses libraries that may crash, and is therefore run in a separate process.
+    A module with `IN_OWN_PROCESS` uses libraries that may crash, and therefore runs in a separate process.
     """
     found = []
     for module in pkgutil.iter_modules(__path__):
@@ -72,4 +72,6 @@ def read_raw(path: Path, given: Entry) -> RawTable:
         raise InputFileError(f"The table {path} could not be read ({error.strerror}).") from error
     if not head.strip(b"\x00 \t\r\n"):
         raise DataError(f"{path} must be a table, but is {'blank' if head else 'empty'}: export it again.")
-    return next(each for each in formats() if each.recognises(path, head)).read(path, given)
+    found = next(each for each in formats() if each.recognises(path, head)).read(path, given)
+    check_columns(path, len(found.columns))
+    return found

@@ -25,7 +25,7 @@ NOT_NUMBERS = frozenset({b"cell", b"function_handle", b"char", b"table", b"timet
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the first bytes are of a MATLAB file; the oldest version is recognised by its file suffix."""
+    """Whether the first bytes of a file are those of a MATLAB file; the oldest version is recognised by its suffix."""
     return head.startswith(b"MATLAB ") or _is_hdf5(head) or path.suffix.lower() == ".mat"
 
 

@@ -21,7 +21,7 @@ PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the first bytes are those of a Parquet file."""
+    """Whether the first bytes of a file are those of a Parquet file."""
     return head.startswith(b"PAR1")
 
 

@@ -25,7 +25,7 @@ UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the first bytes are those of a .tdms file."""
+    """Whether the first bytes of a file are those of a .tdms file."""
     return head.startswith(b"TDSm")
 
 

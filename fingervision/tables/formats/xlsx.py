@@ -133,7 +133,7 @@ class _Sheet:
         return [(r0, r1, c0, c1) for ref in set(found) for c0, r0, c1, r1 in [bounds(ref.decode())]]
 
     def formula(self, row: int, column: int) -> bool:
-        """Whether a cell (from 1) holds a formula."""
+        """Whether a cell (row and column from 1) contains a formula."""
         book = self._library.load_workbook(self.path, read_only=True, keep_links=False)
         try:
             sheet = book.worksheets[self._place]

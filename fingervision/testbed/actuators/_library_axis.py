@@ -85,7 +85,7 @@ class LibraryAxis(ABC):
         self._do(self._go_home)
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse motions beyond the limits."""
+        """Refuse motions beyond the limits of the stage."""
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:

@@ -203,8 +203,8 @@ class BoardActuator:
     def _check_known(self, number: int) -> None:
         if not self._motions.known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
             raise StateError(
-                f"The position must be known before the relative step {number}, but is not since the start or the last "
-                "stop: home first (--home-first)."
+                f"The stage's position must be known before the relative step {number}, but is unknown since the start "
+                "or the last stop: home the stage first (--home-first)."
             )
 
     # How it is done.

@@ -1,8 +1,8 @@
 """A Newport ESP300 (or ESP301) motion controller's axis as a stage, by pymeasure; needs the extra `pymeasure`.
 
-Commands as in Newport's "ESP300 User's Manual" (PA, VA, MV, ST, OR, MD, TP, TE), which pymeasure's `ESP300` speaks.
-Tested against pymeasure's own protocol emulator (`pymeasure.test.expected_protocol`, each command to the letter) and
-against an emulated axis written from the manual (tests/adapters/esp300_axis.py); not on hardware.
+Commands as in Newport's "ESP300 User's Manual" (PA, VA, MV, ST, OR, MD, TP, TE), which pymeasure's `ESP300` speaks. The
+adapter is tested against pymeasure's protocol emulator (`pymeasure.test.expected_protocol`, which compares each
+command) and against an emulated axis written from the manual (tests/adapters/esp300_axis.py), and not on hardware.
 """
 
 import warnings
@@ -87,7 +87,7 @@ class Esp300Stage(LibraryAxis):
 
 
 def build(section: Section, context: BuildContext) -> Esp300Stage:
-    """Connect as the section of the configuration states: `port` is a VISA resource such as ASRL/dev/ttyUSB0."""
+    """Connect to the controller that the configuration states: `port` is a VISA resource such as ASRL/dev/ttyUSB0."""
     try:
         from pymeasure.instruments.newport import ESP300
         from pymeasure.instruments.newport.esp300 import Axis

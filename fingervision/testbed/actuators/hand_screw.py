@@ -54,7 +54,7 @@ class HandScrew:
         self._ask_for("Turn the screw to where the gripper rests, set its reading to zero, and type that reading", 0.0)
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse motions beyond the limits."""
+        """Refuse motions beyond the limits of the screw."""
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
@@ -65,7 +65,7 @@ class HandScrew:
     def jog(self, speed_mm_s: float) -> None:
         """Refuse: a hand-turned screw cannot be stopped by command."""
         raise LimitError(
-            f"A hand screw can only be moved to positions, but a jog at {speed_mm_s:g} mm/s was asked: use move."
+            f"A hand screw can only be moved to positions, but a jog at {speed_mm_s:g} mm/s was requested: use move."
         )
 
     def run_step(self, number: int) -> None:
@@ -76,7 +76,7 @@ class HandScrew:
         """Do nothing: the screw does not move by itself."""
 
     def readings(self) -> tuple[Reading, ...]:
-        """Typed positions, each preceded by the earlier position up to the time of the change, and the present one."""
+        """Typed positions, each preceded by the earlier one until the time of the change, and the present position."""
         turned, self._turned = self._turned, []
         now_s = self._clock.now_s()
         earlier = [reading for reading in turned if reading.device_s < now_s]

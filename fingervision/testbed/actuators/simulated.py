@@ -82,7 +82,7 @@ class SimulatedActuator:
         self._stage.home(self._clock.now_s(), HOMING_MM_S)
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse motions beyond the limits."""
+        """Refuse motions beyond the limits of the simulated stage."""
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
@@ -126,12 +126,12 @@ class SimulatedActuator:
         return (*streamed[:-1], replace(streamed[-1], asked_s=asked_s))
 
     def _ticks_s(self, began_s: float) -> Array:
-        """Sampling times of the board since the last reading (s)."""
+        """Sampling times (s) of the board since the last reading."""
         first, last = (self._board.shows_s(at_s) * RATE_HZ for at_s in (began_s, self._read_until_s))
         return np.array([self._board.bed_s(tick / RATE_HZ) for tick in range(int(first) + 1, int(last) + 1)])
 
     def _edges_s(self, began_s: float) -> Array:
-        """Times just before and after every edge of the encoder's and the BUSY signal since the last reading (s)."""
+        """Times (s) just before and after every change of the encoder's and the BUSY signal since the last reading."""
         edges_s = self._stage.turns_s(began_s, self._read_until_s)
         if self._step_mm > 0.0:
             edges_s += self._borders_s(began_s)
@@ -139,7 +139,7 @@ class SimulatedActuator:
         return np.array([at_s for at_s in around_s if began_s < at_s < self._read_until_s])
 
     def _borders_s(self, began_s: float) -> list[float]:
-        """Times at which the stage passed from one encoder step to the next, found by bisection (s)."""
+        """Times (s) at which the stage passed from one encoder step to the next, found by bisection."""
         grid_s = np.linspace(began_s, self._read_until_s, int((self._read_until_s - began_s) / EDGE_GRID_S) + 2)
         cells = self._stage.at_mm(grid_s) / self._step_mm + 0.5
         low_s, high_s, border = [], [], []

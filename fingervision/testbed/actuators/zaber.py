@@ -2,9 +2,9 @@
 
 `port` is a serial port, or HOST:PORT of a controller in the network. `microstep_mm` is the stage's microstep size from
 its data sheet. Positions are sent and read in microsteps, speeds in microsteps/s x 1.6384 (Zaber, "ASCII Protocol
-Manual", units), so that neither a device database nor a network is needed. Tested with zaber-motion against an emulated
-device in the network, written from the manual (tests/adapters/zaber_device.py); not on hardware. The library's own mock
-connection cannot be used, because it responds to no commands.
+Manual", units), so that neither a device database nor a network is needed. The adapter is tested with zaber-motion
+against an emulated device in the network, written from the manual (tests/adapters/zaber_device.py), and not on
+hardware. The library's own mock connection cannot be used, because it responds to no commands.
 """
 
 from collections.abc import Callable
@@ -94,7 +94,7 @@ class ZaberStage(LibraryAxis):
 
 
 def build(section: Section, context: BuildContext) -> ZaberStage:
-    """Connect as the section of the configuration states."""
+    """Connect to the device that the configuration states."""
     try:
         from zaber_motion.ascii import Connection
     except ImportError as error:

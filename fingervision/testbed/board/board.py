@@ -64,7 +64,7 @@ class Board:
 
     @property
     def levels(self) -> wire.Levels:
-        """Active output lines of the controller, as last reported."""
+        """Active output lines of the board, as last reported."""
         self._link.check()
         return self._levels
 
@@ -95,7 +95,7 @@ class Board:
     def driven_board_s(self) -> float | None:
         """Time of the drive line's last rising edge on the board's clock (s).
 
-        None is returned if there was no rising edge since the last `run`.
+        The result is None if the drive line had no rising edge since the last `run`.
         """
         return self._driven_board_s
 
@@ -155,12 +155,12 @@ class Board:
         return taken
 
     def hold(self) -> "Board":
-        """Register one more part that uses the board."""
+        """Register a further part of the test bed that uses the board."""
         self._users += 1
         return self
 
     def close(self) -> None:
-        """Unregister one part; when the last one unregisters, release all lines and close the port."""
+        """Unregister one part of the test bed; when the last one unregisters, release all lines and close the port."""
         self._users -= 1
         if self._users != 0:
             return
@@ -209,7 +209,7 @@ class Board:
 
 
 def opened(settings: BoardSettings, clock: Clock) -> Board:
-    """Open a board and set it up; each user registers with `hold`.
+    """Open a board and set it up; each part that uses the board then calls `hold`.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """Connection to a board: commands and their answers, streamed messages, and the board's watchdog.
 
-A thread of the link reads all the time. It also requests the state every few milliseconds, which shows the board that
-the computer is alive, shows the link that the board is alive, and synchronises the two clocks.
+A thread of the link reads messages from the board all the time. The thread also requests the state every few
+milliseconds: this shows the board that the computer works, shows the link that the board works, and synchronises the
+two clocks.
 """
 
 import random
@@ -144,9 +145,9 @@ class BoardLink:
         )
 
     def stop(self) -> None:
-        """Let the link's thread send a stop to the board, repeatedly until the board confirms it.
+        """Let the link's thread send a stop to the board, repeatedly until the board confirms the stop.
 
-        The call only sets a flag, so that a signal handler may use it at any time.
+        This call only sets a flag, so that a signal handler may use it at any time.
         """
         self._stopping = True
 

@@ -38,7 +38,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Response to an executed command, with the state after it.
+    """Response of the board to an executed command, with the state after it.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Response to a command that was not executed, with the reason in one word."""
+    """Response of the board to a command that was not executed, with the reason in one word."""
 
     number: int
     reason: str
@@ -75,7 +75,7 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Level of the force channel, numbered (modulo 65536), with the board's time."""
+    """Level of the force channel, with its number (modulo 65536) and the board's time."""
 
     number: int
     time_us: int
@@ -84,7 +84,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """New levels of the lines after a change, numbered (modulo 256), with the board's time."""
+    """New levels of the board's lines after a change, with its number (modulo 256) and the board's time."""
 
     number: int
     time_us: int
@@ -142,7 +142,7 @@ _READERS: dict[str, Callable[..., Message]] = {
 
 
 class Unwrapped:
-    """Unwraps a counter: each value is taken as the one nearest to the previous value.
+    """Counts beyond the range of a wrapping counter: each value is taken as the one nearest to the previous value.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class Unwrapped:
         self._last: int | None = None
 
     def of(self, value: int) -> int:
-        """Unwrapped count for a wrapped value."""
+        """Return the total count for a value of the wrapping counter."""
         if self._last is None:
             self._last = value
         ahead = (value - self._last + self._turn // 2) % self._turn - self._turn // 2

@@ -110,7 +110,7 @@ class SimulatedCamera:
         gripper.looked_at(self._own.bed_s(self._exposure / rate_hz), 1.0 / (rate_hz * self._own.rate))
 
     def next(self) -> SimulatedShot:
-        """Wait for the next frame; frames for which nobody waited are lost."""
+        """Wait for the next frame and return it; earlier frames that were not requested are lost."""
         while True:
             device_s = self._exposure / self._rate_hz
             exposed_s = self._own.bed_s(device_s)

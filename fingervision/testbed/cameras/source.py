@@ -61,7 +61,7 @@ class SourceCamera:
         Thread(target=self._read, name="bed camera", daemon=True).start()
 
     def next(self) -> SourceShot:
-        """Wait for the next frame."""
+        """Wait for the next frame of the source and return it."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._ended, self._patience_s)
             if not self._waiting:
@@ -96,7 +96,7 @@ class SourceCamera:
 
 
 def build(section: Section, context: BuildContext) -> SourceCamera:
-    """Open the source that its section of the configuration states."""
+    """Open the source of frames that a section of the configuration states."""
     name = section.word("source")
     size = None
     if "width_px" in section.values or "height_px" in section.values:

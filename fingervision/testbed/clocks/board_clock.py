@@ -25,7 +25,7 @@ UNKNOWN_RATE = 0.008
 
 @dataclass(frozen=True, slots=True)
 class JoinedClock:
-    """The computer's time as a linear function of the board's time, near the exchanges to which it was fitted.
+    """The computer's time as a linear function of the board's time, valid near the exchanges to which it was fitted.
 
     Parameters
     ----------
@@ -48,15 +48,15 @@ class JoinedClock:
     u_rate: float
 
     def host_at(self, board_s: float) -> float:
-        """Host time at a time of the board (s)."""
+        """Time of the host computer (s) at a given time of the board."""
         return self.host_s + self.rate * (board_s - self.board_s)
 
     def u_at(self, board_s: float) -> float:
-        """Standard uncertainty of `host_at` (s): uniform within the bounds, combined with that of the rate."""
+        """Standard uncertainty of `host_at` (s): uniform within its bounds, combined with that of the clock rate."""
         return hypot(self.within_s / sqrt(3.0), self.u_rate * (board_s - self.board_s))
 
     def bounds_at(self, board_s: float) -> tuple[float, float]:
-        """Bounds of the host time at a time of the board (s), with three standard uncertainties of the rate."""
+        """Bounds of the host time (s) at a given time of the board, widened by three u of the fitted clock rate."""
         half_s = self.within_s + 3.0 * self.u_rate * abs(board_s - self.board_s)
         return self.host_at(board_s) - half_s, self.host_at(board_s) + half_s
 

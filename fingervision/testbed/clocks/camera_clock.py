@@ -1,9 +1,9 @@
 """Synchronisation of a camera's clock with the test bed's clock, from the arrival times of its frames.
 
-A frame arrives at the earliest at its exposure plus the smallest latency, and occasionally hardly later. The earliest
-arrivals therefore lie on a line, whose slope is the rate and whose intercept is the offset plus the smallest latency.
-Arrival times alone cannot separate offset and latency, so that the smallest latency must be known (`Latency` of the
-camera).
+A frame arrives at its exposure plus the smallest latency at the earliest, and some frames arrive hardly later. The
+earliest arrivals therefore lie on a line, whose slope is the rate and whose intercept is the offset plus the smallest
+latency. Arrival times alone cannot separate offset and latency, so that the smallest latency must be known (`Latency`
+of the camera).
 """
 
 from dataclasses import dataclass

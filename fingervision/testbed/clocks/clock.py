@@ -15,7 +15,7 @@ class Clock(Protocol):
         ...
 
     def wait_until(self, time_s: float) -> None:
-        """Return at that time, or at once if it is in the past."""
+        """Wait until the given time; return at once if it is in the past."""
         ...
 
 
@@ -36,7 +36,7 @@ class HostClock:
 class VirtualClock:
     """Clock of a completely simulated test bed: its time advances only while some part waits.
 
-    With a pace, time advances no faster than that; time lost by a pause or a busy machine is not made up for.
+    With a pace, virtual time advances at most at this pace; time lost by a pause or a busy computer is not made up for.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class VirtualClock:
         self._host_began_s: float | None = None
 
     def now_s(self) -> float:
-        """Seconds on the bed's clock."""
+        """Seconds on the test bed's virtual clock."""
         return self._now_s
 
     def wait_until(self, time_s: float) -> None:
-        """Let time pass until `time_s`."""
+        """Let virtual time pass until `time_s`."""
         self._now_s = max(self._now_s, time_s)
         if self._pace > 0.0:
             if self._host_began_s is None:

@@ -72,7 +72,7 @@ class BoardForceSensor:
         )
 
     def force_n(self, level: int) -> float:
-        """Force at a level of the converter, evaluated at the centre of the converter's step (N)."""
+        """Force (N) at a level of the analogue-to-digital converter, evaluated at the middle of the level's step."""
         volts, newtons = self._volts, self._newtons
         at_v = (level + 0.5) * self._reference_v / CONVERTER_STEPS
         if volts[0] <= at_v <= volts[-1]:

@@ -22,7 +22,7 @@ class Interrupted(BaseException):
 
 @dataclass(frozen=True, slots=True)
 class Looking:
-    """How a motion is monitored: normally by the test bed's instruments alone, in the browser also by every frame.
+    """How a motion is monitored: by the test bed's instruments alone or, in the browser, by every frame as well.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def by_instruments(bed: Bed) -> Looking:
 
 @contextmanager
 def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM stop the motor before anything else; signals reach the main thread only."""
+    """Within the `with` block, Ctrl-C and SIGTERM stop the motor first; signals reach the main thread only."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -23,9 +23,9 @@ def step_limits(bed_name: str) -> StageLimits:
 
 
 def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> None:
-    """Move to the reference, then run the sequence, after all of it was checked against the limits.
+    """Move to the reference, then run a sequence of step data, after all of it was checked against the limits.
 
-    An actuator without step data moves to each target at the step's peak speed.
+    If the actuator stores no step data, it moves to the target of each step at the step's peak speed.
 
     Raises
     ------

@@ -51,7 +51,7 @@ class CommandedPath:
         return piece.from_mm + float(piece.motion.travelled_mm(np.array([since_s]))[0])
 
     def times_of_motion_s(self, from_s: float, to_s: float, every_s: float) -> Floats:
-        """Times at intervals of `every_s`, between two times, at which the stage moves.
+        """Times at intervals of `every_s`, between two times, at which the stage is in motion (s).
 
         Returns
         -------

@@ -1,10 +1,10 @@
 """Interpolation of a stage's position between the steps of its encoder, from the times of step transitions.
 
-An encoder resolves the position to one step; at a transition the stage is exactly at the border of two steps. Between
-two borders the stage is assumed to move at constant speed; its stopping position follows from its speed until the
-controller reports the end of the motion. Without interpolation, an encoder step of 30 µm causes a standard uncertainty
-of 9 µm (30 / sqrt 12), which is 67 µm of gap, and play would keep that error during a whole stop. With transitions
-time-stamped to 4 µs, the uncertainty is a few nanometres; with 200 readings per second at 0.5 mm/s, 1 µm.
+An encoder resolves the position to one step; at a step transition the stage is exactly at the border of two steps.
+Between two such borders the stage is assumed to move at constant speed; its stopping position follows from its speed
+until the controller reports the end of the motion. Without interpolation, an encoder step of 30 µm causes a standard
+uncertainty of 9 µm (30 / sqrt 12), which is 67 µm of gap, and play would keep that error during a whole stop. With
+transitions time-stamped to 4 µs, the uncertainty is a few nanometres; with 200 readings per second at 0.5 mm/s, 1 µm.
 """
 
 from bisect import bisect_right
@@ -119,7 +119,7 @@ class StageTrack:
         return a.position_mm + share * (b.position_mm - a.position_mm)
 
     def _onwards_mm(self, device_s: float, cell_mm: float) -> float:
-        """Extrapolate from the last border at the motion's speed, within the cell that the encoder reports."""
+        """Extrapolate from the last border at the motion's speed, within the encoder step that the encoder reports."""
         if len(self._borders) < 2:
             return cell_mm
         first, last = self._borders[0], self._borders[-1]

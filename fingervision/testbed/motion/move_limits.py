@@ -7,7 +7,7 @@ from fingervision.testbed.actuator import StageLimits
 
 
 def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
-    """Refuse a target outside the stroke, and a speed that is not positive or too high.
+    """Refuse a target outside the stroke of the stage, and a speed that is not positive or too high.
 
     Raises
     ------
@@ -52,5 +52,5 @@ class FreeMoves:
     has_steps: bool = False
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse motions beyond the limits."""
+        """Refuse motions beyond the limits of the stage."""
         check_move(self.limits, to_mm, speed_mm_s)

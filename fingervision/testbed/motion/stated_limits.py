@@ -13,7 +13,7 @@ ENDLESS_N = 1e9
 def stated_limits(section: Section) -> StageLimits:
     """Read the settings listed in `KEYS`.
 
-    If accuracy, encoder step, repeatability and settling are not stated, the stage is taken as exact.
+    If accuracy, encoder step, repeatability and settling time are not stated, the stage is assumed to be exact.
     """
     lower_mm = section.number("lower_mm")
     return StageLimits(

@@ -107,7 +107,8 @@ def _rounded_up(seconds: float) -> float:
 def planned_sequence(data: StepData, limits: StageLimits, from_mm: float | None = None) -> tuple[PlannedMotion, ...]:
     """Compute all motions of the sequence, one after another.
 
-    A block outside the sequence is checked when it is run, because its start position is unknown before that.
+    A block of step data outside the sequence is checked when it is run, because its start position is unknown before
+    that.
 
     Parameters
     ----------

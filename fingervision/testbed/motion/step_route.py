@@ -1,6 +1,6 @@
 """Find the sequence of step data blocks that leads to a position.
 
-A controller on parallel lines can reach only the targets of its blocks.
+A controller on parallel lines can reach only the targets of its step data blocks.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ MOST_BLOCKS = 200
 
 
 def nominal_speed_mm_s(step: Step, way_mm: float, top_speed_mm_s: float) -> float:
-    """Speed stated by a block, or resulting from its positioning time (mm/s)."""
+    """Speed (mm/s) stated by a block of step data, or resulting from the block's positioning time."""
     if isinstance(step.entry, CycleTime):
         return profile(way_mm, step.entry, top_speed_mm_s).speed_mm_s
     return step.entry.speed_mm_s
@@ -66,7 +66,7 @@ def route(
     )
     raise LimitError(
         f"A step must lead to {to_mm:g} mm, but none does: the controller goes to {targets or 'no position'} mm, and "
-        f"by its relative steps from there. Give it a step to {to_mm:g} mm, or change the move."
+        f"by its relative steps from there. Store a step to {to_mm:g} mm in the controller, or change the move."
     )
 
 
@@ -77,7 +77,7 @@ def _moving(steps: Mapping[int, Step]) -> dict[int, Step]:
 def _routes(
     steps: Mapping[int, Step], at_mm: float | None, to_mm: float, top_speed_mm_s: float
 ) -> Iterator[tuple[tuple[int, ...], float, int]]:
-    """Each possible sequence: its blocks, its highest speed, and its order of preference."""
+    """Possible sequences of blocks, each with its highest speed and its order of preference."""
     moving = _moving(steps)
     absolute = {n: step for n, step in moving.items() if step.coordinates is Coordinates.ABSOLUTE}
     starts: list[tuple[tuple[int, ...], float, float, int]] = []
@@ -116,6 +116,6 @@ def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float
         sign = "positive" if speed_mm_s > 0.0 else "negative"
         raise LimitError(
             f"A jog at {speed_mm_s:g} mm/s must have a relative step with a {sign} target that is no faster, but the "
-            "controller has none: give it one."
+            "controller has none: store one in it."
         )
     return max(fine, key=lambda number: speeds[number])

@@ -13,26 +13,26 @@ class AtTheBed:
     """A person who receives requests on the terminal, and confirms when a step is done."""
 
     def turn_part(self) -> None:
-        """Ask the person on the terminal to do so, and wait for the confirmation."""
+        """Ask the person on the terminal to turn the part, and wait for the confirmation."""
         self._ask("Turn the part by 180 degrees in the picture.")
 
     def shift_picture(self) -> None:
-        """Ask the person on the terminal to do so, and wait for the confirmation."""
+        """Ask the person on the terminal to shift the picture, and wait for the confirmation."""
         self._ask("Shift the camera, so that the fingers stand elsewhere in the picture.")
 
     def put_in_slot(self, size_mm: float) -> None:
-        """Ask the person on the terminal to do so, and wait for the confirmation."""
+        """Ask the person on the terminal to insert the reference slot, and wait for the confirmation."""
         self._ask(f"Put the reference slot of {size_mm:g} mm in the fingers' plane before the camera.")
 
     def take_out_slot(self) -> None:
-        """Ask the person on the terminal to do so, and wait for the confirmation."""
+        """Ask the person on the terminal to remove the reference slot, and wait for the confirmation."""
         self._ask("Take the reference slot away, so that the camera sees the fingers again.")
 
     def _ask(self, words: str) -> None:
         if TERMINAL.ask(f"{words} Press Enter when it is done: ") is None:
             raise StateError(
-                f"The recipe asks the operator ({words.rstrip('.').lower()}), but nobody is at the terminal: run it "
-                "from one."
+                f"The recipe asks the operator ({words.rstrip('.').lower()}), but there is no terminal: run the "
+                "command from a terminal."
             )
 
 

@@ -20,7 +20,7 @@ class StepKind(Protocol):
     KEYS: tuple[str, ...]
 
     def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
-        """Actions of the test bed for a step that starts at a given position."""
+        """Actions of the test bed for a recipe step that starts at a given position of the stage."""
         ...
 
 

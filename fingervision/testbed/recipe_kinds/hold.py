@@ -12,7 +12,7 @@ APPROACH_MM_S = 0.5
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Move to the position if the stage is elsewhere, then stand."""
+    """Move to the position if the stage is elsewhere, then rest there."""
     hold_mm, seconds, frames = section.number("at_mm"), section.number("seconds", above=0.0), frames_of(section)
     if at_mm != hold_mm:
         yield Go(hold_mm, APPROACH_MM_S, None if frames is None else 0), "at_mm"

@@ -10,5 +10,5 @@ KEYS = ("to_mm", "speed_mm_s", "frames")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one motion; frames requested by number are taken at its end."""
+    """Yield one motion; a requested number of frames is recorded at its end."""
     yield Go(section.number("to_mm"), section.number("speed_mm_s", above=0.0), frames_of(section)), "to_mm"

@@ -10,5 +10,5 @@ KEYS = ()
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one action, with which a new run begins."""
+    """Yield one action; it begins a new run."""
     yield Rezero(), "kind"

@@ -10,7 +10,7 @@ KEYS = ("from_mm", "to_mm", "steps", "dwell_s", "speed_mm_s", "frames")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one level after another, including the first and the last."""
+    """Yield one motion and dwell after another, including those at the first and the last level."""
     from_mm, to_mm = section.number("from_mm"), section.number("to_mm")
     steps, dwell_s = section.whole("steps", low=1, high=10000), section.number("dwell_s", 0.0, low=0.0)
     speed, frames = section.number("speed_mm_s", above=0.0), frames_of(section)

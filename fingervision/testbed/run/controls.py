@@ -31,11 +31,11 @@ class Controls:
 
     @property
     def waits(self) -> bool:
-        """Whether the run is paused."""
+        """Whether the run is paused at present."""
         return self.paused and not self.stopped
 
     def stop(self) -> None:
-        """End the run; the motor stops at once."""
+        """End the run; the motor is stopped at once."""
         self.stopped = True
         self._stop_motor()
 

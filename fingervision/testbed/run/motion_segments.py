@@ -10,7 +10,7 @@ Frames = int | None
 
 @dataclass(frozen=True, slots=True)
 class Go:
-    """Move to a position; frames, if requested by number, are taken there."""
+    """Segment: move to a position; a requested number of frames is recorded there."""
 
     to_mm: float
     speed_mm_s: float
@@ -19,7 +19,7 @@ class Go:
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """Rest for a time; frames, if requested by number, are taken afterwards."""
+    """Segment: rest for a time; a requested number of frames is recorded afterwards."""
 
     seconds: float
     frames: Frames = None
@@ -27,7 +27,7 @@ class Stand:
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """Oscillate sinusoidally about a mean position, starting from the mean towards opening."""
+    """Segment: oscillate sinusoidally about a mean position, starting from the mean towards opening."""
 
     mean_mm: float
     amplitude_mm: float
@@ -37,7 +37,7 @@ class Swing:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """Close until the force limit is reached, the fingers touch, or the test bed's limit is reached."""
+    """Segment: close until the force limit is reached, the fingers touch, or the test bed's limit is reached."""
 
     speed_mm_s: float
     below_force_n: float
@@ -45,22 +45,22 @@ class Close:
 
 @dataclass(frozen=True, slots=True)
 class Rezero:
-    """Reference the stage again; a new run begins."""
+    """Segment: reference the stage again; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Request the part to be turned by 180 degrees in the picture; a new run begins."""
+    """Segment: ask the operator to turn the part by 180 degrees in the picture; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Request the picture to be shifted; a new run begins."""
+    """Segment: ask the operator to shift the picture; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """Request a reference slot to be inserted, measure it, and request its removal."""
+    """Segment: ask the operator to insert a reference slot, measure it, and ask for its removal."""
 
     size_mm: float
     u_size_mm: float
@@ -71,7 +71,7 @@ Act = Go | Stand | Swing | Close | Rezero | Turn | Shift | Slot
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One segment, and the recipe step to which it belongs.
+    """One motion segment, and the recipe step to which it belongs.
 
     Parameters
     ----------

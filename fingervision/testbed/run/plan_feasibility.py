@@ -25,7 +25,7 @@ def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: floa
             case Swing(mean, amplitude, frequency_hz):
                 if actuator.has_steps:
                     raise LimitError(
-                        f"kind in {leg.section.at('kind')} cannot be done: A sine must be driven in short moves to "
+                        f"kind in {leg.section.at('kind')} cannot be executed: A sine must be driven in short moves to "
                         "anywhere on its way, but this actuator goes only where its step data lead. Use a triangle or "
                         "a staircase between two of its steps. Nothing was moved."
                     )
@@ -40,5 +40,5 @@ def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: floa
         try:
             actuator.check(at_mm, to_mm, speed_mm_s)
         except FingervisionError as error:
-            raise LimitError(f"{leg.key} in {leg.section.at(leg.key)} cannot be done: {error}") from error
+            raise LimitError(f"{leg.key} in {leg.section.at(leg.key)} cannot be executed: {error}") from error
         at_mm = to_mm

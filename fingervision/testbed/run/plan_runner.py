@@ -27,8 +27,9 @@ Progress = Callable[[float, float], None]
 class Runner:
     """Executes a plan, starting where the recorded rows end.
 
-    A test bed that can replay executes the whole plan again; rows that are already in the folder are not rendered,
-    measured or written a second time. On any other test bed the interrupted motion segment is repeated, as a new run.
+    A simulated test bed, which can replay, executes the whole plan again; rows that are already in the folder are not
+    rendered, measured or written a second time. On a real test bed the interrupted motion segment is repeated, as a new
+    run.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ class Runner:
         record.event("ended", f"{record.counts.recorded} frames.")
 
     def _first_leg(self) -> int:
-        """Index of the first segment to execute: 0, or that at which a test bed without replay was interrupted."""
+        """Index of the first segment to execute: 0 with replay; without it, the segment that was interrupted."""
         folder = self.watch.record.folder
         if self.watch.bed.replays or not folder.resumed:
             return 0

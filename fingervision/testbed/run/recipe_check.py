@@ -88,7 +88,7 @@ class RecipeCheck:
 
 
 def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
-    """Plan a recipe step by step; a refused step does not hide errors of the following ones.
+    """Plan a recipe step by step; if a step is refused, the following steps are checked nevertheless.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def _speed_mm_s(leg: Leg) -> float:
 
 
 def _foretold(lower_mm: float, upper_mm: float, bed: PlannedBed) -> tuple[tuple[float, float] | None, float | None]:
-    """Predicted gap and force over a motion; None if the model's range does not include the motion."""
+    """Gap and force that the model predicts over a motion; None if the model's range does not include the motion."""
     if bed.model is None:
         return None, None
     try:

@@ -40,9 +40,11 @@ def measured_slot(frames: Sequence[Frame], size_mm: float, scale: Scale) -> dict
     try:
         widths = [find_widths([picture], px_per_mm=scale.px_per_mm)[0] for picture in pictures]
     except CalibrationError as error:
-        raise DeviceError(f"The reference slot of {size_mm:g} mm must be seen, but: {error}") from error
+        raise DeviceError(
+            f"The reference slot of {size_mm:g} mm must be visible, but was not measured: {error}"
+        ) from error
     if not widths:
-        raise DeviceError(f"The reference slot of {size_mm:g} mm must be seen, but the camera gave no frame.")
+        raise DeviceError(f"The reference slot of {size_mm:g} mm must be visible, but the camera gave no frame.")
     points = np.array([width.points_px for width in widths])
     u_px = np.array([width.u_width_px for width in widths])
     found = scale.distances(points, u_px, np.array([width.light for width in widths]))

@@ -17,7 +17,7 @@ from fingervision.testbed.run.run_metadata import KIND, SAMPLES
 
 @dataclass(frozen=True, slots=True)
 class Remains:
-    """A run that was interrupted.
+    """An interrupted run: its rows and events so far, from which it may be continued.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def contents(path: Path) -> list[str]:
 
 
 def refuse_others(path: Path, held: str) -> NoReturn:
-    """Refuse a folder with other files, among which the run's files would be hard to find."""
+    """Refuse a folder that contains other files, among which the run's files would be hard to find."""
     raise OutputError(f"--out must be a new or empty folder, but {path} holds {held}: name another.")
 
 

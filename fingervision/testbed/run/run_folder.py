@@ -37,7 +37,7 @@ BYTES_PER_PX = 0.8
 
 
 class BedRunFolder:
-    """Writes a run while it is executed, and determines how far an interrupted one got.
+    """Writes a run while it is executed, and determines how far an interrupted run got.
 
     Parameters
     ----------
@@ -159,12 +159,12 @@ def rows_before(path: Path) -> list[SampleRow]:
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
     rows = read_samples(table)
     if not rows:
-        raise DataError(f"--after must be the folder of an earlier run on the bed, but {path} holds none.")
+        raise DataError(f"--after must be the folder of an earlier run on the test bed, but {path} holds none.")
     return rows
 
 
 def times_of(rows: Sequence[SampleRow]) -> tuple[float, float] | None:
-    """Times of a step's first row (earlier rows are at rest) and of the last row (s); None without rows."""
+    """Times (s) of a recipe step's first row (earlier rows are at rest) and of the last row; None without rows."""
     if not rows:
         return None
     began_s = next((row.arrived_s for row in rows if row.step > 0), rows[0].arrived_s)

@@ -1,4 +1,4 @@
-"""Record of a run: one row and one picture per frame, in order, written as soon as they are final."""
+"""Record of a run: one row and one picture per frame, in order, written as soon as the position is known."""
 
 from collections import deque
 from collections.abc import Callable
@@ -70,7 +70,7 @@ class RunRecord:
     def follow(self, last: SampleRow, now_s: float) -> None:
         """Continue after the last row of an earlier run, on a test bed whose camera clock has restarted.
 
-        The time in between is known to the accuracy of the computer's clock, which suffices.
+        The duration of the interruption is known to the accuracy of the computer's clock, which suffices.
         """
         self._run = _run_number(last) + 1
         self._base_s = last.time_s + max(PAUSE_S, now_s - last.arrived_s)
@@ -99,7 +99,7 @@ class RunRecord:
     # Frames.
 
     def there_already(self) -> GapRow | None:
-        """Take the next frame's row from the folder if it was recorded before; None if it must be recorded now."""
+        """Return the next frame's row from the folder if it was recorded before; None if it must be recorded now."""
         if self._rows >= len(self.folder.rows):
             return None
         row = self.folder.rows[self._rows]
@@ -108,7 +108,7 @@ class RunRecord:
         return GapRow(0, row.time_s, row.status, gap_mm=row.gap_mm, u_random_mm=row.u_random_mm)
 
     def add(self, look: Look, picture: Frame, measured: GapRow, step: int) -> None:
-        """Add a frame; its row waits until the stage's position is known."""
+        """Add a frame; its row is written once the stage's position is known."""
         if self._zero_s is None:
             self._zero_s = look.shot.device_s - self._base_s
         row = SampleRow(

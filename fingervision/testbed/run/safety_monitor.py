@@ -111,7 +111,7 @@ class Watch:
         return look, measured
 
     def find_fingers(self) -> None:
-        """Refuse to continue if the camera does not see both fingers."""
+        """Refuse to continue if the camera does not show both fingers."""
         words = ""
         for _ in range(FRAMES_TO_FIND_FINGERS):
             measured, words = self.sight.measure(self.look().shot.item())
@@ -128,7 +128,7 @@ class Watch:
 
     @property
     def _closes(self) -> bool:
-        """Whether the present segment ends at a force or at contact."""
+        """Whether the present segment may end by a force or by contact."""
         return self.leg is not None and isinstance(self.leg.act, Close)
 
     # Motions.

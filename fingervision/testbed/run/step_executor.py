@@ -41,7 +41,7 @@ def stand(watch: Watch, act: Stand) -> None:
 
 
 def swing(watch: Watch, act: Swing) -> None:
-    """Move sinusoidally, in short pieces."""
+    """Move the stage sinusoidally, in short pieces."""
     since, piece_s = _Since(watch), SWING_FRAMES / watch.sight.rate_hz
     lasts_s = act.cycles / act.frequency_hz
     at_mm = act.mean_mm
@@ -57,7 +57,7 @@ def swing(watch: Watch, act: Swing) -> None:
 
 
 def close(watch: Watch, act: Close) -> None:
-    """Close until the force limit is reached, the fingers touch, or the test bed's limit is reached."""
+    """Close the gripper until the force limit is reached, the fingers touch, or the test bed's limit is reached."""
     felt: list[str] = []
 
     def met(look: Look, row: GapRow) -> bool:
@@ -69,12 +69,12 @@ def close(watch: Watch, act: Close) -> None:
 
     bed = watch.bed
     watch.follow(partial(bed.actuator.move, bed.limits.lower_mm, act.speed_mm_s), record=True, until=met)
-    why = felt[0] if felt else "nothing was met down to the bed's limit of position"
+    why = felt[0] if felt else "no contact was found down to the test bed's limit of position"
     watch.record.event("closed", f"Closing ended: {why}.", input_mm=watch.sight.position.newest)
 
 
 def rezero(watch: Watch) -> None:
-    """Reference the stage again, and pause."""
+    """Reference the stage again, and wait for a pause."""
     watch.follow(watch.bed.actuator.home, record=False)
     stand(watch, Stand(REST_AFTER_HOMING_S, frames=0))
 
@@ -100,7 +100,7 @@ def slot(watch: Watch, act: Slot) -> dict[str, float]:
 
 
 def _point(watch: Watch, frames: Frames) -> None:
-    """Take the requested number of frames of a picture at rest."""
+    """Record the requested number of frames once the picture is at rest."""
     if not frames:
         return
     _settle(watch)
@@ -132,7 +132,7 @@ def _still(rows: list[GapRow]) -> bool:
 
 
 class _Since:
-    """Time since its creation, without pauses."""
+    """Time since the object was created, without pauses (s)."""
 
     def __init__(self, watch: Watch) -> None:
         self._watch, self._began_s = watch, self._now_s(watch)

@@ -47,13 +47,13 @@ class JoinedInstrument:
         return readings
 
     def device_at(self, bed_s: float) -> float:
-        """Convert a time of the test bed to the instrument's clock; before synchronisation, the time itself."""
+        """Convert a time of the test bed to the instrument's clock; before synchronisation, return it unchanged."""
         joined = self.clock.joined()
         return bed_s if joined is None else joined.board_s + (bed_s - joined.host_s) / joined.rate
 
 
 class Position(JoinedInstrument):
-    """Position of the stage, interpolated between the steps of its encoder."""
+    """Position of the stage over time, interpolated between the steps of its encoder."""
 
     def __init__(self, actuator: Actuator) -> None:
         super().__init__(actuator)
@@ -67,12 +67,12 @@ class Position(JoinedInstrument):
         return readings
 
     def at(self, bed_s: float, *, at_once: bool = False) -> float | None:
-        """Position at a time of the test bed (mm); None if later readings will determine it (see `StageTrack`)."""
+        """Position (mm) at a time of the test bed; None until later readings determine it (see `StageTrack`)."""
         return self._track.at_mm(self.device_at(bed_s), at_once=at_once)
 
 
 class Force(JoinedInstrument):
-    """The force at the drive."""
+    """Force at the drive over time."""
 
     def __init__(self, sensor: ForceSensor) -> None:
         super().__init__(sensor)
@@ -95,7 +95,7 @@ class Force(JoinedInstrument):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """One frame, with the state of the test bed at its exposure.
+    """One frame, with stage position and force at its exposure.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class Look:
 
 
 class Sight:
-    """Takes frames and instrument readings, and measures the frames.
+    """Acquires frames with instrument readings at their exposures, and measures the frames.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class Sight:
         self._rows = RowMaker(bed.scale, (description.width_px, description.height_px))
 
     def look(self) -> Look:
-        """Wait for the next frame, and read the instruments after it."""
+        """Wait for the next frame, and read the instruments after its arrival."""
         shot = self.camera.next()
         self.camera_clock.add(shot.device_s, shot.arrived_s)
         self.position.read()

@@ -26,14 +26,14 @@ class OwnClock:
 
     @staticmethod
     def drawn(rng: np.random.Generator) -> "OwnClock":
-        """Choose a clock with random offset and rate."""
+        """Choose an instrument's clock with random offset and rate."""
         began_s = rng.uniform(-BEGAN_WITHIN_S, 0.0)
         return OwnClock(float(began_s), float(1.0 + rng.uniform(-LARGEST_RATE_ERROR, LARGEST_RATE_ERROR)))
 
     def shows_s(self, bed_s: float) -> float:
-        """Reading of this clock at a time of the test bed (s)."""
+        """Reading (s) of the instrument's clock at a time of the test bed."""
         return (bed_s - self.began_s) * self.rate
 
     def bed_s(self, shown_s: float) -> float:
-        """Time of the test bed at which the clock shows a given time (s)."""
+        """Time of the test bed (s) at which the instrument's clock shows a given time."""
         return self.began_s + shown_s / self.rate

@@ -30,7 +30,7 @@ CONTACT_N_PER_MM = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Position of the stage over time: past, present, and future as far as the motion is planned.
+    """Position of the stage over time: past, present, and the planned future.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class SimulatedGripper:
     def at(self, time_s: float) -> Response:
         """Positions of the measuring points, and the force, at one time of the test bed; arrays of one element.
 
-        Before the first motion, this is the state at rest.
+        Before the first motion, these are the positions at rest.
         """
         began_s = self._motion.began_s()
         version = (self._motion.version(), len(self._motion.homed_s()), began_s)
@@ -123,7 +123,7 @@ class SimulatedGripper:
         return Response(edges.left_mm[1:], edges.right_mm[1:])
 
     def _grid_s(self, time_s: float, since_s: float) -> Array:
-        """Times at which to compute the stage for a requested time; none before the first motion."""
+        """Times (s) at which to compute the stage's position for a requested time; none before the first motion."""
         until_s = time_s
         if since_s > time_s:
             since_s = time_s

@@ -8,7 +8,7 @@ from fingervision.effects import catalogue
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """Effects that act in the simulated parts; no other part of the program knows of them.
+    """Effects that act in the simulated parts; the measurement and the diagnosis are not told of them.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ class Hidden:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def of_stage(self, stage: str) -> dict[str, Mapping[str, float]]:
-        """Injected effects of one stage of the measuring chain, in the order in which they act."""
+        """Injected effects of one section of the measuring chain, in the order in which they act."""
         return {
             name: self.effects[name]
             for name, effect in catalogue().items()

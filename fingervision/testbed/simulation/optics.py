@@ -47,7 +47,7 @@ def _tilt(optics: Optics, k_per_mm: float) -> Optics:
 
 
 def in_the_picture(name: str) -> bool:
-    """Whether an effect is applied to the picture itself.
+    """Whether a camera effect is applied to the rendered picture itself.
 
     All other camera effects are applied by moving the scene in front of the camera, which is equivalent for drifts and
     scale errors. An edge bias in the picture would change the gap of round tips by less than that of two straight edges

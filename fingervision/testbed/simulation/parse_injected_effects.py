@@ -20,8 +20,7 @@ USUAL_INPUTS_MM, USUAL_STEP_MM = (-0.45, 1.45), 0.002
 def hidden_from(words: tuple[str, ...]) -> Hidden:
     """Read injected effects, each given as `EFFECT[:PARAMETER=VALUE,...]` or by a sealed file.
 
-    A sealed file has the form of a corrected model's file: `[[effect]]` with `name` and `[effect.parameters]` of plain
-    numbers.
+    A sealed file has the form of a model.toml: `[[effect]]` with `name` and `[effect.parameters]` of plain numbers.
 
     Raises
     ------
@@ -35,13 +34,13 @@ def hidden_from(words: tuple[str, ...]) -> Hidden:
         more = _sealed(Path(word)) if word.lower().endswith(".toml") else [_spoken(word)]
         for name, values in more:
             if name in effects:
-                raise UsageError(f"Each effect may be hidden only once, but {name} is hidden twice: leave one out.")
+                raise UsageError(f"--hide may name each effect only once, but {name} is named twice: leave one out.")
             effects[name] = usual_values(catalogue()[name]) | values
     return Hidden(effects)
 
 
 def usual_values(effect: Effect) -> dict[str, float]:
-    """Parameter values for an effect that is given without any: large enough to be visible, well within the bounds."""
+    """Parameter values for an injected effect without stated values: clearly visible, and within the bounds."""
     inputs = np.arange(*USUAL_INPUTS_MM, USUAL_STEP_MM)
     history = History(
         input_mm=inputs,

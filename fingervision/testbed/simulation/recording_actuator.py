@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 class Followed:
-    """An actuator that stores its readings.
+    """An actuator that stores its readings, by which a simulated gripper is driven.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Followed:
 
     @property
     def motion(self) -> Motion:
-        """Motion of the stage, as far as it was read."""
+        """Motion of the stage as far as it was read from the actuator."""
         return Motion(
             self._at_mm, self._known_until_s, lambda: len(self._time_s), lambda: list(self._homed_s), self._began_s
         )
@@ -64,7 +64,7 @@ class Followed:
         self._homing = True
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse a motion that is not possible."""
+        """Refuse a motion that the actuator cannot make."""
         self._actuator.check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:

@@ -16,7 +16,7 @@ LEAD_PERIODS_MM, LEAD_SHARES = (7.3, 2.9, 1.1), (0.55, 0.3, 0.15)
 
 
 class SimulatedStage:
-    """True position of the stage, for all past times and as planned.
+    """True position of the simulated stage, for all past times and for the planned motion.
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ class SimulatedStage:
 
     @property
     def planned_until_s(self) -> float:
-        """End of the present motion (s); minus infinity before the first."""
+        """End of the present motion (s); minus infinity before the first motion."""
         begin_s, _, _, _, duration_s = self._pieces[-1]
         return begin_s + duration_s
 
     @property
     def began_s(self) -> float:
-        """Time of the first motion (s); infinity before it."""
+        """Time of the first motion (s); infinity before the first motion."""
         return self._pieces[1][0] if len(self._pieces) > 1 else float("inf")
 
     def lands_at_mm(self, target_mm: float) -> float:
@@ -105,7 +105,7 @@ class SimulatedStage:
         self.version += 1
 
     def turns_s(self, after_s: float, until_s: float) -> list[float]:
-        """Times at which a motion began or ended."""
+        """Times at which a motion began or ended (s)."""
         ends = [(begin_s, begin_s + duration_s) for begin_s, _, _, _, duration_s in self._pieces[1:]]
         joined = {begin_s for begin_s, _ in ends} & {end_s for _, end_s in ends}
         return sorted({at for piece in ends for at in piece if at not in joined and after_s < at <= until_s})

@@ -1,0 +1,78 @@
+"""Drop effects that are not needed to explain the disagreement, and replace curves by straight lines."""
+
+from dataclasses import replace
+
+from fingervision.diagnosis.inference.hypothesis import Explanation
+from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
+from fingervision.diagnosis.inference.search_state import Findings
+from fingervision.diagnosis.inference.verdict import standing_of
+from fingervision.diagnosis.input.observations import Observations
+
+NEEDED = 1.1
+"""Factor by which dropping an effect may increase the residual (RMS); an effect that reduces it by more is kept."""
+AS_MUCH = 2.0**0.5
+"""Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
+power, because a richer formula also fits part of that structure."""
+
+
+def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
+    """Drop effects that explain less than the remaining residual, because they may only imitate a part of it.
+
+    If structure remains in addition to several effects, each effect is fitted to part of that structure as well.
+    """
+    rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
+    while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):
+        best = found.best
+        less = min((_without(found, name) for name in best.names), key=lambda explanation: explanation.score)
+        fewer = replace(found, best=less, alternatives=(less,))
+        needed = standing_of(data, fewer).after_mm > NEEDED * standing_of(data, found).after_mm
+        if less.score - best.score > best.score - rows or needed:
+            break
+        found = fewer
+    return found
+
+
+def with_simpler_parts(data: Observations, found: Findings) -> Findings:
+    """If there is unknown structure, replace an effect by a straight line that leaves about as much residual.
+
+    A richer formula gains by fitting unexplained structure: an apparent warming within two seconds may only be an
+    offset and one unusual part of the record.
+    """
+    most_mm = AS_MUCH * standing_of(data, found).after_mm if found.unknown is not None else 0.0
+    while found.unknown is not None:
+        simpler = [e for e in _with_a_line(found) if _stands(data, found, e) <= most_mm]
+        if not simpler:
+            break
+        best = min(simpler, key=lambda e: e.score)
+        found = replace(found, best=best, alternatives=(best,))
+    return found
+
+
+def _with_a_line(found: Findings) -> list[Explanation]:
+    """Explanations in which one curved effect of the best one is replaced by a straight line over the input."""
+    best, problem = found.best, found.problem
+    curved = [n for n, s in zip(best.names, own_shapes(problem, best), strict=True) if not is_a_line(problem, s)]
+    out = []
+    for name in curved:
+        kept = {other: best.values[other] for other in best.names if other != name}
+        for other in set(problem.effects) - set(best.names):
+            listed = problem.parameters((other,))
+            if len(listed) != 1 or listed[0][1].starts != 1:
+                continue
+            fitted = fit(problem, (*kept, other), {**kept, other: {}}, iterations=20)
+            shapes = dict(zip(fitted.names, own_shapes(problem, fitted), strict=True))
+            if is_a_line(problem, shapes[other]):
+                out.append(fitted)
+    return out
+
+
+def _stands(data: Observations, found: Findings, explanation: Explanation) -> float:
+    return standing_of(data, replace(found, best=explanation, alternatives=(explanation,))).after_mm
+
+
+def _without(found: Findings, name: str) -> Explanation:
+    kept = {other: found.best.values[other] for other in found.best.names if other != name}
+    refit = fit(found.problem, tuple(kept), kept, iterations=20)
+    known = [e for e in found.singles if e.names == refit.names]
+    return min([refit, *known], key=lambda e: e.score)

@@ -1,0 +1,129 @@
+"""State of a search for effects: explanations with one, two and three effects, and the evidence for them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fingervision.diagnosis.inference.explanation_candidates import (
+    extended,
+    single_effects,
+)
+from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.model_adequacy import shapes_of
+from fingervision.diagnosis.inference.probe_basis import Probes
+from fingervision.diagnosis.inference.signatures import Signatures, signatures
+from fingervision.diagnosis.inference.significance import Evidence
+
+COMPLETE = 0.05
+"""Largest remaining share, in chi-square beyond the noise, of a complete explanation: effects that only fit the
+inexactness of another effect's formula reduce it by less."""
+NOISY = 2.0 * 2.0**0.5
+"""Excess of the chi-square of noise over the number of rows n that occurs now and then, in units of sqrt(n): two
+standard deviations sqrt(2 n)."""
+ROUGH = 2
+"""Starts, and explanations refitted thoroughly, of a first search that is for the noise alone; where its fit is poor,
+the chi-square of the answer says so, and the search is repeated (`searched.QUIET`)."""
+SHORT = 100
+"""Number of samples below which the noise is estimated with single effects only."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """Result of a search; explanations in descending order of their score.
+
+    `nearest` is the likeliest of one or two effects, whether or not its second effect is large enough to be named.
+    """
+
+    best: Explanation
+    alternatives: tuple[Explanation, ...]
+    nothing: Explanation
+    singles: tuple[Explanation, ...]
+    nearest: Explanation
+    unknown: str | None
+    left_over: str | None
+    smallest: dict[str, dict[str, object]]
+    distances: dict[tuple[str, ...], float]
+    problem: Problem
+
+
+def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -> bool:
+    """Whether the larger explanation removes nearly all of the smaller one's residual, as a true one does.
+
+    The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
+    added fits part of that inexactness, however large the residual is. Other effects in its place depend less on it;
+    where these leave noise alone, only what formulas are typically off by speaks for the smaller one: a creep that
+    left 70 times the noise, 3.6 % of what it explained, had stood for a ratio and an offset that leave none.
+    """
+    rows = state.values - int(state.problem.whitener.aside.sum())
+    stands = smaller.score - rows
+    joins = set(smaller.names) <= set(larger.names)
+    noise_alone = not joins and larger.score - rows < NOISY * rows**0.5
+    share = state.problem.form_share if joins else FORM_SHARE if noise_alone else SMALL_SHARE
+    plain = max(float(rows), share**2 * (state.nothing.score - smaller.score))
+    return stands > plain and (noise_alone or larger.score - rows < COMPLETE * stands)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchState:
+    """State of the search.
+
+    Parameters
+    ----------
+    problem, atoms : Problem, Signatures
+        The estimation problem, and the signatures of all effects.
+    nothing, best : Explanation
+        The model without effects, and the present best explanation.
+    peers : list of Explanation
+        Explanations with as many effects as the best, best first.
+    shapes : Probes
+        Generic shapes that are not in the catalogue.
+    singles, pairs, triples : list of Explanation
+        All explanations with one effect, and the most probable ones with two and three, best first.
+    evidence : Evidence or None
+        Criterion for the significance of gains.
+    imitation, unknown, left_over : str or None
+        Description of a probe that effects only imitate; of structure that no effect explains; of remaining structure
+        that is small.
+    """
+
+    problem: Problem
+    atoms: Signatures
+    nothing: Explanation
+    best: Explanation
+    peers: list[Explanation]
+    shapes: Probes
+    singles: list[Explanation] = field(default_factory=list)
+    pairs: list[Explanation] = field(default_factory=list)
+    triples: list[Explanation] = field(default_factory=list)
+    evidence: Evidence | None = None
+    imitation: str | None = None
+    unknown: str | None = None
+    left_over: str | None = None
+
+    @property
+    def values(self) -> int:
+        """Number of measured values, at least 2."""
+        return max(2, int(self.problem.measured.size))
+
+    def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
+        """Whether the best of some explanations gains more over `base` than noise alone would."""
+        return self.evidence is not None and self.evidence.speaks_for(found, base)
+
+
+def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> SearchState:
+    """Estimate the noise from the residual of the known effects, or of those from a rough first search."""
+    if known is not None:
+        problem = problem_beside(known)
+        nothing = problem.nothing()
+        return SearchState(problem, signatures(problem), nothing, nothing, [nothing], shapes_of(problem))
+    problem = problem_beside(None)
+    atoms = signatures(problem)
+    rough = single_effects(problem, atoms, 4, ROUGH)
+    # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
+    many = problem.chain.history.input_mm.size >= SHORT
+    pairs = extended(problem, atoms, rough[:3], 16, lambda _: None, scanned=1, refined=ROUGH) if many else []
+    first = [*rough[:1], *pairs[:1]]
+    if first:
+        problem = problem_beside(min(first, key=lambda e: e.bic(problem.measured.size)))
+        atoms = signatures(problem)
+    nothing = problem.nothing()
+    return SearchState(problem, atoms, nothing, nothing, [nothing], shapes_of(problem))

@@ -1,0 +1,108 @@
+"""Features of a GenICam camera: those requested at the start, those stated, and those that may change later.
+
+The names of the features are those of the Standard Features Naming Convention (EMVA). Each GenTL producer has exception
+classes of its own, so that every exception is caught.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraControl
+from fingervision.frames.source import Wish
+
+MONO = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
+"""Pixel formats in which each grey level has one or two bytes of its own, by the names of the PFNC (EMVA, Pixel Format
+Naming Convention)."""
+NODES = {"exposure_ms": ("ExposureTime", 1e3), "gain": ("Gain", 1.0)}
+"""Feature of the Standard Features Naming Convention for what may be asked, and its units in ours."""
+CONTROLS = {
+    EXPOSURE: (*NODES["exposure_ms"], "ms"),
+    GAIN: (*NODES["gain"], "dB"),
+    FRAME_RATE: ("AcquisitionFrameRate", 1.0, "Hz"),
+}
+"""What may be set while the camera runs: its feature, its units in ours, our unit."""
+
+
+def control_list(nodes: Any) -> tuple[CameraControl, ...]:
+    """What a camera's features let be changed; a feature that is locked now states no value or no limit.
+
+    Parameters
+    ----------
+    nodes : GenApi's map of nodes
+        Of the camera.
+    """
+    found = []
+    for name, (node, factor, unit) in CONTROLS.items():
+        value = feature_value(nodes, node)
+        if value is None:
+            continue
+        least, greatest = (_limit(nodes, node, end) for end in ("min", "max"))
+        found.append(
+            CameraControl(
+                name,
+                float(value) / factor,
+                unit,
+                None if least is None else least / factor,
+                None if greatest is None else greatest / factor,
+            )
+        )
+    return tuple(found)
+
+
+def _limit(nodes: Any, node: str, end: str) -> float | None:
+    try:
+        return float(getattr(getattr(nodes, node), end))
+    except Exception:  # the camera does not tell it now
+        return None
+
+
+def request_settings(nodes: Any, wish: Wish) -> tuple[str, ...]:
+    """Request settings and a grey format; return a sentence for each one that the camera refuses."""
+    asked: dict[str, Any] = {}
+    if feature_value(nodes, "PixelFormat") not in MONO:
+        asked["PixelFormat"] = next((each for each in MONO if each in _choices(nodes, "PixelFormat")), None)
+    if wish.size_px is not None:
+        asked["Width"], asked["Height"] = wish.size_px
+    if wish.rate_hz is not None:
+        asked["AcquisitionFrameRateEnable"], asked["AcquisitionFrameRate"] = True, float(wish.rate_hz)
+    for name, (node, factor) in NODES.items():
+        value = getattr(wish.camera, name)
+        if value is not None:
+            asked[node] = factor * value
+    notes = []
+    for node, value in asked.items():
+        try:
+            if value is not None:
+                getattr(nodes, node).value = value
+        except Exception as error:  # not there, not now, beyond its range: each producer has its own class
+            if node != "AcquisitionFrameRateEnable":  # many cameras have no such switch, and need none
+                notes.append(f"The camera was asked for {node} = {value}, and did not take it ({error_words(error)}).")
+            continue
+    return tuple(notes)
+
+
+def read_settings(nodes: Any) -> Mapping[str, str]:
+    """Return the settings that the camera states, each with its unit."""
+    units = {"AcquisitionFrameRate": "Hz", "ExposureTime": "us", "Gain": "dB", "PixelFormat": ""}
+    found = {node: feature_value(nodes, node) for node in units}
+    return {node: f"{value} {units[node]}".strip() for node, value in found.items() if value is not None}
+
+
+def feature_value(nodes: Any, node: str) -> Any:
+    """Return the value of a feature; None if the camera has no such feature, or does not state it now."""
+    try:
+        return getattr(nodes, node).value
+    except Exception:
+        return None
+
+
+def _choices(nodes: Any, node: str) -> tuple[str, ...]:
+    try:
+        return tuple(getattr(nodes, node).symbolics)
+    except Exception:
+        return ()
+
+
+def error_words(error: Exception) -> str:
+    """Return class and message of an error in one line, without the final full stop."""
+    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". :")

@@ -1,0 +1,119 @@
+"""Fits of every model to the mean profiles of both inner flanks, each computed when it is first needed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.vision.mean_profile import MeanProfile
+from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
+
+Floats = NDArray[np.float64]
+# A mean profile, the inverse of the variance of one of its pixels, and the blur of its single step (pixels).
+Flank = tuple[MeanProfile, float, float]
+
+# A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
+# step does with half of that, or with so many times what the best model leaves.
+MODEL_LEAVES, MODEL_TIMES, STEP_TIMES = 4.0, 10.0, 3.0
+# A model that leaves so many times what one may leave is none, however long it is fitted.
+HOPELESS_TIMES = 2.0
+# What a step takes for blur is partly what stands beside it: the search begins at this share of it as well.
+OWN_BLUR = 0.55
+RIVALS = (WALL, SHADOW, GLARE)
+
+
+class FlankFits:
+    """Fits of the models to both inner flanks.
+
+    Parameters
+    ----------
+    flanks : list of (MeanProfile, float, float)
+        Mean profile, inverse variance of one pixel, and blur of the single step (pixels), for each of the two flanks.
+    """
+
+    def __init__(self, flanks: list[Flank]) -> None:
+        self._flanks = flanks
+        self._fits: dict[tuple[int, int], ProfileFit] = {}
+        self._too_many = np.inf
+        self.bins = sum(profile.t.size for profile, _, _ in flanks)
+        """Number of bins of both profiles."""
+        step = self.squares(STEP)
+        self.enough = max(MODEL_LEAVES * self.bins, step / MODEL_TIMES)
+        """Weighted sum of squared residuals, of both flanks, below which a model explains the profiles."""
+        self._too_many = HOPELESS_TIMES * self.enough
+        # A step explains both, whatever the others would: only how wide it is is still to be asked.
+        self._is_explained = step < 0.5 * MODEL_LEAVES * self.bins
+
+    def of(self, kind: int) -> list[ProfileFit]:
+        """Fits of a model to the left and the right flank; if a step explains both flanks, those of the step."""
+        return [self._fit(kind, k) for k in range(len(self._flanks))]
+
+    def squares(self, kind: int) -> float:
+        """Weighted sum of squared residuals of a model, over both flanks."""
+        return sum(fit.squares for fit in self.of(kind))
+
+    def is_step(self) -> bool:
+        """Whether a single step explains the profiles, because no other model is clearly better.
+
+        A model that leaves too large a residual on one flank is not fitted to the other flank.
+        """
+        if self._is_explained:
+            return True
+        step = self.squares(STEP)
+        worst_first = sorted(range(len(self._flanks)), key=lambda k: -self._fit(STEP, k).squares)
+        for kind in RIVALS:
+            left = 0.0
+            for k in worst_first:
+                left += self._fit(kind, k).squares
+                if step < STEP_TIMES * left:
+                    break
+            else:
+                return False
+        return True
+
+    def _fit(self, kind: int, k: int) -> ProfileFit:
+        if kind != STEP and self._is_explained:
+            kind = STEP
+        if (kind, k) not in self._fits:
+            self._fits[kind, k] = best_fit(kind, *self._flanks[k], too_many=self._too_many)
+        return self._fits[kind, k]
+
+
+def best_fit(
+    kind: int,
+    profile: MeanProfile,
+    weight: float,
+    blur: float,
+    is_blur_known: bool = False,
+    too_many: float = np.inf,
+) -> ProfileFit:
+    """Fit a model from all starting values, and return the best fit.
+
+    Parameters
+    ----------
+    kind : int
+        STEP, WALL, SHADOW, GLARE or FADING.
+    profile : MeanProfile
+        Mean light across the flank.
+    weight : float
+        Inverse of the variance of the light of one pixel.
+    blur : float
+        Blur of the single step (pixels).
+    is_blur_known : bool
+        Whether the blur is fixed to the given value.
+    too_many : float
+        Sum of squares above which a fit is stopped early, because the model will not be chosen.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the parts of the model are indistinguishable on this profile.
+    """
+    weights = profile.count * weight
+    blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
+    return min(
+        (
+            fit_profile(kind, profile.t, profile.light, weights, own, start, is_blur_known, too_many)
+            for own in blurs
+            for start in STARTS_PX[kind]
+        ),
+        key=lambda fit: fit.squares,
+    )

@@ -1,0 +1,27 @@
+"""Names and metadata that FFmpeg's and Python's text rules would refuse."""
+
+from pathlib import Path
+
+import av
+import pytest
+
+from fingervision.frames.open_container import open_container
+from fingervision.frames.source import open_source
+from tests.frames.test_video_file import H264, smooth_pictures, timed, write_clip
+
+
+@pytest.mark.parametrize("suffix", [".mkv", ".mp4"])
+def test_a_title_that_is_no_text_costs_no_frame(tmp_path: Path, suffix: str) -> None:
+    write_clip(tmp_path / f"clip{suffix}", timed(smooth_pictures(4)), H264())
+    path = tmp_path / f"titled{suffix}"
+    with open_container(tmp_path / f"clip{suffix}") as old, av.open(str(path), "w") as new:
+        new.metadata["title"] = "Spalt 7"
+        stream = new.add_stream_from_template(old.streams.video[0])
+        for packet in old.demux(video=0):
+            if packet.size:
+                packet.stream = stream
+                new.mux(packet)
+    content = path.read_bytes()
+    assert b"Spalt 7" in content
+    path.write_bytes(content.replace(b"Spalt 7", b"Sp\xe4lt 7"))
+    assert len(list(open_source(str(path)))) == 4
