@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from fingervision.tables.units import known_unit, spelled
 from fingervision.tables.words import role_of, source_of
@@ -39,6 +40,7 @@ class ColumnName:
         return source_of(self.base)
 
 
+@lru_cache(maxsize=65_536)
 def column_name(text: str) -> ColumnName:
     """Split a column's name into name and unit.
 

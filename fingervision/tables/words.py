@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from functools import lru_cache
 
 ROLES = {
     "time": "time t zeit zeitachse temps tempo tiempo uhrzeit timestamp timestamps zeitstempel horodatage elapsed "
@@ -71,6 +72,7 @@ def tokens(name: str) -> tuple[str, ...]:
     return tuple(re.findall(r"[^\W_]+", plain))
 
 
+@lru_cache(maxsize=65_536)
 def role_of(name: str) -> str | None:
     """Role denoted by a name without its unit; None for an unknown or ambiguous name.
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from html import escape
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from fingervision.effects import catalogue
 
 CHROMIUM = shutil.which("chromium")
 PLAY_MM = 0.05
+PATIENCE_MS = 120_000
+"""For a browser on a machine that has much else to do."""
 # What a name may hold: it begins an element wherever it is not written as text.
 MARKUP = "<img src=x onerror=alert(1)><script>alert(1)<"
 MEASURED, STRAIGHT = f"measured {MARKUP}.csv", f"straight {MARKUP}.csv"
@@ -170,28 +173,68 @@ def test_turning_points_are_found_and_their_frames_shown(tmp_path: Path) -> None
     assert "<img" not in strip_html(table)  # another file of the same name is no witness
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed.")
-@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1280, "light"), (2560, "dark")])
-def test_a_browser_shows_it_without_a_word_or_a_request(answer: Path, width: int, scheme: str) -> None:
+@pytest.fixture(scope="module")
+def pages(rig: Path, answer: Path) -> list[Path]:
+    """A diagnosis, a comparison of several models, and the figures of ISO 230-2."""
+    words = [word for name in ("steep.csv", STRAIGHT) for word in ("--model", rig / name)]
+    assert run("compare", rig / MEASURED, *words, "--out", rig / "several").exit_code == 0
+    rng = np.random.default_rng(8)
+    lines = ["target_mm,cycle,direction,deviation_um"]
+    for cycle in range(1, 6):
+        for side, word in ((1, "up"), (-1, "down")):
+            lines += [f"{t},{cycle},{word},{-10.0 * side + rng.normal():.3f}" for t in np.linspace(-3.0, 3.0, 7)]
+    (rig / "targets.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (rig / "axis.csv").write_text("input_mm,gap_mm\n-3,-3\n3,3\n", encoding="utf-8")
+    assert run("diagnose", rig / "targets.csv", "--model", rig / "axis.csv", "--out", rig / "iso").exit_code == 0
+    return [answer / "report.html", rig / "several" / "compare.html", rig / "iso" / "report.html"]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed.")
     with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        found = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"], timeout=PATIENCE_MS
+        )
+        yield found
+        found.close()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed.")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280, 2560])
+def test_a_browser_shows_it_without_a_word_or_a_request(
+    pages: list[Path], browser: Any, width: int, scheme: str
+) -> None:
+    for path in pages:
         page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        page.set_default_timeout(PATIENCE_MS)
         said: list[str] = []
         asked: list[str] = []
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto((answer / "report.html").as_uri())
+        page.on("console", lambda message, said=said: said.append(message.text))
+        page.on("pageerror", lambda error, said=said: said.append(str(error)))
+        page.on("request", lambda request, asked=asked: asked.append(request.url))
+        page.goto(path.as_uri())
         page.wait_for_selector("#gap-input canvas")
         page.focus("#gap-input")
         page.keyboard.press("ArrowRight")
         page.wait_for_function("document.querySelector('#gap-input + .readout').textContent.includes('measured')")
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        browser.close()
-    assert said == []
-    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, path
+        shown = page.evaluate(
+            "[...document.querySelectorAll('data')].map((a) => [a.value, a.textContent, a.nextSibling?.data ?? ''])"
+        )
+        page.close()
+        known = set(numbers_in(json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))))
+        assert len(shown) > 3
+        for value, text, unit in shown:
+            assert float(value) in known
+            held = float(value) * (100.0 if unit.strip().startswith("%") else 1.0)
+            # What is read is what the report holds, rounded to the digits that are shown.
+            digits = len(text.partition(".")[2]) if "e" not in text else 0
+            assert float(text) == pytest.approx(held, rel=5.1e-4, abs=0.51 * 10.0**-digits)
+        assert said == []
+        assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

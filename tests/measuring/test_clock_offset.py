@@ -112,6 +112,27 @@ def test_a_reversed_sign_is_named():
     assert "sign" in refused.words or "does not follow" in refused.words
 
 
+def test_the_next_best_offset_is_named_where_there_is_one():
+    # Two strokes that are nearly alike, 5 s apart, then one that is not.
+    strokes = [
+        (1.0, 0.0),
+        (2.0, 1.0),
+        (3.0, 0.0),
+        (6.0, 0.0),
+        (7.0, 0.9),
+        (8.0, 0.0),
+        (11.0, 0.0),
+        (12.0, 1.0),
+        (13.0, 0.0),
+    ]
+    clock = found(drawn(2.0, corners=strokes))
+    assert isinstance(clock, ClockOffset)
+    assert clock.offset_s == pytest.approx(2.0, abs=0.02)
+    assert abs(clock.runner_up_s - clock.offset_s) == pytest.approx(5.0, abs=0.2)
+    assert any(f"{clock.runner_up_s:.3f} s" in note for note in clock.notes)
+    assert found(drawn(2.0)).runner_up_s is None
+
+
 def test_a_log_of_set_points_is_refused():
     at_s, at_mm = np.array(STROKES).T
     one = drawn(3.0)

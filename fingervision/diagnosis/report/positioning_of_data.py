@@ -7,6 +7,7 @@ import numpy as np
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
+from fingervision.diagnosis.report.html_parts import table
 from fingervision.diagnosis.report.positioning_of_table import positioning_of_table
 from fingervision.diagnosis.report.positioning_report import PositioningReport
 from fingervision.diagnosis.report.positioning_words import (
@@ -57,8 +58,6 @@ def positioning_html(found: PositioningReport | NoRepeatedTargets) -> str | None
     if isinstance(found, NoRepeatedTargets):
         return None
     head, rows = positioning_rows(found)
-    lines = ["<tr>" + "".join(f"<th>{escape(cell)}</th>" for cell in head) + "</tr>"]
-    lines += ["<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows]
     told = "".join(f"<li>{escape(sentence)}</li>" for sentence in positioning_words(found))
     notes = "".join(f"<p>{escape(note)}</p>" for note in positioning_notes(found))
-    return f"<ul>{told}</ul><table>{''.join(lines)}</table>{notes}"
+    return f"<ul>{told}</ul>{table(head, rows)}{notes}"

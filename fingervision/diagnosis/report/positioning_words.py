@@ -1,5 +1,7 @@
 """Positioning accuracy in report.json, and as table and sentences in report.html."""
 
+from html import escape
+
 from fingervision.diagnosis.report.positioning_figures import Figure, Visits
 from fingervision.diagnosis.report.positioning_report import PositioningReport
 
@@ -67,19 +69,20 @@ def positioning_document(report: PositioningReport) -> dict[str, object]:
 
 
 def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[str]]]:
-    """Head and rows of the table in report.html; lengths in µm."""
+    """Head and rows of the table in report.html; lengths in mm, with their full values for programs."""
     effects = list(report.without)
-    after = [] if report.after is None else ["after the answer, um"]
-    head = ["figure", "measured, um", *after, *(f"share of {effect}, um" for effect in effects), "definition"]
+    after = [] if report.after is None else ["after the answer, mm"]
+    head = ["figure", "measured, mm", *after, *(f"share of {effect}, mm" for effect in effects), "definition"]
     rows = []
     for symbol, figure in report.measured.figures.items():
         if figure.value_mm is None:
-            cells = [f"none: {figure.reason}", *("-" for _ in (*after, *effects))]
+            cells = [escape(f"none: {figure.reason}"), *("-" for _ in (*after, *effects))]
         else:
-            cells = [_um(figure.value_mm) + _interval(figure)]
-            cells += [] if report.after is None else [_um(report.after.figures[symbol].value_mm)]
-            cells += [_um(report.share_mm(effect, symbol)) for effect in effects]
-        rows.append([symbol, *cells, figure.definition])
+            interval = "" if figure.interval_mm is None else f" +- {_number(figure.interval_mm)}"
+            cells = [_number(figure.value_mm) + interval]
+            cells += [] if report.after is None else [_number(report.after.figures[symbol].value_mm)]
+            cells += [_number(report.share_mm(effect, symbol)) for effect in effects]
+        rows.append([escape(symbol), *cells, escape(figure.definition)])
     return head, rows
 
 
@@ -106,9 +109,9 @@ def positioning_words(report: PositioningReport) -> tuple[str, ...]:
 def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
     figure, side = report.measured.figures[symbol], symbol.partition("_")[2]
     name = NAMES.get(symbol) or f"{NAMES[symbol[0]]} {SIDES[side].replace('approached ', '')},"
-    words = f"{name} {symbol}: {_um(value)}" + (" um" if symbol != "B_mean" else "")
+    words = f"{name} {symbol}: {_mm(value)}" + (" mm" if symbol != "B_mean" else "")
     if symbol == "B_mean":
-        words += f"{_interval(figure)} um" + (" (95 %)" if figure.interval_mm is not None else "")
+        words += f"{_interval(figure)} mm" + (" (95 %)" if figure.interval_mm is not None else "")
         words += _side_words(figure, report.slope_sign)
     causes = []
     for effect in report.without:
@@ -116,13 +119,13 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
         if share is None or abs(share) <= TOLD * abs(value):
             continue
         if 0.0 < share * value <= (1.0 + TOLD) * value**2:
-            causes.append(f"{_um(abs(share))} um of it is {effect}")
+            causes.append(f"{_mm(abs(share))} mm of it is {effect}")
         else:
             # It hides a part of the figure, or others hide a part of it: what would stand without it is true always.
-            causes.append(f"without {effect} it would be {_um(value - share)} um")
+            causes.append(f"without {effect} it would be {_mm(value - share)} mm")
     words += f"; {', '.join(causes)}" if causes else ""
     rest = None if report.after is None else report.after.figures[symbol].value_mm
-    return words + (f"; {_um(rest)} um remain." if rest is not None else ".")
+    return words + (f"; {_mm(rest)} mm remain." if rest is not None else ".")
 
 
 def _side_words(figure: Figure, slope_sign: int) -> str:
@@ -142,11 +145,15 @@ def _visits(visits: Visits | None) -> dict[str, float | None] | None:
     return None if visits is None else {"n": visits.n, "mean_mm": visits.mean_mm, "s_mm": visits.s_mm}
 
 
-def _um(value_mm: float | None) -> str:
-    """Write a length in micrometres with two decimals, as in published reports."""
+def _mm(value_mm: float | None) -> str:
+    """Write a length in millimetres, to a hundredth of a micrometre as in published reports."""
     # Adding zero takes the sign from what rounds to zero.
-    return "-" if value_mm is None else f"{round(1e3 * value_mm, 2) + 0.0:.2f}"
+    return "-" if value_mm is None else f"{round(value_mm, 5) + 0.0:.5f}"
+
+
+def _number(value_mm: float | None) -> str:
+    return "-" if value_mm is None else f'<data value="{value_mm!r}">{_mm(value_mm)}</data>'
 
 
 def _interval(figure: Figure) -> str:
-    return "" if figure.interval_mm is None else f" +- {_um(figure.interval_mm)}"
+    return "" if figure.interval_mm is None else f" +- {_mm(figure.interval_mm)}"

@@ -82,11 +82,11 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     if refused is not None:
         return refused
     motion, whole, rounding = with_corners(motion, whole)
-    rivals = unrefuted(motion, drive, whole, [one for one, _, _ in fits if one is not best], frame_s)
+    rivals, runner_up = unrefuted(motion, drive, whole, [one for one, _, _ in fits if one is not best], frame_s)
     if rivals:
         return ambiguous([whole.at.offset_s, *rivals])
     at = posterior(motion, whole)
-    return stated(motion, at, whole, rounding, frame_s)
+    return stated(motion, at, whole, rounding, frame_s, runner_up)
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:

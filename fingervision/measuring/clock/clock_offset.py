@@ -27,6 +27,8 @@ class ClockOffset:
         Share of the gap's variance that the log explains.
     notes : tuple of str
         Remarks that a reader must know, one sentence each.
+    runner_up_s : float or None
+        Next best offset, at the middle of the recording, that was rejected; None if no other one explains the motion.
     """
 
     offset_s: float
@@ -39,6 +41,7 @@ class ClockOffset:
     u_play_mm: float
     explained_share: float
     notes: tuple[str, ...] = ()
+    runner_up_s: float | None = None
 
     def log_time_s(self, time_s: float) -> float:
         """Convert a time of the recording to the log's clock."""

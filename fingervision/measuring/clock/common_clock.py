@@ -58,6 +58,7 @@ def in_words(clock: ClockOffset | NoClockOffset | None, given_s: float | None) -
             "drive_play_mm": clock.play_mm,
             "u_drive_play_mm": clock.u_play_mm,
             "drive_explained_share": clock.explained_share,
+            "drive_runner_up_s": clock.runner_up_s,
         }
     if isinstance(clock, NoClockOffset):
         return {

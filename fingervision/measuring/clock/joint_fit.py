@@ -113,18 +113,24 @@ def squares_at(motion: Motion, at: Alignment) -> float:
     return solve(motion, at).squares
 
 
-def shift_by_creep(motion: Motion, found: Fit) -> Array:
-    """Change of offset, rate and play if creep is added to the model; shape (3,), zero if it is already included.
+def allowance_for_creep(motion: Motion, found: Fit) -> tuple[Array, Array]:
+    """Change of offset, rate and play if creep is added to the model, and by how much their variances grow; shape (3,).
 
-    In slow motion, creep too small to be detected acts as a delay equal to (creep fraction x time constant), and can
-    also be mistaken for play.
+    Both are zero if creep is already included. In slow motion, creep too small to be detected acts as a delay equal to
+    (creep fraction x time constant), and can also be mistaken for play. The change is what the data say of it, the
+    growth is what they leave open within the creep's prior.
     """
-    at = found.at if motion.creeps else fit(replace(motion, creeps=True), found.at, free_play=found.at.play_mm > 0.0).at
-    return _change(at, found.at)
-
-
-def _change(to: Alignment, since: Alignment) -> Array:
-    return np.array([to.offset_s - since.offset_s, to.rate - since.rate, to.play_mm - since.play_mm])
+    if motion.creeps:
+        return np.zeros(3), np.zeros(3)
+    free_play = found.at.play_mm > 0.0
+    slow = fit(replace(motion, creeps=True), found.at, free_play=free_play)
+    at, was = slow.at, found.at
+    change = np.array([at.offset_s - was.offset_s, at.rate - was.rate, at.play_mm - was.play_mm])
+    growth = np.zeros(3)
+    if slow.normal.shape == found.normal.shape:
+        more = np.diag(np.linalg.pinv(slow.normal)) - np.diag(np.linalg.pinv(found.normal))
+        growth[: more.size - 1] = np.maximum(np.delete(more, 2), 0.0)
+    return change, growth
 
 
 def prior_of(size: int) -> Array:

@@ -1,6 +1,6 @@
 """Find other offsets that explain the frames which both offsets cover as well as the best offset does."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import WHITE, Alignment, Motion, Noise
 from fingervision.measuring.clock.noise_of_motion import noise_of
 from fingervision.measuring.clock.play_posterior import most_likely
-from fingervision.measuring.clock.refusals import FEWEST_FRAMES
+from fingervision.measuring.clock.refusals import FEWEST_FRAMES, LEAST_SHARE, explained
 
 CHANCE_SIGMAS = 3.0
 """Standard deviations by which the log's own noise may enlarge the chi-square of another offset: one valid offset in
@@ -56,9 +56,41 @@ def only(motion: Motion, kept: NDArray[np.bool_]) -> Motion:
     return replace(motion, time_s=motion.time_s[kept], gap_mm=motion.gap_mm[kept], noise=WHITE)
 
 
-def unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float) -> list[float]:
-    """Offsets that explain the frames which they share with the best offset as well as the best offset does."""
-    found = []
+@dataclass(frozen=True, slots=True)
+class RunnerUp:
+    """The most likely one of the offsets that are rejected.
+
+    Parameters
+    ----------
+    offset_s : float
+        Offset at the middle of the recording.
+    share : float
+        Share of the gap's variance that the log explains there, of the frames in common with the best offset.
+    best_share : float
+        The same share at the best offset.
+    """
+
+    offset_s: float
+    share: float
+    best_share: float
+
+    def words(self) -> str:
+        """Sentence that names the offset."""
+        return (
+            f"The next best offset, {self.offset_s:.3f} s, is rejected: the drive explains a share of {self.share:.3f} "
+            f"of the gap's variance there, and of {self.best_share:.5f} at the offset that was taken."
+        )
+
+
+def unrefuted(
+    motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float
+) -> tuple[list[float], RunnerUp | None]:
+    """Offsets that explain the frames shared with the best offset as well as it does; the best of the others.
+
+    An offset is only named as the next best if it explains enough of the gap to be taken, were it the only one.
+    """
+    found: list[float] = []
+    rejected: list[tuple[float, RunnerUp]] = []
     by_chance = _by_chance(motion, drive, best)
     for candidate in others:
         shared, first = fitted(motion.time_s, motion.gap_mm, motion.path, candidate, QUICK_PLAYS)
@@ -68,11 +100,15 @@ def unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Candi
         own = replace(shared, noise=Noise(motion.noise.terms, np.empty(0)))
         own = replace(own, noise=noise_of(own, replace(best, residual_mm=_residual(own, best))))
         ours, rival = most_likely(own, best.at, QUICK_PLAYS), most_likely(own, first.at, QUICK_PLAYS)
-        if not _shares_motion(motion, rival.at):
+        apart_s = abs(rival.at.offset_s - best.at.offset_s)
+        if rival.scale <= 0.0 or apart_s < ONE_PEAK * frame_s or not _shares_motion(motion, rival.at):
             continue
-        if rival.scale > 0.0 and (rival.squares - ours.squares) / ours.variance_mm2 < UNREFUTED + by_chance:
+        worse = (rival.squares - ours.squares) / ours.variance_mm2
+        if worse < UNREFUTED + by_chance:
             found.append(rival.at.offset_s)
-    return found
+        elif (share := explained(own, rival)) > LEAST_SHARE:
+            rejected.append((worse, RunnerUp(rival.at.offset_s, share, explained(own, ours))))
+    return found, min(rejected, key=lambda entry: entry[0])[1] if rejected else None
 
 
 def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:

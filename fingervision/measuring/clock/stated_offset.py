@@ -5,13 +5,14 @@ import numpy as np
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.corner_rounding import Rounding
 from fingervision.measuring.clock.correlation import LARGEST_RATE
-from fingervision.measuring.clock.joint_fit import Fit, shift_by_creep
+from fingervision.measuring.clock.joint_fit import Fit, allowance_for_creep
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.offset_covariance import inflation
 from fingervision.measuring.clock.path_between_rows import FINER
 from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
+from fingervision.measuring.clock.rivals import RunnerUp
 from fingervision.measuring.clock.set_points import gap_arrives
 
 FOLLOWED = 0.95
@@ -37,15 +38,17 @@ def crossed_in_s(path: LogPath) -> float:
     return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
 
 
-def stated(motion: Motion, at: Posterior, best: Fit, rounding: Rounding, frame_s: float) -> ClockOffset | NoClockOffset:
+def stated(
+    motion: Motion, at: Posterior, best: Fit, rounding: Rounding, frame_s: float, runner_up: RunnerUp | None
+) -> ClockOffset | NoClockOffset:
     """Convert the fitted offset to the time of the log's first row."""
     first_s = float(motion.drive.time_s[0])
     more = np.sqrt(inflation(motion, best.at))
     offset_s, rate = at.offset_s + float(rounding.shift[0]), at.rate + float(rounding.shift[1])
     covariance = at.covariance * np.outer(more[:2], more[:2])
-    shift = shift_by_creep(motion, best)
+    shift, growth = allowance_for_creep(motion, best)
     # Without its correlation: by chance it would cancel at one instant what is off at all others.
-    covariance = covariance + np.diag(shift[:2] ** 2) + rounding.covariance[:2, :2]
+    covariance = covariance + np.diag(shift[:2] ** 2 + growth[:2] * more[:2] ** 2) + rounding.covariance[:2, :2]
     # Recording's time at which the log begins; there the offset is middle's plus the rate times the way to it.
     begins_s = (first_s + offset_s - rate * motion.middle_s) / (1.0 - rate)
     away_s = np.append(motion.time_s, begins_s) - motion.middle_s
@@ -108,6 +111,8 @@ def stated(motion: Motion, at: Posterior, best: Fit, rounding: Rounding, frame_s
         notes.append(
             f"The drive explains a share of {share:.2f} of the gap's variance: the gap moves by something else as well."
         )
+    if runner_up is not None:
+        notes.append(runner_up.words())
     return ClockOffset(
         offset_s=begins_s - first_s,
         u_offset_s=u_offset_s,
@@ -116,7 +121,10 @@ def stated(motion: Motion, at: Posterior, best: Fit, rounding: Rounding, frame_s
         reference_s=first_s,
         u_time_s=u_time_s,
         play_mm=max(at.play_mm + float(rounding.shift[2]), 0.0),
-        u_play_mm=float(np.sqrt((at.u_play_mm * more[2]) ** 2 + shift[2] ** 2 + rounding.covariance[2, 2])),
+        u_play_mm=float(
+            np.sqrt((at.u_play_mm**2 + growth[2]) * more[2] ** 2 + shift[2] ** 2 + rounding.covariance[2, 2])
+        ),
         explained_share=share,
         notes=tuple(notes),
+        runner_up_s=None if runner_up is None else runner_up.offset_s,
     )

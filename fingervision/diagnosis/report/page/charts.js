@@ -37,7 +37,9 @@
         scales: { x: { time: false } },
         axes: [axis(figure.x), { ...axis(figure.y), size: 64 }],
         series: [{ label: figure.x }, ...series],
-        legend: { live: false },
+        // A filled square for filled points, an empty one for open points; lines have the line's dash.
+        legend: { live: false, markers: { fill: (u, k) => (k > 0 && figure.series[k - 1].filled ? series[k - 1].stroke : "transparent"),
+          dash: (u, k) => (k > 0 && (figure.series[k - 1].dash || []).length ? "dashed" : "solid") } },
         cursor: { drag: { x: true, y: true } },
         hooks: {
           setCursor: [(u) => {
