@@ -30,7 +30,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A driven face: it moves by the input times `per_input`.
+    """A driven face, which moves by the input times `per_input`.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             raise DataError(f"probe {probe} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside it.")
     for face in (*mechanism.fixed, *(drive.face for drive in mechanism.drives)):
         if hypot(*face.box_mm) > 1e6:
-            raise DataError(f"face {face.name} of {name} must have a box of finite size.")
+            raise DataError(f"face {face.name} of {name} must have a box_mm with finite limits.")
 
 
 def _is_hole(area_mm2: float, flexure: Flexure) -> bool:

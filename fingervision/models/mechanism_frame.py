@@ -293,7 +293,7 @@ class MechanismFrame:
         return float(way[0]), float(way[1])
 
     def _section_at(self, point: tuple[float, float]) -> int | None:
-        """Node of the section of a flexure nearest to a point on it; None for a point on a body."""
+        """Node of the section of a flexure that is nearest to a point on the flexure; None for a point on a body."""
         for span, own in zip(self.spans, self.segments, strict=True):
             if span.slab.holds(np.array(point)[:, None])[0]:
                 nodes = np.unique(self.frame.ends[list(own)])
@@ -301,7 +301,7 @@ class MechanismFrame:
         return None
 
     def _vibration(self, count: int) -> FrameVibration:
-        """Mass and stiffness with `count` own modes of every body, of the last count asked for."""
+        """Mass and stiffness with `count` own modes of every body; the result for the latest count is cached."""
         if self._vibrating is None or self._vibrating[0] != count:
             stiffness = self.driven.stiffness_n_mm.toarray()
             found = frame_vibration(self.assembly, stiffness, self._masses, self.free, self.by_input, count)
@@ -316,7 +316,7 @@ class MechanismFrame:
     def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
         """First natural modes in the plane: angular frequencies in rad/s, and mode shapes of unit mass by column.
 
-        A shape holds the displacements of the bodies' nodes, followed by the motions of the frames.
+        A mode shape contains the displacements of the bodies' nodes, followed by the motions of the coordinate frames.
         """
         vibration = self._vibration(count)
         rad_s, shapes, _ = vibration.modes(drive_held=drive_held, count=count)
@@ -350,7 +350,7 @@ class MechanismFrame:
         return FreeModes(rad_s, drive, changes(self.mechanism, self._probes_by(vibration, shapes)))
 
     def _probes_by(self, vibration: FrameVibration, shapes: Array) -> dict[str, Array]:
-        """Small motion of every probe, shape (2, k), by each column of displacements."""
+        """Small motion of every probe caused by each column of displacements, shape (2, k)."""
         fields, found = vibration.field(shapes), {}
         for name, point in self.mechanism.probes.items():
             if self._section_at(point) is None:
