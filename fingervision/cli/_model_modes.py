@@ -1,5 +1,6 @@
 """`fingervision model --modes`: natural frequencies, with plots and a film of the mode shapes."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from math import ceil, cos, pi
@@ -24,6 +25,8 @@ _PICTURES, _PERIODS, _A_SECOND = 24, 4, 24
 """Pictures per period, periods in the film, and pictures per second: one period takes one second for every
 frequency."""
 _FILM_DPI = 80
+_LETTERS_AN_INCH = 12.0
+"""Letters of a title that fit side by side."""
 _KILO = 1e4
 """Frequency (Hz) from which on a title tells kilohertz: four digits would be a power of ten."""
 _MARGIN = 0.02
@@ -79,7 +82,7 @@ def _panels(shapes: Sequence[ModeShape], title: str) -> tuple[Figure, list[tuple
     width = 2.6 if ratio > 0.4 else 3.4
     figure = Figure(figsize=(max(width * columns, 5.0) + 0.6, (width * ratio + 0.9) * len(rows) + 0.5),
                     layout="constrained")  # fmt: skip
-    figure.suptitle(title, fontsize="medium")
+    figure.suptitle(textwrap.fill(title, int(_LETTERS_AN_INCH * figure.get_size_inches()[0])), fontsize="medium")
     grid = figure.subplots(len(rows), columns, squeeze=False)
     moving = []
     for place, row in enumerate(rows):

@@ -136,7 +136,7 @@ WRONG = [
     ("direction = [1.0, 0.0]", "direction = [0.0, 0.0]", "drive lower.direction"),
     ("direction = [1.0, 0.0]", "direction = [1.0]", "drive lower.direction"),
     ('across = "free"', 'across = "guided"', "drive lower.across"),
-    ("direction = [1.0, 0.0]", "direction = [1.0, 1.0]", "free where drive lower.direction is along x or y"),
+    ("direction = [1.0, 0.0]", "direction = [1.0, 1.0]", "drive lower.direction is along x or"),
 ]
 
 
