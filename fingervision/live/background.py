@@ -1,4 +1,4 @@
-"""Execution of a fingervision command in a separate process of lowest priority, so that the live view is not slowed."""
+"""Execution of a fingervision command in a separate process of low priority, so that the live view is not slowed."""
 
 import os
 import subprocess
@@ -8,10 +8,16 @@ from pathlib import Path
 
 from fingervision.domain.errors import ProcessError
 
+LOWEST = 19
+"""Niceness of what runs beside a camera: it gets what nobody else wants."""
+WAITED_FOR = 5
+"""Niceness of what somebody waits for while no camera runs: a third of what a busy program beside it gets. At the
+lowest, which is a seventieth, a recording of a second was not measured within two minutes at a load of 24."""
 # Threads of the live view ask to be served first, and a process begins with the priority of the thread that starts it.
 BEGIN = (
     "import os, sys\n"
-    "if hasattr(os, 'setpriority'): os.setpriority(os.PRIO_PROCESS, 0, 19)\n"
+    "if hasattr(os, 'setpriority'):\n"
+    "    os.setpriority(os.PRIO_PROCESS, 0, max({niceness}, os.getpriority(os.PRIO_PROCESS, 0)))\n"
     "from fingervision.cli import main\n"
     "sys.argv[0] = 'fingervision'\n"
     "main()\n"
@@ -28,6 +34,8 @@ class BackgroundCommand:
     ----------
     *arguments : str or Path
         Command-line arguments, as written after `fingervision`.
+    niceness : int, optional
+        Niceness of the process: `LOWEST` or `WAITED_FOR`.
 
     Raises
     ------
@@ -35,7 +43,7 @@ class BackgroundCommand:
         No process can be started.
     """
 
-    def __init__(self, *arguments: str | Path) -> None:
+    def __init__(self, *arguments: str | Path, niceness: int = LOWEST) -> None:
         root = str(Path(__file__).parents[2])
         paths = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
         try:
@@ -43,7 +51,7 @@ class BackgroundCommand:
             self._out, self._error = (Path(self._folder.name) / name for name in ("out", "error"))
             with self._out.open("w") as out, self._error.open("w") as error_stream:
                 self._process = subprocess.Popen(
-                    [sys.executable, "-c", BEGIN, *map(str, arguments)],
+                    [sys.executable, "-c", BEGIN.format(niceness=niceness), *map(str, arguments)],
                     stdin=subprocess.DEVNULL,
                     stdout=out,
                     stderr=error_stream,

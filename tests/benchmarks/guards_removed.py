@@ -233,7 +233,7 @@ GUARDS = (
     ),
     Guarded(
         "markup in a report's sentences", "fingervision/diagnosis/report/html_parts.py",
-        'f"<li>{escape(item)}</li>"', 'f"<li>{item}</li>"', "diagnosis/test_report_files", "markup_in_the_names",
+        'f"<li>{escape(item)}</li>"', 'f"<li>{item}</li>"', "diagnosis/test_report_files", "markup_in_a_sentence",
     ),
 )  # fmt: skip
 IN_A_BROWSER = (

@@ -16,6 +16,7 @@ from click.testing import CliRunner, Result
 from fingervision.cli import cli
 from fingervision.diagnosis.report.effect_figure import effect_figure
 from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
+from fingervision.diagnosis.report.html_parts import bullets, named
 from fingervision.domain.errors import UsageError
 from fingervision.effects import catalogue
 
@@ -109,6 +110,11 @@ def check_markup_is_text(page: str) -> None:
 
 def test_markup_in_the_names_of_files_and_runs_is_text(answer: Path) -> None:
     check_markup_is_text((answer / "report.html").read_text(encoding="utf-8"))
+
+
+def test_markup_in_a_sentence_of_the_report_is_text() -> None:
+    assert "<img" not in bullets([MARKUP])
+    assert "<img" not in named(MARKUP)
 
 
 def test_figures_are_vectors_and_the_same_each_time(rig: Path, answer: Path) -> None:

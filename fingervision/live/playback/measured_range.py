@@ -6,7 +6,7 @@ from threading import Thread
 from time import sleep
 
 from fingervision.domain.errors import StateError
-from fingervision.live.background import BackgroundCommand
+from fingervision.live.background import WAITED_FOR, BackgroundCommand
 from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.track import WHOLE, arguments_of
@@ -46,7 +46,9 @@ class RangeMeasurement:
         more = () if frames is None else ("--frames", f"{frames[0]}:{frames[1]}")
         arguments = arguments_of(playback.recorded.name, playback.choices, playback.recorded.options)
         self._playback = playback
-        self._command = BackgroundCommand(*arguments, *more, *gauges, "--out", str(self.folder), "--json")
+        self._command = BackgroundCommand(
+            *arguments, *more, *gauges, "--out", str(self.folder), "--json", niceness=WAITED_FOR
+        )
         self._thread = Thread(target=self._wait, name="measuring a range", daemon=True)
         self._thread.start()
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from calib.measured_scale import Calibration
 from calib.stated_scale import is_stated
-from fingervision.live.background import BackgroundCommand
+from fingervision.live.background import WAITED_FOR, BackgroundCommand
 from fingervision.live.choices import Choices
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.gaps_reader import GapsReader
@@ -60,7 +60,9 @@ class Track:
         self.failure = ""
         self.is_whole = False
         self._reader = GapsReader(self.table)
-        self._command: BackgroundCommand | None = BackgroundCommand(*arguments, "--out", self._folder.name)
+        self._command: BackgroundCommand | None = BackgroundCommand(
+            *arguments, "--out", self._folder.name, niceness=WAITED_FOR
+        )
 
     def refresh(self) -> bool:
         """Read new rows of the table; return True if inputs were added to all rows, so that all must be read again."""
