@@ -56,16 +56,20 @@ Exit codes: 0 done; 1 failed, or no frame has a gap; 2 wrong usage;
 @click.option(
     "--drive-offset-s",
     type=float,
-    help="Clock offset, added to the drive's times; determined from the motion if not given.",
+    help="Clock offset in seconds, added to the drive's times; determined from the motion if not given.",
 )
 @click.option(
     "--response",
     default="auto",
     show_default=True,
     metavar="auto|linear|srgb|bt709|FILE",
-    help="Camera response; auto: as in the calibration, else as the recording is tagged, else linear.",
+    help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
 )
-@click.option("--bits", type=click.IntRange(8, 16), help="True bit depth of levels stored in 16 bits, if not 16.")
+@click.option(
+    "--bits",
+    type=click.IntRange(8, 16),
+    help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
+)
 @click.option(
     "--fingers",
     type=click.Choice(["auto", "dark", "light"]),

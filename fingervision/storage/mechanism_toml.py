@@ -282,11 +282,11 @@ class _Reader(DrawingReader):
         x, y = self.numbers(table, "direction", 2, what)
         across = table.get("across", "held")
         if hypot(x, y) == 0.0:
-            raise DataError(f"{what}.direction in {self.origin} must be a direction, but is [0, 0].")
+            raise DataError(f"{what}.direction in {self.origin} must be a vector such as [1, 0], but is [0, 0].")
         if across not in ("held", "free") or (across == "free" and x * y != 0.0):
             raise DataError(
-                f"{what}.across in {self.origin} must be held, or free where {what}.direction is along x or y, "
-                f"but is {across!r}."
+                f"{what}.across in {self.origin} must be 'held', or 'free' if {what}.direction is along x or "
+                f"y, but is {across!r}."
             )
         per_input = self.value({"per_input": 1.0, **table}, "per_input", what)
         return Drive(self.face(table, what), (x / hypot(x, y), y / hypot(x, y)), across, per_input)

@@ -78,7 +78,7 @@ def register(
     start : ndarray of float, shape (k, 3)
         Initial estimate of x, y and rotation, accurate to about half a period of the finest texture.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
 
     Returns
     -------

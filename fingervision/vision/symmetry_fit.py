@@ -70,7 +70,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
     half_px : int
         Half width of the window.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
 
     Raises
     ------

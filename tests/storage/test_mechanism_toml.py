@@ -146,7 +146,7 @@ def test_the_command_answers_a_mechanism(tmp_path: Path) -> None:
 
 def test_a_loop_has_no_stiffness_matrix_and_says_so(tmp_path: Path) -> None:
     arguments = [str(DRAWN / "four_bar_gripper.toml"), "--kind", "stiffness_matrix", "--out", str(tmp_path / "o")]
-    with pytest.raises(ModelError, match="that of a chain, but the flexures of four-bar gripper, one jaw form"):
+    with pytest.raises(ModelError, match="the flexures of four-bar gripper, one jaw form a loop"):
         CliRunner().invoke(command, arguments, catch_exceptions=False)
     assert not (tmp_path / "o").exists()
 
@@ -176,7 +176,7 @@ WRONG_TEMPLATES = [
     ("hinge1.thickness_mm", "hinge1.height_mm", "thickness_mm and radius_mm"),
     ("= 0.9", "= -0.9", "must be positive, but is -0.9"),
     ("= 0.9", "= nan", "must be a number"),
-    ("= 0.9", '= "thin"', "arithmetic with names"),
+    ("= 0.9", '= "thin"', "arithmetic expression with names"),
     ("= 0.9", "= 9.0", "neck"),
     ("l2_mm = 18.0", "l3_mm = 18.0", "the same in both halves"),
     ("[gripper.left]", "[gripper.middle]", "unknown key, middle"),
