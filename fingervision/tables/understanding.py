@@ -13,6 +13,7 @@ from fingervision.tables.cells import to_numbers
 from fingervision.tables.column_choice import DIMENSION, NEEDED, Findings, choose
 from fingervision.tables.column_names import ColumnName, column_name
 from fingervision.tables.doubts import doubts
+from fingervision.tables.long_table import refuse_long_table
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable
@@ -116,6 +117,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     DataError
         What the user has decided does not fit the table.
     """
+    refuse_long_table(raw)
     about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))
     names = [column_name(column.name) for column in raw.columns]
     chosen = choose(raw, names, kind, given, about)

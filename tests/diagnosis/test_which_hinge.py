@@ -11,12 +11,13 @@ from click.testing import CliRunner
 
 from fingervision.cli.diagnose import command
 from fingervision.diagnosis.bodies.body_prediction import slip_mm
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.place_answers import PlaceAnswers, PlaceChanges
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.mechanism_toml import mechanism_from_tables
+from fingervision.tables.read import read_measured_table as read_any_table
 from fingervision.tables.read import read_model
 from tests.diagnosis.lever_drawing import TABLES, changed, write_toml
 
@@ -124,6 +125,18 @@ def test_channels_are_read_and_a_column_of_words_is_left_out(tmp_path: Path) -> 
     assert set(table.channels) == set(POSES)
     assert table.channels["finger.x_mm"].u == pytest.approx(U_MM)
     assert any("note_mm" in note for note in table.notes)
+
+
+def test_poses_and_gauges_row_by_row_are_refused_with_what_to_give(tmp_path: Path) -> None:
+    rows = "".join(f"{k},{0.1 * k},finger,ok,0,0,0\n" for k in range(30))
+    for header, name in (
+        ("frame,time_s,body,status,x_mm,y_mm,angle_mrad", "bodies.csv"),
+        ("frame,time_s,gauge,quantity,value,u,unit", "gauges.csv"),
+    ):
+        path = tmp_path / "table.csv"
+        path.write_text(f"{header}\n{rows}")
+        with pytest.raises(DataError, match=rf"{name}.*gaps\.csv"):
+            read_any_table(path)
 
 
 def check_sketch(page: str, slopes: dict[str, float]) -> None:
