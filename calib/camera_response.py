@@ -161,10 +161,10 @@ STUDIO = {"srgb": (8, 16, 235), "bt709": (8, 16, 235), "hlg": (10, 64, 940), "pq
 
 
 def _studio(name: str) -> Callable[[Floats], Floats]:
-    """Transfer curve of a studio-range signal, whose black and white lie within the stored levels.
+    """Transfer curve of a video with studio range, whose black and white lie within the range of stored levels.
 
-    Below black the curve continues antisymmetrically, above white by its own formula: levels there occur as overshoot
-    of a filter, and as noise.
+    Below black the curve continues antisymmetrically, above white by its own formula, because filters and noise cause
+    such levels.
     """
     curve = CURVES[name]
     bits, black, white = STUDIO[name]
@@ -190,8 +190,8 @@ CURVES |= {f"{name}_studio": _studio(name) for name in STUDIO}
 def standard_response(name: str) -> CameraResponse:
     """Return a standard response by its name: linear, srgb, bt709, or (high dynamic range) hlg or pq.
 
-    With `_studio` appended the levels are those of a studio-range video. Light is stated relative to the lowest and the
-    highest level: an edge does not depend on either.
+    With `_studio` appended to the name, the levels are those of a video with studio range. Light is stated relative to
+    the lowest and the highest level, because the position of an edge depends on neither.
     """
     if name not in CURVES:
         raise CalibrationError(f"A standard camera response must be one of {', '.join(CURVES)}, but is {name}.")

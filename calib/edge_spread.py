@@ -68,7 +68,7 @@ class EdgeRows:
     x_px : ndarray
         Column at which the edge crosses the middle of the row.
     u_x_px : ndarray
-        Standard uncertainty from the noise common to all rows.
+        Standard uncertainty from the noise that all rows share.
     contrast : ndarray
         Step in grey levels; positive if it has the expected sign.
     unexplained : ndarray

@@ -1,4 +1,4 @@
-"""Search for the lines of a line scale (stage micrometer): their direction, their rows, and each line to a pixel."""
+"""Search for the lines of a line scale (stage micrometer): their direction, their rows, and rough positions."""
 
 from dataclasses import dataclass
 
@@ -135,7 +135,7 @@ def _rows(upright: Floats, slope: float) -> tuple[int, int]:
 
 
 def _found(upright: Floats, slope: float, rows: tuple[int, int], is_turned: bool) -> CoarseLines:
-    """Lines of the mean profile, without those that the border cuts and without marks of another width."""
+    """Lines of the mean profile, without lines that the picture's border cuts and without marks of another width."""
     profile = _profile(upright, slope, rows)
     # Columns that the slanted rows do not all reach are left out at both sides alike.
     first = (upright.shape[1] - profile.size) // 2

@@ -121,8 +121,8 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
         )
     if u_exponent > LARGEST_U:
         raise CalibrationError(
-            f"The edges must tell the exponent to {LARGEST_U:g}, but tell {exponent:.2f} to +-{u_exponent:.2f} only: "
-            "take more of them, with more contrast, or an exposure series."
+            f"The edges must determine the exponent to within {LARGEST_U:g}, but give {exponent:.2f} to "
+            f"+-{u_exponent:.2f} only: take more of them, with more contrast, or an exposure series."
         )
     levels = np.concatenate([profile.level for profile in profiles])
     curve = curve_of(exponent, np.zeros(KNOTS), top_level, name)

@@ -79,7 +79,7 @@ def scale_from_lines(
     u_line_mm : float
         Standard uncertainty of each line's position, independent between lines.
     u_length_mm : float
-        Standard uncertainty of the length between the first and the last line used, common to all lines.
+        Standard uncertainty of the length between the first and the last line used, the same for all lines.
     frame_size_px : tuple of int
         Width and height of the picture.
     limits, stated

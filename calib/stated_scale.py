@@ -1,4 +1,4 @@
-"""A scale with its standard uncertainty, as stated by the user: read from a ruler, or taken from a data sheet."""
+"""A scale with its standard uncertainty as stated by the user, such as from a ruler or a data sheet."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -17,8 +17,8 @@ STATED = "scale, as stated"
 class StatedScale(BareScale):
     """A scale stated by the user together with its standard uncertainty.
 
-    Until the size of the frames is known it serves as a scale without uncertainty; `for_frames` gives the calibration
-    by which distances get their full uncertainty.
+    Until the size of the frames is known, the object serves as a scale without uncertainty; `for_frames` then gives the
+    calibration by which distances get their full uncertainty.
 
     Parameters
     ----------
@@ -46,10 +46,10 @@ class StatedScale(BareScale):
             )
 
     def for_frames(self, frame_size_px: tuple[int, int]) -> Calibration:
-        """Return the calibration that the stated values amount to.
+        """Return the calibration that corresponds to the stated values.
 
-        The stated uncertainty is one cause of it. As with a single reference object, the edge bias is unknown, and the
-        set-up's imperfections have their default limits (`calib.limits.Limits`).
+        The stated uncertainty is one contribution to its budget. As with a single reference object, the edge bias is
+        unknown, and the set-up's imperfections have their default limits (`calib.limits.Limits`).
 
         Parameters
         ----------

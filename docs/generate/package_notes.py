@@ -26,11 +26,9 @@ def note(name: str) -> str:
 
 
 def _below_one_title(text: str) -> str:
-    """Lower all headings by a level if the text has further titles, because a page has one; code is left alone."""
-    parts = re.split(r"(```.*?```)", text, flags=re.DOTALL)
-    if not any(re.search(r"^# ", part, re.MULTILINE) for part in parts[::2]):
-        return text
-    parts[::2] = [re.sub(r"^(#+ )", r"#\1", part, flags=re.MULTILINE) for part in parts[::2]]
+    """Turn further titles of a README into headings of the second level, because a page has one title."""
+    parts = re.split(r"(```.*?```)", text, flags=re.DOTALL)  # code stands at the odd places, and stays
+    parts[::2] = [re.sub(r"^# ", "## ", part, flags=re.MULTILINE) for part in parts[::2]]
     return "".join(parts)
 
 

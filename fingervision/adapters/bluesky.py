@@ -152,7 +152,7 @@ class StageDevice:
         if not limits.lower_mm <= float(to_mm) <= limits.upper_mm:
             raise LimitError(
                 f"{self.name} must stay between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but {float(to_mm):g} "
-                "mm is asked for: nothing was moved."
+                "mm is requested: nothing was moved."
             )
 
     def _until_rest(self) -> None:

@@ -216,7 +216,7 @@ def _check_folder(job: Job) -> None:
         raise OutputError(f"The folder {job.out} cannot be read ({error.strerror}): name another.") from error
     if entries and MARK not in entries:
         raise OutputError(
-            f"--out must be a new folder or one of an earlier batch, but {job.out} holds something else "
+            f"--out must be a new folder or that of an earlier batch, but {job.out} contains other files "
             f"({min(entries)}): name another."
         )
     if entries and (command := _command_of(job.out / MARK)) != job.command:

@@ -99,7 +99,7 @@ def main() -> None:
 
 
 def _printable(words: str) -> str:
-    """Escape control characters except line ends: a file's name may hold those that a terminal obeys."""
+    """Escape control characters except line ends, because a file's name may contain ones that a terminal obeys."""
     return "".join(
         each if each == "\n" or unicodedata.category(each) != "Cc" else each.encode("unicode_escape").decode()
         for each in words

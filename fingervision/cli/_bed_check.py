@@ -66,10 +66,10 @@ def command(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
         )
         speed = "any speed" if limits.speed_mm_s == float("inf") else f"{limits.speed_mm_s:g} mm/s"
         click.echo(
-            f"the bed's limits: {limits.lower_mm:g} to {limits.upper_mm:g} mm, {speed}, {limits.force_n:g} N, gap at "
-            f"least {limits.gap_mm:g} mm"
+            f"limits of the test bed: {limits.lower_mm:g} to {limits.upper_mm:g} mm, {speed}, {limits.force_n:g} N, "
+            f"gap at least {limits.gap_mm:g} mm"
         )
     if done.refusals:
         raise LimitError("\n".join(done.refusals))
     if not as_json:
-        click.echo("The recipe fits the bed.")
+        click.echo("The test bed can execute the recipe.")

@@ -8,14 +8,18 @@ EXAMPLES = """
 \b
 Examples:
   fingervision bed jog 0.5 --for-s 1
-  fingervision bed jog -2 --bed lab.toml      until Ctrl-C, or the bed's limit
+  fingervision bed jog -2 --bed lab.toml      until Ctrl-C, or the test bed's limit
 """
 
 
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("speed_mm_s", type=float)
 @click.option("--for-s", type=click.FloatRange(0.0, min_open=True), help="Stop after this many seconds.")
-@click.option("--home-first", is_flag=True, help="First go to the reference: step data need a known start.")
+@click.option(
+    "--home-first",
+    is_flag=True,
+    help="First search the reference position; relative step data need a known start position.",
+)
 @bed_option
 def command(speed_mm_s: float, for_s: float | None, home_first: bool, bed_name: str) -> None:
     """Move the stage at SPEED_MM_S (mm/s) until stopped.

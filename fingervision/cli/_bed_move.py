@@ -19,8 +19,12 @@ relative steps, none of them faster than requested. Ctrl-C first stops the motor
 
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("to_mm", type=float)
-@click.option("--speed-mm-s", type=float, default=1.0, show_default=True, help="Speed of the stage.")
-@click.option("--home-first", is_flag=True, help="First go to the reference: step data need a known start.")
+@click.option("--speed-mm-s", type=float, default=1.0, show_default=True, help="Speed of the stage in mm/s.")
+@click.option(
+    "--home-first",
+    is_flag=True,
+    help="First search the reference position; relative step data need a known start position.",
+)
 @bed_option
 def command(to_mm: float, speed_mm_s: float, home_first: bool, bed_name: str) -> None:
     """Move the stage to the position TO_MM; positive positions open the gripper.

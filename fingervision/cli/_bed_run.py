@@ -32,7 +32,9 @@ resumes a run, q and Enter or Ctrl-C ends it; the motor is stopped first.
 @bed_option
 @hide_option
 @effects_option
-@click.option("--out", type=click.Path(path_type=Path), default=Path("run"), show_default=True, help="Folder to write.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), default=Path("run"), show_default=True, help="Folder for the results."
+)
 @click.option(
     "--after",
     type=click.Path(path_type=Path),

@@ -19,7 +19,7 @@ LIMITS = (
         "--lens-relative",
         "lens_relative",
         0.001,
-        "Largest residual lens distortion, +-, as a fraction of the radius at the corner.",
+        "Largest residual lens distortion, +-, as a fraction of the distance from centre to corner.",
     ),
     (
         "--edge-bias-px",
@@ -27,7 +27,7 @@ LIMITS = (
         0.6,
         "Largest edge bias (both edges together) if no reference determines it, +- px.",
     ),
-    ("--estimator-px", "estimator_px", 0.02, "Largest phase bias of each edge, +- px."),
+    ("--estimator-px", "estimator_px", 0.02, "Largest sub-pixel phase bias of the fit of each edge, +- px."),
     (
         "--temperature-k",
         "temperature_k",

@@ -20,7 +20,7 @@ def choices_of(
 ) -> "Choices":
     """Read scale, measuring height, direction of the tips, and region of interest from the options.
 
-    `stated` contains the values of --px-per-mm and --u-px-per-mm.
+    The argument `stated` contains the values of --px-per-mm and --u-px-per-mm.
 
     Raises
     ------

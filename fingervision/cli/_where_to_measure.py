@@ -36,31 +36,33 @@ OPTIONS = (
         help="Settings file, as saved by the browser page; options on the command line override it.",
     ),
     click.option(
-        "--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale with its uncertainty."
+        "--calibration",
+        type=click.Path(path_type=Path),
+        help="File calibration.json with the scale and its uncertainty.",
     ),
     click.option(
         "--px-per-mm",
         type=float,
-        help="The scale as you state it; without --u-px-per-mm, uncertainties have only the random part.",
+        help="Scale in pixels per mm; without --u-px-per-mm, only the random part of the uncertainty is given.",
     ),
     click.option(
         "--u-px-per-mm",
         type=float,
-        help="Standard uncertainty of --px-per-mm, for instance of a ruler's reading; u_gap_mm then holds it.",
+        help="Standard uncertainty of --px-per-mm in pixels per mm, such as of a ruler; u_gap_mm then includes it.",
     ),
     click.option(
         "--below-tip-mm",
         type=float,
         default=0.3,
         show_default=True,
-        help="How far below each finger's tip the gap is measured.",
+        help="Distance (mm) below each finger's tip at which the gap is measured.",
     ),
     click.option(
         "--tips",
         type=click.Choice(["auto", "up", "down", "left", "right"]),
         default="auto",
         show_default=True,
-        help="Where the fingers point in the picture.",
+        help="Direction in which the fingertips point in the picture.",
     ),
     click.option(
         "--roi", metavar="X,Y,W,H", help="Region of interest: first column, first row, width, height in pixels."

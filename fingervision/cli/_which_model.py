@@ -44,5 +44,5 @@ kind_option = click.option(
     type=KindChoice(),
     default="lumped",
     show_default=True,
-    help="Kind of model that computes a gripper.toml.",
+    help="Kind of model by which a gripper.toml is computed.",
 )

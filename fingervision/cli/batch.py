@@ -69,11 +69,15 @@ def _batch_of(name: str) -> click.Command:
         params=[
             click.Argument(["inputs"], nargs=-1, required=True, metavar="INPUT..."),
             *options,
-            click.Option(["--scheduler"], metavar="tcp://HOST:PORT", help="Work on this Dask cluster."),
+            click.Option(
+                ["--scheduler"],
+                metavar="tcp://HOST:PORT",
+                help="Address of a Dask cluster whose workers process the inputs.",
+            ),
             click.Option(
                 ["--jobs"],
                 type=click.IntRange(min=1),
-                help="Number of processes on this machine; default: one per core.",
+                help="Number of processes on this computer; default: one per core.",
             ),
             click.Option(["--out"], type=click.Path(path_type=Path), required=True, help="Folder for all results."),
             click.Option(["--json", "as_json"], is_flag=True, help="Print the result of every input as JSON."),

@@ -78,7 +78,7 @@ def _output_options(command: Command) -> Command:
                 default="auto",
                 show_default=True,
                 metavar="auto|linear|srgb|bt709|FILE",
-                help="Camera response, from grey level to light; auto: as the pictures are tagged, else linear.",
+                help="Camera response (light for each grey level); auto: the pictures' own tag, else linear.",
             ),
             click.option(
                 "--camera",
@@ -87,7 +87,7 @@ def _output_options(command: Command) -> Command:
                 help="A camera setting to record in the calibration; repeatable.",
             ),
             click.option("--no-picture", is_flag=True, help="Write no calibration picture."),
-            click.option("--json", "as_json", is_flag=True, help="Print the result for programs."),
+            click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
         )
     ):
         command = option(command)
@@ -182,7 +182,9 @@ def charuco(**options: Any) -> None:
 @command.command("scale", epilog=SCALE_EXAMPLES)
 @click.argument("image", type=click.Path(path_type=Path))
 @click.option("--pitch-mm", type=float, required=True, help="Certified distance of neighbouring lines, mm.")
-@click.option("--u-line-mm", default=0.0003, show_default=True, help="Standard uncertainty of every line's place, mm.")
+@click.option(
+    "--u-line-mm", default=0.0003, show_default=True, help="Standard uncertainty of every line's position, mm."
+)
 @click.option(
     "--u-length-mm", default=0.001, show_default=True, help="Standard uncertainty of the length over all lines, mm."
 )
@@ -201,15 +203,19 @@ def scale(**options: Any) -> None:
 
 @command.command("response", epilog=RESPONSE_EXAMPLES)
 @click.argument("items", nargs=-1, required=True, metavar="IMAGE[=EXPOSURE]...")
-@click.option("--edges", is_flag=True, help="Use pictures of sharp, unclipped, straight, plain edges instead.")
+@click.option(
+    "--edges",
+    is_flag=True,
+    help="Estimate the response from pictures of sharp, straight, plain edges that are not clipped.",
+)
 @click.option(
     "--densities",
     metavar="A:B:STEP|A,B,...",
-    help="Use one picture of a grey wedge instead; optical densities of its fields, lightest first.",
+    help="Measure the response on one picture of a grey wedge with these optical densities, lightest first.",
 )
 @click.option("--roi", metavar="X,Y,W,H", help="With --densities: region of the wedge's fields.")
 @click.option("-o", "--out", default="response.csv", type=click.Path(path_type=Path), show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def response(**options: Any) -> None:
     """Measure the camera's response (light for each grey level), best from a still scene at several exposures.
 
@@ -228,7 +234,7 @@ def response(**options: Any) -> None:
 @command.command("check", epilog=CHECK_EXAMPLES)
 @click.argument("calibration", type=click.Path(path_type=Path))
 @_size_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
     """Measure an object of known size with an existing calibration and say whether both agree (E_n number)."""
     with sentences():
@@ -266,7 +272,7 @@ def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | 
 @click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=click.Path(path_type=Path))
 @click.option("--tolerance-mm", type=float, default=None, help="Full width of the tolerance, for %GRR.")
 @click.option("--by-input", is_flag=True, help="Treat every input_mm of the drive as a separate part of the study.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, as_json: bool) -> None:
     """Gauge repeatability and reproducibility over repeated recordings (AIAG, analysis of variance).
 

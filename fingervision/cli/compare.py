@@ -27,7 +27,13 @@ Files written to --out:
 @click.command(epilog=EXAMPLES)
 @click.argument("measured", type=click.Path(path_type=Path))
 @models_option
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("comparison"),
+    show_default=True,
+    help="Folder for the results.",
+)
 @click.option(
     "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the bootstrap for the threshold."
 )

@@ -22,7 +22,7 @@ Examples:
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True,
               help="Seed of all randomness; without --hide, it also chooses the hidden effect.")  # fmt: skip
 @click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("demo"), show_default=True, help="Folder to write."
+    "--out", type=click.Path(path_type=Path), default=Path("demo"), show_default=True, help="Folder for the results."
 )
 def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
     """Add an effect to the simulated test bed, run a recipe, measure its video, and identify the added effect.

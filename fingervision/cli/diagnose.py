@@ -28,7 +28,13 @@ Files written to --out:
 @click.command(epilog=EXAMPLES)
 @click.argument("measured", type=click.Path(path_type=Path))
 @model_option
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("diagnosis"), show_default=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("diagnosis"),
+    show_default=True,
+    help="Folder for the results.",
+)
 @click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Include this effect in every explanation.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Exclude this effect from every explanation.")
 @click.option(

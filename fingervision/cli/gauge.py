@@ -36,10 +36,12 @@ USUAL_GAUGES = Path("gauges.toml")
 )
 @click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for what the browser page measures.  [default: live]"
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder for the measurements that the browser page saves.  [default: live]",
 )
 @port_of_page
-@click.option("--no-browser", is_flag=True, help="Print the page's address, but open no browser.")
+@click.option("--no-browser", is_flag=True, help="Print the address of the browser page, but open no browser.")
 @where_to_measure
 def command(
     recording: str,

@@ -25,23 +25,33 @@ WITHOUT_SCALE_PX = 10.0
 @click.command(epilog=EXAMPLES)
 @click.argument("source")
 @where_to_measure
-@click.option("--seconds", type=float, default=5.0, show_default=True, help="Duration of the inspection, in seconds.")
+@click.option("--seconds", type=float, default=5.0, show_default=True, help="Duration of the inspection in seconds.")
 @click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
 @click.option(
     "--response",
     default="auto",
     show_default=True,
     metavar="auto|linear|srgb|bt709|FILE",
-    help="Camera response; auto: as in the calibration, else as the recording is tagged, else linear.",
+    help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
 )
-@click.option("--bits", type=click.IntRange(8, 16), help="True bit depth of levels stored in 16 bits, if not 16.")
-@click.option("--fingers", type=click.Choice(["auto", "dark", "light"]), default="auto", show_default=True)
+@click.option(
+    "--bits",
+    type=click.IntRange(8, 16),
+    help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
+)
+@click.option(
+    "--fingers",
+    type=click.Choice(["auto", "dark", "light"]),
+    default="auto",
+    show_default=True,
+    help="Whether the fingers are darker or lighter than the background.",
+)
 @click.option(
     "--picture",
     type=click.Path(path_type=Path),
     default="inspection.png",
     show_default=True,
-    help="Where the picture is written.",
+    help="File to which the picture of the inspection is written.",
 )
 @click.option("--no-picture", is_flag=True, help="Write no picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")

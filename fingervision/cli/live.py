@@ -27,7 +27,7 @@ Examples:
   fingervision live 0 --px-per-mm 34 --no-page --out runs   also records, from the first frame
 
 \b
-By default, only this machine can open the page, at the address that is printed (it contains a secret token).
+By default, only this computer can open the browser page, at the address that is printed (it contains a secret token).
 A recorded run is a folder in --out: video.mp4 (lossless, or the camera's own packets), gaps.csv,
 events.jsonl, run.json. `fingervision measure RUN/video.mp4` gives the same values again.
 
@@ -41,25 +41,31 @@ port_of_page = click.option(
     type=click.IntRange(0, 65535),
     default=USUAL_PORT,
     show_default=True,
-    help="Port of the page; 0: any free port.",
+    help="Network port of the browser page; 0: any free port.",
 )
 
 
 @click.command(epilog=EXAMPLES)
 @click.argument("source", required=False)
-@click.option("--list", "list_cameras", is_flag=True, help="List the cameras of this machine.")
+@click.option("--list", "list_cameras", is_flag=True, help="List the cameras of this computer.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for runs and snapshots.  [default: live]")
 @click.option("--as-camera", is_flag=True, help="Play a recording once in real time, as if it came from a camera.")
 @click.option("--no-page", is_flag=True, help="Open no browser page; print gap, status and rate in the terminal.")
 @click.option("--json", "as_json", is_flag=True, help="Print one line of JSON per frame, with the columns of gaps.csv.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Network address at which the page is served.")
+@click.option(
+    "--host", default="127.0.0.1", show_default=True, help="Network address at which the browser page is served."
+)
 @port_of_page
 @click.option(
     "--password-file",
     type=click.Path(path_type=Path),
-    help="Text file with the password of the page; required if other machines can reach it.",
+    help="Text file with the password of the browser page; required if other computers can reach it.",
 )
-@click.option("--tls-cert", type=click.Path(path_type=Path), help="Certificate (PEM): the page is served over TLS.")
+@click.option(
+    "--tls-cert",
+    type=click.Path(path_type=Path),
+    help="Certificate (PEM) with which the browser page is served over TLS.",
+)
 @click.option("--tls-key", type=click.Path(path_type=Path), help="Private key of the certificate (PEM).")
 @click.option("--size", metavar="WxH", help="Picture size to request from the camera.")
 @click.option("--rate-hz", type=float, help="Frames per second to request from the camera.")
@@ -69,10 +75,10 @@ port_of_page = click.option(
     metavar="FOUR",
     help="Pixel format to request, such as YUYV (raw) or MJPG.  [default: raw]",
 )
-@click.option("--exposure-ms", type=float, help="Exposure time.")
-@click.option("--gain", type=float, help="Amplification, in the camera's own units.")
-@click.option("--focus", type=float, help="Focus, in the camera's own units.")
-@click.option("--white-balance-k", type=float, help="Colour temperature of the white balance.")
+@click.option("--exposure-ms", type=float, help="Exposure time to request, in ms.")
+@click.option("--gain", type=float, help="Gain (amplification) to request, in the camera's own units.")
+@click.option("--focus", type=float, help="Focus to request, in the camera's own units.")
+@click.option("--white-balance-k", type=float, help="Colour temperature of the white balance to request, in kelvin.")
 @click.option(
     "--model",
     "model_path",
@@ -84,29 +90,39 @@ port_of_page = click.option(
     type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
     default="lumped",
     show_default=True,
-    help="Kind of model that computes a gripper.toml.",
+    help="Kind of model by which a gripper.toml is computed.",
 )
 @click.option(
-    "--drive", type=click.Path(path_type=Path), help="Log of the stage, in the time of this view or recording."
+    "--drive",
+    type=click.Path(path_type=Path),
+    help="Log of the stage (drive.csv) on the clock of this live view or recording.",
 )
 @click.option(
     "--drive-offset-s",
     type=float,
-    help="Clock offset, added to the drive's times; for a recording, it is determined if not given.",
+    help="Clock offset in seconds, added to the drive's times; determined for a recording if not given.",
 )
 @click.option(
     "--gauges",
     type=click.Path(path_type=Path),
-    help="File of user-defined gauges, which the page shows, measures and edits; it need not exist.",
+    help="File of user-defined gauges, which the browser page shows, measures and edits; it need not exist.",
 )
-@click.option("--bed", "bed_name", metavar="simulated|CONFIG.toml", help="Show this test bed through its camera.")
 @click.option(
-    "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]", help="Hide an effect in a simulated test bed."
+    "--bed",
+    "bed_name",
+    metavar="simulated|CONFIG.toml",
+    help="Test bed whose camera is the source: the word simulated, or its configuration file.",
+)
+@click.option(
+    "--hide",
+    multiple=True,
+    metavar="EFFECT[:PARAMETER=VALUE,...]",
+    help="Add an effect to the simulated test bed, untold to the measurement.",
 )
 @click.option(
     "--allow-motion",
     is_flag=True,
-    help="Let the page move the stage of the test bed; otherwise the page can only show and stop it.",
+    help="Allow the browser page to move the test bed's stage; otherwise it can only show and stop it.",
 )
 @where_to_measure
 def command(

@@ -56,16 +56,20 @@ Exit codes: 0 done; 1 failed, or no frame has a gap; 2 wrong usage;
 @click.option(
     "--drive-offset-s",
     type=float,
-    help="Clock offset, added to the drive's times; determined from the motion if not given.",
+    help="Clock offset in seconds, added to the drive's times; determined from the motion if not given.",
 )
 @click.option(
     "--response",
     default="auto",
     show_default=True,
     metavar="auto|linear|srgb|bt709|FILE",
-    help="Camera response; auto: as in the calibration, else as the recording is tagged, else linear.",
+    help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
 )
-@click.option("--bits", type=click.IntRange(8, 16), help="True bit depth of levels stored in 16 bits, if not 16.")
+@click.option(
+    "--bits",
+    type=click.IntRange(8, 16),
+    help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
+)
 @click.option(
     "--fingers",
     type=click.Choice(["auto", "dark", "light"]),
@@ -168,15 +172,19 @@ def command(
         frames=_frames(frames),
         gauges=gauges,
     )
+    follow = None
+    if mechanism is not None:
+        from fingervision.cli._measure_bodies import body_follower
+
+        # What is wrong with the drawing or its points is said before the recording is measured.
+        follow = body_follower(mechanism, points)
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)
     _report(measured, as_json)
-    if mechanism is not None:
-        from fingervision.cli._measure_bodies import follow_bodies
+    if follow is not None:
         from fingervision.frames.source import Wish, open_source
 
-        source = open_source(recording, Wish(rate_hz=rate_hz))
-        follow_bodies(source, mechanism, points, task, measured.folder.path, as_json)
+        follow(open_source(recording, Wish(rate_hz=rate_hz)), task, measured.folder.path, as_json)
     raise SystemExit(int(measured.exit_code))
 
 

@@ -40,30 +40,58 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
-@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Kind of model.")
-@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs over time.")
+@click.option(
+    "--kind",
+    type=KindChoice("all"),
+    default="all",
+    show_default=True,
+    help="Kind of model by which the drawing is computed.",
+)
+@click.option(
+    "--drive",
+    type=click.Path(path_type=Path),
+    help="Log of the stage (drive.csv or another table), for which the response over time is computed.",
+)
 @columns_option
 @click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder to write."
+    "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder for the results."
 )
 @click.option("--hinge", type=click.Choice(["corrected", "beam"]), default="corrected", show_default=True,
               help="Hinge compliance: beam theory corrected by finite elements, or beam theory alone.")  # fmt: skip
-@click.option("--large-rotation", is_flag=True, help="Equilibrium in the deformed shape (not for stiffness_matrix).")
-@click.option("--contact", is_flag=True, help="Fingers touch and stop (not for stiffness_matrix).")
-@click.option("--modes", metavar="N|F", help="Write and draw N natural modes of each family, or all up to a frequency "
-              "such as 500Hz.")  # fmt: skip
-@click.option("--film", is_flag=True, help="With --modes: the modes in motion too, modes.mp4.")
-@click.option("--frequency", metavar="A:B", help="Response to a drive that shakes it at A to B Hz: frequency.csv and "
-              "frequency.png.")  # fmt: skip
-@click.option("--damping", default="modal:0.025", show_default=True, metavar="LAW", help="In motion: modal:RATIO, "
-              "loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 above the lowest mode).")  # fmt: skip
-@click.option("--rate-hz", type=float, help="Rows a second of response.csv, beside the drive's own samples.")
-@click.option("--object-mm", type=float, help="Width of a part between the fingers, or the probes of a pair: "
-              "grip.csv and grip.png.")  # fmt: skip
-@click.option("--object-n-mm", type=float, help="Stiffness of that part in N/mm; rigid where left out.")
-@click.option("--mesh", is_flag=True, help="Draw the mesh of the finite elements to mesh.png.")
-@click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Table over one number of the drawing, N values from "
-              "A to B; several make a grid. Writes vary.csv and vary.png, by the lumped model.")  # fmt: skip
+@click.option(
+    "--large-rotation", is_flag=True, help="Compute the equilibrium in the deformed shape (not with stiffness_matrix)."
+)
+@click.option(
+    "--contact", is_flag=True, help="Stop the fingers where they touch each other (not with stiffness_matrix)."
+)
+@click.option("--modes", metavar="N|F", help="Compute and plot N natural modes of each family, or all up to a "
+              "frequency such as 500Hz.")  # fmt: skip
+@click.option("--film", is_flag=True, help="With --modes: also write modes.mp4, a film of the mode shapes.")
+@click.option(
+    "--frequency",
+    metavar="A:B",
+    help="Compute the response to a drive that vibrates at A to B Hz: frequency.csv and frequency.png.",
+)
+@click.option(
+    "--damping",
+    default="modal:0.025",
+    show_default=True,
+    metavar="LAW",
+    help="Damping law of vibrations: modal:RATIO, loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 of "
+    "Hricko and Havlik, 2015, above the lowest mode).",
+)
+@click.option("--rate-hz", type=float, help="Rows per second of response.csv, in addition to the drive's own samples.")
+@click.option(
+    "--object-mm",
+    type=float,
+    help="Width (mm) of a part to grip between the fingers or a pair of probes: grip.csv and grip.png.",
+)
+@click.option(
+    "--object-n-mm", type=float, help="With --object-mm: stiffness of the part in N/mm; a rigid part if not given."
+)
+@click.option("--mesh", is_flag=True, help="Write a picture of the finite-element mesh, mesh.png.")
+@click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Vary one number of the drawing over N values from "
+              "A to B (repeatable: a grid); write vary.csv and vary.png, computed by the lumped model.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
 def command(
     gripper_toml: Path,

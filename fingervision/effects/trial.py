@@ -84,7 +84,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
             )
     for word in ("words", "formula", "source", "residual"):
         if not isinstance(getattr(effect, word), str) or not getattr(effect, word):
-            raise MisfitError(f"must state its {word} in half a sentence, but does not")
+            raise MisfitError(f"must state its {word} in a few words, but does not")
     history = trial_history()
     searched = effect.search(history)
     if isinstance(searched, str):

@@ -91,7 +91,7 @@ def check_value(controls: tuple[CameraControl, ...], name: str, value: float) ->
     control = next((each for each in controls if each.name == name), None)
     if control is None:
         there = ", ".join(each.name for each in controls) or "nothing"
-        raise UsageError(f"The camera lets {there} be set while it runs, but {name[:40]!r} was asked.")
+        raise UsageError(f"The camera lets {there} be changed while it runs, but {name[:40]!r} was requested.")
     least, greatest = control.least, control.greatest
     is_known = name in (EXPOSURE, FRAME_RATE)
     if not isfinite(value) or (is_known and value <= 0.0):

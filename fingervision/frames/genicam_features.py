@@ -1,7 +1,7 @@
-"""Features of a GenICam camera: those requested at the start, those stated, and those that may be changed later.
+"""Features of a GenICam camera: those requested at the start, those stated, and those that may change later.
 
-Names are those of the Standard Features Naming Convention (EMVA). Each producer has exception classes of its own, so
-every exception is caught.
+The names of the features are those of the Standard Features Naming Convention (EMVA). Each GenTL producer has exception
+classes of its own, so that every exception is caught.
 """
 
 from collections.abc import Mapping
@@ -104,5 +104,5 @@ def _choices(nodes: Any, node: str) -> tuple[str, ...]:
 
 
 def error_words(error: Exception) -> str:
-    """Return class and message of an error on one line, without the full stop at its end."""
+    """Return class and message of an error in one line, without the final full stop."""
     return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". :")

@@ -8,9 +8,9 @@ import av
 def open_container(path: str | Path) -> av.container.InputContainer:
     """Open a media file for reading.
 
-    FFmpeg takes what precedes a colon in a name for a protocol, so that the name follows `file:` (`12:30:05.mp4` is a
-    file). Metadata that are not valid UTF-8, as a damaged byte in a title leaves them, are read with the replacement
-    character, since no picture depends on them.
+    FFmpeg interprets text before a colon in a name as a protocol; the name is therefore given after `file:`, so that
+    `12:30:05.mp4` is read as a file. Metadata that are not valid UTF-8, such as a title with a damaged byte, are read
+    with the replacement character, because no picture depends on them.
 
     Parameters
     ----------

@@ -52,9 +52,9 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
 
 
 def _of_video(codec: av.VideoCodecContext) -> str | None:
-    """Curve that a video states, with `_studio` where it states that black and white lie within the stored levels.
+    """Transfer curve that a video states, with `_studio` appended if black and white lie within the stored levels.
 
-    A range is stored with luma only; a video that states none is taken as full range.
+    Only luma is stored with such a range; a video that states no range is assumed to use the full range.
     """
     name = VIDEO_TAGS.get(int(codec.color_trc))
     is_luma = (codec.pix_fmt or "").startswith(LUMA_FORMATS)

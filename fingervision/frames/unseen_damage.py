@@ -1,10 +1,10 @@
-"""Look for damage in a whole file before its first frame is given, for codecs that show damage only here and there.
+"""Look for damage in a whole file before its first frame is returned, for codecs that notice only some damage.
 
-The arithmetic decoders of VP8 and VP9 give a picture for any bytes, and notice damage only where it makes them read
-past the end of a packet. Damage that they notice in one packet is therefore evidence of damage in others that they do
-not notice: of drawn files with 1 to 20 faults, those in which any was noticed held two thirds of the pictures that
-looked sound and were wrong (`tests/benchmarks/damaged_files.py`). Without a checksum in the file, none of its frames
-can be told to be sound. Files with checksums are judged cluster by cluster instead (`matroska_checksums`).
+The arithmetic decoders of VP8 and VP9 give a picture for any bytes, and notice damage only if it makes them read past
+the end of a packet. Damage that they notice in one packet is therefore evidence of unnoticed damage in other packets:
+of simulated files with 1 to 20 faults, those in which any fault was noticed contained two thirds of the wrong pictures
+that looked undamaged (`tests/benchmarks/damaged_files.py`). If such a file has no checksum, none of its frames can be
+trusted. Files with checksums are not judged in this way, but cluster by cluster (`matroska_checksums`).
 
 Missing whole pictures, a missing end, and packets before the first key frame are not evidence of damaged bytes.
 """

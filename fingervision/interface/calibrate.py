@@ -75,7 +75,7 @@ def calibrate(
     camera : mapping of str to str, or None
         Settings of the camera, to be compared with a recording's.
     plane_mm, camera_distance_mm, tilt_deg, lens_relative, edge_bias_px, estimator_px, temperature_k, expansion_per_k
-        Limits of the bench, for the budget; None takes the default of `calib.Limits`.
+        Limits of the set-up, for the budget; None takes the default of `calib.Limits`.
 
     Returns
     -------

@@ -75,12 +75,12 @@ def measure(
     calibration : path, Calibration or None
         The scale with its uncertainty; one of `calibration` and `px_per_mm` is required.
     px_per_mm : float or None
-        The scale as stated; without `u_px_per_mm`, uncertainties have only the random part.
+        Scale in pixels per mm; without `u_px_per_mm`, only the random part of the uncertainty is given.
     u_px_per_mm : float or None
-        Standard uncertainty of `px_per_mm`, for instance of a ruler's reading; `u_gap_mm` then holds it, an unknown
-        edge bias, and the default limits of the set-up.
+        Standard uncertainty of `px_per_mm` in pixels per mm, such as that of a ruler; `u_gap_mm` then includes this
+        uncertainty, an unknown edge bias, and the default limits of the set-up.
     below_tip_mm : float
-        How far below each finger's tip the gap is measured.
+        Distance (mm) below each finger's tip at which the gap is measured.
     tips : str
         Where the fingers point in the picture: auto, up, down, left or right.
     roi : (int, int, int, int) or None

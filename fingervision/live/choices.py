@@ -77,7 +77,7 @@ class Choices:
         )
 
     def for_frames(self, description: Description) -> "Choices":
-        """Refuse settings that are impossible for these frames; complete the scale by their size.
+        """Refuse settings that are impossible for frames of this size; complete the scale by the frames' size.
 
         Raises
         ------

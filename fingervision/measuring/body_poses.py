@@ -151,7 +151,7 @@ class BodyTracker:
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
-                f"The edges of {self.mechanism.name} must be visible where it was placed on frame {index}, "
+                f"The edges of {self.mechanism.name} must be visible where the drawing was placed on frame {index}, "
                 "but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )

@@ -121,8 +121,8 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
     scale = float(np.sqrt(np.sum(here**2))) / size
     if abs(scale / px_per_mm - 1.0) > OTHER_SCALE:
         raise UsageError(
-            f"The points of --at must be as far apart as the scale of {px_per_mm:g} px/mm says, but they say "
-            f"{scale:.4g} px/mm: check the points, the drawing's lengths and the calibration."
+            f"The distances between the points of --at must agree with the scale of {px_per_mm:g} px/mm, but "
+            f"correspond to {scale:.4g} px/mm: check the points, the drawing's lengths and the calibration."
         )
     found = []
     for is_mirrored in (False, True) if len(points) > 2 else (False,):

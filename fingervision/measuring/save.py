@@ -65,7 +65,9 @@ def save_measured(
         if steps_frame is not None:
             wanted = next((item for item in again if item.index == steps_frame), None)
             if not isinstance(wanted, Frame):
-                raise UsageError(f"--steps must be a frame that can be read, but {steps_frame} cannot.")
+                raise UsageError(
+                    f"--steps must be the number of a frame that can be read, but frame {steps_frame} cannot."
+                )
             write_steps(wanted, found.how.settings, folder.steps)
         draw_gap(folder.figure, series, task.drive, clock_drawn(found.clock, task))
         write_summary(folder.summary, found.summary)

@@ -32,7 +32,7 @@ def check_px_per_mm(px_per_mm: float) -> None:
 
 
 def stated_scale(px_per_mm: float, u_px_per_mm: float | None = None) -> BareScale:
-    """Return a scale that the user states, with its standard uncertainty if that is stated too.
+    """Return a scale that the user states, with its standard uncertainty if this is stated too.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def stated_scale(px_per_mm: float, u_px_per_mm: float | None = None) -> BareScal
 
 
 def check_one_scale(calibration: object, px_per_mm: object, u_px_per_mm: object) -> None:
-    """Refuse two scales at once, and an uncertainty without its scale.
+    """Refuse two scales at once, and an uncertainty that is stated without its scale.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def check_one_scale(calibration: object, px_per_mm: object, u_px_per_mm: object)
         Both a calibration and a scale are given, or the uncertainty of a scale that is not.
     """
     if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
     if u_px_per_mm is not None and calibration is not None:
         raise UsageError(
             "--u-px-per-mm belongs to --px-per-mm, but --calibration is given, which has its own uncertainty: "
@@ -101,7 +101,7 @@ class Scale(Protocol):
 
 
 def scale_for_frames(scale: Scale, frame_size_px: tuple[int, int]) -> Scale:
-    """Return the scale for frames of a size, with the uncertainty budget of a stated uncertainty.
+    """Return the scale for frames of a given size; a stated uncertainty becomes an uncertainty budget.
 
     Parameters
     ----------

@@ -220,7 +220,7 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
     )
     never = [
         "movement during the exposure",
-        "change of the bench since the calibration (focus, camera, light)",
+        "change of the set-up since the calibration (focus, camera, light)",
         "a finger's outline that is not the edge seen from above (thickness, burr)",
     ]
     if not isinstance(scale, Calibration):

@@ -116,7 +116,7 @@ class Task:
 
 
 def task_for_frames(task: Task, description: Description) -> Task:
-    """Refuse settings that are impossible for the given frames; complete the scale by the frames' size.
+    """Refuse settings that are impossible for frames of a given size; complete the scale by the frames' size.
 
     Parameters
     ----------

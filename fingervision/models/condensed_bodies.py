@@ -123,7 +123,7 @@ def condensed(
 
 
 def own_modes(plate: PlaneStressPlate, body: CondensedBody, count: int) -> OwnModes:
-    """Compute the first modes of a body with fixed frames, at most a quarter of its unknowns, by subspace iteration.
+    """Compute the first modes of a body with fixed coordinate frames (a quarter of its unknowns at most).
 
     Source: Bathe, Finite Element Procedures, section 11.6.
     """

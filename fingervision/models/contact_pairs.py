@@ -150,7 +150,7 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, wanted), axis=0)]
         if edges.shape[1] == 0 or np.intersect1d(nodes, wanted).size:
             raise DataError(
-                f"contact {contact.name} of {mechanism.name} must be between two faces with no common part, "
+                f"contact {contact.name} of {mechanism.name} must be between two faces that share no part, "
                 "but they have one."
             )
         # The body lies on the right of an edge that runs so that the void is on its left.

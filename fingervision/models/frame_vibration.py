@@ -1,7 +1,8 @@
-"""Vibration of a lumped mechanism: condensed bodies with modes of their own between flexures with mass.
+"""Vibration of a lumped mechanism: condensed bodies with their own modes, joined by flexures with mass.
 
 The bodies' own vibration modes with fixed frames are added to the condensed motions (Craig and Bampton, AIAA Journal 6
-(1968) 1313). The unknowns are the motions of all frames, followed by the coordinates of these modes.
+(1968) 1313). The unknowns are the motions of all coordinate frames, followed by the amplitudes of the bodies' own
+modes.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class SegmentMass:
-    """Mass (t) of a flexure's segment of some length, shared by the frames at its two ends."""
+    """Mass (t) of a flexure's segment of a given length, divided between the coordinate frames at its two ends."""
 
     ends: tuple[int, int]
     mass_t: float
@@ -76,7 +77,7 @@ class FrameVibration:
         return np.asarray(1.0 / np.sqrt(inverse)), np.asarray(columns @ sought), drive
 
     def field(self, shapes: Array) -> Array:
-        """Small displacements of every node of the bodies, shape (unknowns of the plate, k), from those of all frames.
+        """Small displacements of every node of the bodies, shape (unknowns of the plate, k), from the frames' motions.
 
         Parameters
         ----------
@@ -93,7 +94,7 @@ class FrameVibration:
 
     @property
     def frames(self) -> int:
-        """Number of motions of the frames."""
+        """Number of motions of all coordinate frames."""
         return int(self.mass_t.shape[0]) - sum(own.squared.size for own in self.own)
 
 

@@ -2,8 +2,8 @@
 
 The model applies equations (5) to (15) of Hricko & Havlik (2015), in the plane, to any chain from a fixed body to the
 driven one: the compliance at the drive is C = sum T C_i T', and the stiffness is that in the directions which the drive
-and its guides constrain. Several drives are loads at
-several bodies of such a tree. For a closed loop of bodies such a sum does not exist; it is refused.
+and its guides constrain. If there are several drives, they are loads at several bodies of such a tree. For a closed
+loop of bodies such a sum does not exist; it is refused.
 """
 
 from dataclasses import replace
@@ -66,7 +66,7 @@ class MechanismChain:
         bodies = [self._only(drive.face) for drive in mechanism.drives]
         if len(set(bodies)) < len(bodies):
             raise ModelError(
-                f"The stiffness matrix is that of a chain with one drive a body, but {mechanism.name} drives one body "
+                f"The stiffness-matrix model allows one driven face per body, but {mechanism.name} drives one body "
                 "at several faces; take --kind lumped or finite_element."
             )
         self._paths = [self._path_from(self._ground, body) for body in bodies]
@@ -256,7 +256,7 @@ class MechanismChain:
                               named_forces_n(mechanism, forces))  # fmt: skip
 
     def _moved(self, point: Array, own: list[int], load: Array) -> Array:
-        """Motion (x, y, rotation) of a point behind the flexures `own`, under the loads at all drives."""
+        """Motion (x, y, rotation) of a point beyond the flexures `own`, under the loads at all drives."""
         return np.asarray(sum(
             self.compliance_at(point, [place for place in path if place in own], at) @ part
             for at, path, part in zip(self._at, self._paths, load.reshape(-1, 3), strict=True)
@@ -295,7 +295,7 @@ class MechanismChain:
         return np.zeros(2)
 
     def _stress_mpa(self, place: int, load: Array) -> float:
-        """Largest stress in one flexure, under the loads of those drives that it carries."""
+        """Largest stress in one flexure (MPa), under the loads of those drives that the flexure carries."""
         span = self.spans[place]
         stations = span.stations_mm(self.mechanism.plate_mm)
         angle = np.radians(span.flexure.axis_deg)

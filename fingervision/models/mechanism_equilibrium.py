@@ -153,7 +153,7 @@ class DrivenMechanism:
         return float(moved @ (self.stiffness_n_mm @ moved))
 
     def by_one_drive(self) -> tuple[MechanismEquilibrium, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest; nothing touches."""
+        """Small displacements per 1 mm of one driven face after another, with the others at rest, without contact."""
         pairs = zip(self.unit_by_drive.T, self.drive_stiffness_n_mm.T, strict=True)
         return tuple(
             MechanismEquilibrium(moved, float(forces[i]), forces, ()) for i, (moved, forces) in enumerate(pairs)
@@ -244,7 +244,7 @@ class DrivenMechanism:
             if step < _LEAST_STEP:
                 raise ModelError(
                     f"The equilibrium of {self.name} could be computed up to an input of "
-                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are asked for; take a smaller input."
+                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are requested; take a smaller input."
                 )
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
         drives = np.asarray(self.by_drive.T @ loads)

@@ -65,7 +65,7 @@ def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
 
 
 def driven_components(drive: Drive) -> tuple[str, ...]:
-    """Components prescribed at every node of a driven face: x and y if it is guided, else that of the drive."""
+    """Components prescribed at every node of a driven face: x and y if the face is guided, else that of the drive."""
     if drive.across == "held":
         return "x", "y"
     return ("x",) if drive.direction[0] != 0.0 else ("y",)

@@ -274,9 +274,9 @@ class MechanismPlate:
         return FreeModes(rad_s, drive, changes(self.mechanism, self._probes_by(shapes)))
 
     def _probes_by(self, columns: Array) -> dict[str, Array]:
-        """Small motion of every probe, shape (2, k), by each column of displacements."""
+        """Small motion of every probe caused by each column of displacements, shape (2, k)."""
         return {name: rows @ columns for name, rows in self.probe_rows.items()}
 
     def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
-        """Lines of the outline; see `mode_shapes.MovingMechanism`."""
+        """Lines of the outline for plotting; see `mode_shapes.MovingMechanism`."""
         return self.plate.outline_lines()

@@ -51,7 +51,7 @@ class MechanismState:
 
 
 def named_forces_n(mechanism: Mechanism, forces_n: NDArray[np.float64]) -> dict[str, float]:
-    """Forces of the driven faces by name."""
+    """Forces of the driven faces (N), by the names of the faces."""
     return {drive.face.name: float(force) for drive, force in zip(mechanism.drives, forces_n, strict=True)}
 
 
@@ -83,7 +83,7 @@ def pair_distances_mm(
 
 
 def changes(mechanism: Mechanism, probes_by: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Small changes of every pair's distance and every probe's place, by column name.
+    """Small changes of every pair's distance and every probe's position, by column name.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """A driven elastic body reduced to its static shape and its natural modes: the basis of all dynamic responses.
 
-The motion u of the drive is prescribed. The body follows u by its static shape s; each mode r of the body with fixed
+The motion u(t) of the drive is prescribed. The body follows u by its static shape s; each mode r of the body with fixed
 drive is excited by the inertia of the static shape (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface
 unknown):
 

@@ -58,14 +58,14 @@ class ModeShape:
 
 
 class MovingMechanism(Protocol):
-    """A mechanism drawn by bodies that has masses."""
+    """Protocol of a mechanism drawn by bodies whose vibration can be computed, because it has masses."""
 
     def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
-        """First natural modes in the plane: angular frequencies, and shapes by column."""
+        """First natural modes in the plane: angular frequencies (rad/s), and mode shapes by column."""
         ...
 
     def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
-        """Line pieces to plot, shape (n, 2, 2), and the places of their ends' motions along x and y in a shape."""
+        """Line pieces to plot, shape (n, 2, 2), and the indices of their ends' motions (x and y) in a mode shape."""
         ...
 
 

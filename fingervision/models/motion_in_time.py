@@ -128,7 +128,7 @@ def gripper_motion(
 
 
 def check_small_vibration(small: Motion, column: str, travel_mm: float) -> None:
-    """Refuse a drive that shakes a length too much for the modes at rest to vibrate about the equilibria.
+    """Refuse a drive that vibrates a length too strongly for the modes at rest to be superposed on the equilibria.
 
     Parameters
     ----------
@@ -146,8 +146,8 @@ def check_small_vibration(small: Motion, column: str, travel_mm: float) -> None:
     """
     if (shaken_mm := small.vibration_mm(column)) > _FAST * travel_mm:
         raise ModelError(
-            f"With large rotation or contact this drive must shake {column.removesuffix('_mm')} by at most {_FAST:g} "
-            f"of its travel of {travel_mm:.3g} mm, but shakes it by {shaken_mm:.3g} mm; slow it down, or leave "
+            f"With large rotation or contact this drive must vibrate {column.removesuffix('_mm')} by at most {_FAST:g} "
+            f"of its travel of {travel_mm:.3g} mm, but vibrates it by {shaken_mm:.3g} mm; slow it down, or leave "
             "--large-rotation and --contact off."
         )
 

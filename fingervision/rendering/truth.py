@@ -128,7 +128,7 @@ def _in_axes(piece: Piece, direction: Direction, t: ArrayLike) -> NDArray[np.flo
 
 
 def _along(point: tuple[float, float], direction: Direction) -> float:
-    """Coordinate of a point towards the root."""
+    """Coordinate of a point along the finger, growing towards the finger's root."""
     along = point[1] if direction.is_vertical else point[0]
     return along if direction in (Direction.UP, Direction.LEFT) else -along
 

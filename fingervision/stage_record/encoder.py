@@ -200,7 +200,7 @@ def _grid(input_mm: Array) -> float:
 def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
     """Whether a motion was rounded to a grid: it pauses on grid values, or its increments differ by single grid steps.
 
-    At a little less than one step per row, nearly all rows advance by one step, and only the pauses tell.
+    At a little less than one step per row, nearly all rows advance by one step, and only pauses reveal the grid.
 
     Set points in round numbers lie on a grid as well, but advance in equal steps.
     """

@@ -45,9 +45,11 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
         try:
             value = _evaluated(ast.parse(raw, mode="eval").body, names)
         except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError) as error:
-            raise DataError(f"{what} must be a number or arithmetic with names, but is {raw!r}: {error}.") from None
+            raise DataError(
+                f"{what} must be a number or an arithmetic expression with names, but is {raw!r}: {error}."
+            ) from None
     elif isinstance(raw, bool) or not isinstance(raw, int | float):
-        raise DataError(f"{what} must be a number or arithmetic with names, but is {raw!r}.")
+        raise DataError(f"{what} must be a number or an arithmetic expression with names, but is {raw!r}.")
     else:
         # A whole number may have more digits than a float holds.
         value = float(raw) if not abs(raw) > 10.0 * LARGEST else math.copysign(math.inf, 1 if raw > 0 else -1)

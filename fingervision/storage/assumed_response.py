@@ -1,4 +1,4 @@
-"""Note on a measured table whose camera response was assumed, as the summary of its measurement says."""
+"""Note on a measured table whose camera response was assumed, according to the summary of its measurement."""
 
 import csv
 import json
@@ -11,9 +11,9 @@ from fingervision.storage.summary_json import GAPS, SUMMARY
 
 
 def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tuple[str, ...]:
-    """Sentence that the camera's response was assumed, and by how much this may shift the gap.
+    """Sentence that the camera's response was assumed, and by how much this assumption may shift the gap.
 
-    An error of the response moves both edges of every frame alike, so that it has the signature of an offset.
+    An error of the response moves both edges equally in every frame, so that it has the signature of an offset.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tup
 
 
 def response_note_beside(table: Path) -> tuple[str, ...]:
-    """Sentence that the response was assumed, for a gaps.csv with its summary.json beside it; none for other tables."""
+    """Sentence that the response was assumed, for a gaps.csv with its summary.json; None for other tables."""
     if table.name != GAPS:
         return ()
     try:

@@ -1,4 +1,4 @@
-"""Values of a calibration file, checked one by one, and the calibration that they make."""
+"""Values of a calibration file, checked one by one, and the calibration made from them."""
 
 from collections.abc import Mapping
 from dataclasses import fields

@@ -137,7 +137,9 @@ def measured_rows(
                 f"{label} must change, but is {signal[0]:g} in every row of {path}: record a run that moves."
             )
     if len(runs) == 1:
-        notes.append("there is one run only: it cannot tell a re-zeroing of the bench from an offset.")
+        notes.append(
+            "there is only one run, in which a re-zeroing of the stage cannot be distinguished from an offset."
+        )
     notes += response_note_beside(path)
     return MeasuredTable(
         input_mm=column["input_mm"],

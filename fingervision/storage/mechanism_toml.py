@@ -20,6 +20,7 @@ from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
 from fingervision.storage.plain_file import text_of
+from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
 
 _TOP = (
     "schema",
@@ -113,6 +114,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
         raise InputFileError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError, RecursionError) as error:
         raise unreadable(error)(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+    refuse_other_file(path, tables, "the drawing of a mechanism or gripper", DRAWINGS)
     return MechanismDrawing(path, *bare_tables(tables, str(path)))
 
 
@@ -280,11 +282,11 @@ class _Reader(DrawingReader):
         x, y = self.numbers(table, "direction", 2, what)
         across = table.get("across", "held")
         if hypot(x, y) == 0.0:
-            raise DataError(f"{what}.direction in {self.origin} must be a direction, but is [0, 0].")
+            raise DataError(f"{what}.direction in {self.origin} must be a vector such as [1, 0], but is [0, 0].")
         if across not in ("held", "free") or (across == "free" and x * y != 0.0):
             raise DataError(
-                f"{what}.across in {self.origin} must be held, or free where {what}.direction is along x or y, "
-                f"but is {across!r}."
+                f"{what}.across in {self.origin} must be 'held', or 'free' if {what}.direction is along x or "
+                f"y, but is {across!r}."
             )
         per_input = self.value({"per_input": 1.0, **table}, "per_input", what)
         return Drive(self.face(table, what), (x / hypot(x, y), y / hypot(x, y)), across, per_input)

@@ -1,4 +1,4 @@
-"""Read input files: no pipes and devices, which could wait for ever or never end, and text in UTF-8 only."""
+"""Read input files: pipes and devices, which could wait for ever, are refused, and so is text that is not UTF-8."""
 
 import codecs
 import errno
@@ -35,7 +35,7 @@ def plain(path: Path) -> Path:
 
 
 class NotUtf8Error(ValueError):
-    """A text file has another encoding than UTF-8; the message is a clause that says which, and what to do."""
+    """A text file has another encoding than UTF-8; the message is a clause that states which, and what to do."""
 
 
 def text_of(path: Path) -> str:
@@ -67,7 +67,7 @@ def why(error: Exception) -> str:
 
 
 def in_utf8(path: Path, text: str) -> str:
-    """Return a text unchanged if UTF-8 can encode it; file names may contain characters that UTF-8 cannot encode.
+    """Return a text unchanged if UTF-8 can encode it, and refuse it otherwise; file names may contain other characters.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def in_utf8(path: Path, text: str) -> str:
     except UnicodeEncodeError as error:
         line = next(each for each in text.splitlines() if error.object[error.start] in each)
         raise OutputError(
-            f"{path.name} must be in UTF-8, but would name a file that is not ({line.strip()[:200]!a}): rename that "
-            "file and run again."
+            f"{path.name} is written in UTF-8, but would contain a file name that UTF-8 cannot encode "
+            f"({line.strip()[:200]!a}): rename that file and run again."
         ) from error
     return text

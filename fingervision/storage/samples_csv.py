@@ -112,7 +112,7 @@ def read_samples(path: Path) -> list[SampleRow]:
     Raises
     ------
     DataError
-        The file is not one of a run on the bed.
+        The file is not the table of a run on the test bed.
     """
     try:
         text = plain(path).read_bytes()
@@ -127,7 +127,7 @@ def read_samples(path: Path) -> list[SampleRow]:
         return []
     except (OSError, ValueError, IndexError) as error:
         raise DataError(
-            f"{path} must be the table of a run on the test bed to go on with it, but is not ({error}): name "
+            f"{path} must be the table of samples by which the run is continued, but is not ({error}): name "
             "another folder with --out."
         ) from error
     if columns != COLUMNS:

@@ -102,10 +102,10 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
 def _lone_u(
     raw: RawTable, names: Sequence[ColumnName], roles: dict[str, list[int]], fixed: set[int], about: Findings
 ) -> None:
-    """Take a simulation's column `u` with a unit of length for the input, as a prescribed displacement is called.
+    """Take a simulation's column `u` with a unit of length as the input: `u` often denotes a displacement.
 
-    Only where no other column is an input, and neither a time nor an uncertainty shows that this is a measurement: in
-    one, u is a standard uncertainty.
+    This is done only if no other column is an input, and if neither a time nor an uncertainty indicates a measurement,
+    in which `u` would be a standard uncertainty.
     """
     found = [
         place

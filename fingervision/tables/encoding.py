@@ -92,7 +92,7 @@ def _older(content: bytes) -> tuple[str, str]:
 
 
 def _lines_beyond_ascii(content: bytes) -> bytes:
-    """Join the first lines that are not ASCII, up to a sample's size."""
+    """Join the first lines that contain non-ASCII characters, up to the size of a sample."""
     lines: list[bytes] = []
     at = size = 0
     while size < SAMPLE_BYTES and (found := BEYOND_ASCII.search(content, at)) is not None:

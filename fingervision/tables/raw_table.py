@@ -43,7 +43,7 @@ took minutes)."""
 
 
 def check_columns(path: Path, count: int) -> None:
-    """Refuse a table of too many columns before their names are interpreted.
+    """Refuse a table with too many columns before the columns' names are interpreted.
 
     Raises
     ------

@@ -88,7 +88,7 @@ def planned_bed(name: str) -> PlannedBed:
         sections["actuator"].refuse(
             "kind",
             "must say what it can do without its hardware, but has no function without_hardware(section, folder): add "
-            "one to its file, or let `bed run` check the recipe at the bed.",
+            "one to its file, or let `bed run` check the recipe when it starts.",
         )
     actuator: MoveCheck = describe(sections["actuator"], folder)
     scale = stated_scale(top.table("scale"), folder)

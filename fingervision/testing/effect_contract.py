@@ -225,7 +225,7 @@ class _ChainOf:
         self._chain.__dict__["effects"] = {effect.name: effect}
 
     def respond(self, settings: dict[str, dict[str, float]]) -> Response:
-        """Compute the response of the chain."""
+        """Compute the response of the measuring chain with this one effect."""
         return self._chain.respond(settings)
 
 

@@ -1,9 +1,10 @@
-"""Standard uncertainty of the fitted blur of flanks and tips, from the picture's noise and from its codec.
+"""Standard uncertainty of the fitted blur of flanks and tips, due to the picture's noise and its codec.
 
-For a step of contrast A blurred by sigma, the derivative of a line's light by position has the squared norm A^2 / (2
-sqrt(pi) sigma), that by sigma half as much. Noise n on N lines therefore leaves sigma uncertain by n / A sqrt(4
-sqrt(pi) sigma / N) (Cramer-Rao bound; Kay, Estimation Theory, 1993, section 3.9). A codec that is free to change the
-light by a certain squared error may displace the edge by d, or widen it by sqrt(2) d at the same price.
+For a step of contrast A blurred by sigma, the derivative of a line's light with respect to position has the squared
+norm A^2 / (2 sqrt(pi) sigma), that with respect to sigma half as much. Noise n on N lines therefore leaves sigma
+uncertain by n / A sqrt(4 sqrt(pi) sigma / N) (Cramer-Rao bound; Kay, Estimation Theory, 1993, section 3.9). If a codec
+may change the light by a certain squared error, it may displace the edge by d, or widen the edge by sqrt(2) d with the
+same squared error.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ Displacement = Callable[[EdgePoints], tuple[float, float]]
 
 
 def not_displaced(_edges: EdgePoints) -> tuple[float, float]:
-    """Displacement of edges by the codec of a picture that is as the sensor saw it: none."""
+    """Displacement of edges (px) by the codec of an uncompressed picture, which is zero."""
     return 0.0, 0.0
 
 

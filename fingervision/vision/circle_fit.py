@@ -90,7 +90,7 @@ def fit_circle(
     blur_px : float
         Initial estimate of the blur.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
 
     Raises
     ------

@@ -55,7 +55,7 @@ def displaced_px(step: float, contrast: float) -> float:
 def flanks_displaced_px(
     edges: EdgePoints, orientation: Orientation, quantiser: Quantiser, light: Floats, top_level: int
 ) -> tuple[float, float]:
-    """Standard uncertainty of the position of both inner flanks from codec errors common to all of their rows (pixels).
+    """Standard uncertainty (px) of the position of both inner flanks, from codec errors that all of their rows share.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def with_coding_error(
 
 
 def _stored_contrast(level: float, contrast: float, light: Floats, top_level: int) -> float:
-    """Contrast of an edge in stored levels of an 8-bit scale, from the light inside and the change of light."""
+    """Contrast of an edge in stored levels on an 8-bit scale, from the light inside and the change of light."""
     stored = np.interp([level, level + contrast], light[: top_level + 1], np.arange(top_level + 1.0))
     return float(np.ptp(stored)) * EIGHT_BITS / top_level
 

@@ -79,7 +79,7 @@ class EdgePoints:
     inside : (float, float)
         Level of each finger next to its inner flank.
     shared_lines : float
-        Number of neighbouring lines with common noise.
+        Number of neighbouring lines that share their noise.
     noise_flat : float
         Standard deviation of the light in the flat parts beside the edges; 0 if no flat part is in view.
     beside : str

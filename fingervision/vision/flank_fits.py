@@ -1,4 +1,4 @@
-"""Fits of every model to the mean profiles of both inner flanks, each made when it is first asked for."""
+"""Fits of every model to the mean profiles of both inner flanks, each computed when it is first needed."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,17 +43,17 @@ class FlankFits:
         self._is_explained = step < 0.5 * MODEL_LEAVES * self.bins
 
     def of(self, kind: int) -> list[ProfileFit]:
-        """Fits of a model to the left and the right flank; those of a step where it explains both."""
+        """Fits of a model to the left and the right flank; if a step explains both flanks, those of the step."""
         return [self._fit(kind, k) for k in range(len(self._flanks))]
 
     def squares(self, kind: int) -> float:
-        """Weighted sum of squared residuals of a model, of both flanks."""
+        """Weighted sum of squared residuals of a model, over both flanks."""
         return sum(fit.squares for fit in self.of(kind))
 
     def is_step(self) -> bool:
         """Whether a single step explains the profiles, because no other model is clearly better.
 
-        A model that leaves too much on one flank is not fitted to the other.
+        A model that leaves too large a residual on one flank is not fitted to the other flank.
         """
         if self._is_explained:
             return True

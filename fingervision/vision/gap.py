@@ -84,7 +84,7 @@ def measure_gap(
     light_gap : bool
         Whether the fingers are darker than the gap.
     coding : Coding
-        Coding of the picture, which determines how many neighbouring points have a common error.
+        Coding of the picture, which determines how many neighbouring points share an error.
 
     Returns
     -------

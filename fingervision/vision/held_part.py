@@ -59,7 +59,7 @@ def held_part(
         Fitted end shapes of the left and of the right finger.
     spread : (float, float)
         Ratio of the residuals' variance to the stated variance for each finger, multiplied by the number of
-        neighbouring points with a common error.
+        neighbouring points that share an error.
     light_gap : bool
         Whether the fingers are darker than the gap.
 

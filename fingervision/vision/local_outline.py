@@ -155,7 +155,7 @@ def local_measuring_point(points: OutlinePoints, below_tip_px: float, shared: fl
     below_tip_px : float
         Distance of the measuring point below the tip.
     shared : float
-        Number of neighbouring points with a common error.
+        Number of neighbouring points that share an error.
     """
     blur = float(np.median(points.blur))
     top = int(np.argmin(points.y))

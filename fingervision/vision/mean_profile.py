@@ -38,7 +38,7 @@ class MeanProfile:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A straight line, called as NumPy's polynomials are, which take longer for it than the whole profile.
+    """A straight line with the interface of NumPy's polynomials, whose evaluation takes longer than the whole profile.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class Line:
     slope: float
 
     def __call__(self, at: Ints) -> Floats:
-        """Values at the given places, shape (n,)."""
+        """Values of the line at given positions, shape (n,)."""
         return np.asarray(self.intercept + self.slope * at, dtype=np.float64)
 
     def deriv(self) -> "Line":
-        """Its derivative, which is constant."""
+        """Derivative of the line, which is constant."""
         return Line(self.slope, 0.0)
 
 

@@ -84,7 +84,7 @@ class EdgeView:
     outward_px : float
         Edge bias: distance by which an edge appears outside its body, in pixels of the picture.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
     body_level, contrast : float or None
         Level of the bodies, and difference of the background from it; None if not known.
     u_outward_px, u_size : float

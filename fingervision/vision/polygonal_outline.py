@@ -77,7 +77,7 @@ def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared
     below_tip_px : float
         Distance of the measuring point below the tip.
     shared : float
-        Number of neighbouring points with a common error.
+        Number of neighbouring points that share an error.
     """
     if not _has_straight_top(points):
         return None

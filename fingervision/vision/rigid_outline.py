@@ -49,9 +49,9 @@ class RigidFit:
         Standard deviation of the edges' blur.
     by_outward, by_scale : ndarray of float, shape (3,)
         Change of x, y and the angle per 1 px of outward shift of all edges, and per unit of relative error of the
-        body's size. These errors are common to all frames and not included in the covariance.
+        body's size. These errors are the same in all frames and not included in the covariance.
     by_shadows : ndarray of float, shape (3, 3)
-        Covariance of x, y and the angle due to possible shadows along some sides; common to all frames too.
+        Covariance of x, y and the angle due to possible shadows along some sides; the same in all frames.
     size_error, u_size_error : float
         Relative excess of the body's size in the picture over the drawing, after a common shift of all edges was
         fitted; and its standard uncertainty, infinite if the edges do not determine it.

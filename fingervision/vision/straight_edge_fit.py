@@ -188,7 +188,7 @@ def fit_straight_edges(
     blur_px : float
         Initial estimate of the blur.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
     cut_off : int
         +1 if the lighter plateau of the first edge lies at the end of the scale, -1 if the darker one does: the clipped
         part of the step is then estimated too. 0 otherwise.

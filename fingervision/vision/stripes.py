@@ -39,7 +39,7 @@ class StripeEdges:
     u_noise : ndarray of float
         Standard uncertainty of each edge from the noise of its own row.
     u_shared : ndarray of float
-        Standard uncertainty of each edge due to the contrast, which is common to all rows.
+        Standard uncertainty of each edge due to the contrast, which is the same in all rows.
     """
 
     left: Floats

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.patch_registration import LEAST_INFORMATION, MARGIN_PX, ROUNDING
+from fingervision.vision.patch_covariance import LEAST_INFORMATION, ROUNDING
+from fingervision.vision.patch_reference import MARGIN_PX
 from fingervision.vision.spline_interpolation import coefficients, interpolated_power, sampled
 
 Floats = NDArray[np.float32]
@@ -69,7 +70,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
     half_px : int
         Half width of the window.
     shared_pixels : float
-        Number of neighbouring pixels with a common error (from a codec), which count as one pixel.
+        Number of neighbouring pixels that share an error (from a codec) and count as one pixel.
 
     Raises
     ------

@@ -63,7 +63,7 @@ def wall_limits_px(edges: EdgePoints, displaced_px: Displacement) -> list[float]
 
 
 def are_outer_flanks_in_view(edges: EdgePoints) -> bool:
-    """Whether both fingers' outer flanks can be compared with the inner ones; the picture's border is no flank."""
+    """Whether both fingers' outer flanks can be compared with the inner ones; the picture's border is not a flank."""
     size, is_real = np.abs(edges.contrast), edges.lines.weight > 0
     inner = size[:, :INNER][is_real[:, :INNER]]
     if not inner.size:
@@ -73,7 +73,7 @@ def are_outer_flanks_in_view(edges: EdgePoints) -> bool:
 
 
 def squared_blurs(edges: EdgePoints) -> tuple[Floats, Floats]:
-    """Squared spread of the inner flanks and of the tips, pixel width included, of the left and the right finger."""
+    """Squared spread of inner flanks and tips of both fingers, pixel width included (px^2)."""
     flanks, tips = (np.maximum(edges.blur_px[:, part], LEAST_RESOLVED_BLUR_PX) ** 2 + PIXEL_VARIANCE for part in (0, 1))
     return flanks, tips
 
@@ -85,5 +85,5 @@ def is_surely_broader(edges: EdgePoints, displaced_px: Displacement) -> NDArray[
 
 
 def _u_excess(edges: EdgePoints, displaced_px: Displacement) -> Floats:
-    """Standard uncertainty by which each flank's squared spread exceeds its tip's, shape (2,) (pixels squared)."""
+    """Standard uncertainty of the excess of each flank's squared spread over its tip's, shape (2,) (pixels squared)."""
     return np.asarray(np.hypot(*u_squared_blur(edges, displaced_px(edges)).T))

@@ -206,7 +206,7 @@ def test_an_output_folder_of_something_else_is_left_alone(run: Run, copy: Path) 
     Path("mine/thesis.txt").write_text("years of work", encoding="utf-8")
     code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "mine")
     assert code == 1
-    assert "--out must be a new folder or one of an earlier batch, but mine holds something else (thesis.txt)" in err
+    assert "--out must be a new folder or that of an earlier batch, but mine contains other files (thesis.txt)" in err
     assert [path.name for path in Path("mine").iterdir()] == ["thesis.txt"]
     code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "mine/thesis.txt")
     assert (code, "is a file: name another" in err) == (1, True)

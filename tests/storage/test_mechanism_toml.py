@@ -176,7 +176,7 @@ WRONG_TEMPLATES = [
     ("hinge1.thickness_mm", "hinge1.height_mm", "thickness_mm and radius_mm"),
     ("= 0.9", "= -0.9", "must be positive, but is -0.9"),
     ("= 0.9", "= nan", "must be a number"),
-    ("= 0.9", '= "thin"', "arithmetic with names"),
+    ("= 0.9", '= "thin"', "arithmetic expression with names"),
     ("= 0.9", "= 9.0", "neck"),
     ("l2_mm = 18.0", "l3_mm = 18.0", "the same in both halves"),
     ("[gripper.left]", "[gripper.middle]", "unknown key, middle"),

@@ -44,28 +44,28 @@ gap_mm = {gap_mm}
     [
         (
             'kind = "triangle"\nfrom_mm = -0.3\nto_mm = 1.9\nspeed_mm_s = 0.5',
-            "to_mm in line 6 of {path} leads beyond the bed's limit of position, 1.45 mm: it needs 1.9, which is "
+            "to_mm in line 6 of {path} leads beyond the test bed's limit of position, 1.45 mm: it needs 1.9, which is "
             "0.45 mm too much. Nothing was moved.",
         ),
         (
             'kind = "move"\nto_mm = -0.5\nspeed_mm_s = 0.5',
-            "to_mm in line 5 of {path} leads below the bed's limit of position, -0.46 mm: it needs -0.5, which is "
+            "to_mm in line 5 of {path} leads below the test bed's limit of position, -0.46 mm: it needs -0.5, which is "
             "0.04 mm too little. Nothing was moved.",
         ),
         (
             'kind = "move"\nto_mm = 0.9\nspeed_mm_s = 500',
-            "speed_mm_s in line 6 of {path} leads beyond the bed's limit of speed, 400 mm/s: it needs 500, which is "
-            "100 mm/s too much. Nothing was moved.",
+            "speed_mm_s in line 6 of {path} leads beyond the test bed's limit of speed, 400 mm/s: it needs 500, which "
+            "is 100 mm/s too much. Nothing was moved.",
         ),
         (
             'kind = "sine"\nmean_mm = 1.2\namplitude_mm = 0.5\nfrequency_hz = 0.1',
-            "amplitude_mm in line 6 of {path} leads beyond the bed's limit of position, 1.45 mm: it needs 1.7, which "
-            "is 0.25 mm too much. Nothing was moved.",
+            "amplitude_mm in line 6 of {path} leads beyond the test bed's limit of position, 1.45 mm: it needs 1.7, "
+            "which is 0.25 mm too much. Nothing was moved.",
         ),
         (
             'kind = "close_until_contact"\nspeed_mm_s = 1.0\nbelow_force_n = 7.0',
-            "below_force_n in line 6 of {path} leads beyond the bed's limit of force, 5 N: it needs 7, which is 2 N "
-            "too much. Nothing was moved.",
+            "below_force_n in line 6 of {path} leads beyond the test bed's limit of force, 5 N: it needs 7, which is "
+            "2 N too much. Nothing was moved.",
         ),
         (
             'kind = "moove"\nto_mm = 1',

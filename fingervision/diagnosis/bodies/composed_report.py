@@ -1,4 +1,4 @@
-"""One report of the diagnoses from the poses of bodies and from the gap."""
+"""Combine the diagnosis from the poses of bodies and the diagnosis from the gap into one report."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Mirror images: which bodies, hinges and channels of a drawing correspond to each other."""
+"""Mirror images in a drawing: which bodies, hinges and channels of its two halves correspond to each other."""
 
 from collections.abc import Callable
 from math import hypot

@@ -87,7 +87,7 @@ def apart(truth: Fitted, other: Fitted) -> float:
 
 
 def smallest_sizes(fitted: Sequence[Fitted], limit: float) -> dict[str, tuple[Candidate, float]]:
-    """Detection limit of every candidate: the size whose gain reaches the limit, the least of each key."""
+    """Detection limit of every candidate: the smallest size whose gain in chi-square reaches the limit."""
     found: dict[str, tuple[Candidate, float]] = {}
     for each in fitted:
         size = float(np.sqrt(limit)) * each.u

@@ -1,4 +1,4 @@
-"""What nobody knows beside the place: constants, turns, bends, and the errors of the drawing's own model."""
+"""Nuisance parameters beside a faulty place: constants, rotations, bends, and errors of the drawing's own model."""
 
 from collections.abc import Sequence
 

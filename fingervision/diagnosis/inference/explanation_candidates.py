@@ -197,12 +197,12 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
 
 
 def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explanation]) -> list[Explanation]:
-    """Keep the explanations that change the prediction by more than the recorded input's own error does.
+    """Keep the explanations that change the prediction by more than the error of the recorded input does.
 
-    The others follow the roundings of an encoder. A delay within one step of it gained 225 in chi-square so, and hid
-    the offset that a play had beside it, which changed the prediction by twenty times as much. If even the best
-    explanation only follows the roundings, so may others beyond it that replace the smaller one: then only additions to
-    the smaller one are kept.
+    The explanations that are dropped only follow the rounding errors of an encoder. For example, a delay within one
+    step of an encoder gained 225 in chi-square in this way, and hid an offset beside a play that changed the prediction
+    by twenty times as much. If even the best explanation only follows the rounding errors, explanations with other
+    effects may do so as well: then only additions to the smaller explanation are kept.
     """
     beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
     if beyond[:1] == larger[:1]:

@@ -60,7 +60,7 @@ class _JointSquares:
         return self.aim - self.problem.whitener.one(self._predicted(x))
 
     def _predicted(self, x: Array) -> Array:
-        """Prediction before whitening, shape (m,)."""
+        """Prediction of the stacked channels before whitening, shape (m,)."""
         key = x.tobytes()
         if key not in self.latest:
             self.latest.clear()

@@ -124,10 +124,11 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
 
 
 def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation, shapes: Array) -> bool:
-    """Whether an explanation with added shapes predicts what the effects do, but for the recorded input's own error.
+    """Whether an explanation with added shapes differs from that of the effects by less than the input's error.
 
-    For example, a step over the input behind the first line of an encoder is an offset: under the first line, where
-    the strokes turn, the stage stands on average elsewhere than at the line. Constants of the runs do not count.
+    For example, a step over the input at the first line of an encoder is an offset: beyond this line, where the strokes
+    reverse, the mean position of the stage is not that of the line. Differences in the constants of the runs are
+    ignored.
 
     Parameters
     ----------

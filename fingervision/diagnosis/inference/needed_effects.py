@@ -1,4 +1,4 @@
-"""Drop effects that the disagreement does not need, and replace curves by straight lines."""
+"""Drop effects that are not needed to explain the disagreement, and replace curves by straight lines."""
 
 from dataclasses import replace
 

@@ -125,7 +125,7 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
 
 
 def _in_stretches(values: Array) -> bool:
-    """Whether neighbouring rows lie near the median together (a stage that moves and rests), unlike wrong rows."""
+    """Whether rows near the median are neighbours, as for a stage that moves and rests; wrong rows are scattered."""
     near = (np.abs(values - np.median(values)) < NARROW * np.std(values)).astype(np.float64)
     near -= near.mean()
     power = float(near @ near)

@@ -36,7 +36,7 @@ class Probes:
     shares: Array
 
     def before_whitening(self, index: int) -> Array:
-        """One shape before whitening, with channels stacked; shape (m,)."""
+        """One generic shape before whitening, with channels stacked; shape (m,)."""
         kind, shape = divmod(index, self.bare.shape[1])
         return np.outer(self.shares[kind], self.bare[:, shape]).ravel()
 

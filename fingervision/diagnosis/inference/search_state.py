@@ -1,4 +1,4 @@
-"""State of a search: explanations with one, two and three effects, and the evidence for them."""
+"""State of a search for effects: explanations with one, two and three effects, and the evidence for them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

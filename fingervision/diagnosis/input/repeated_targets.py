@@ -83,10 +83,10 @@ def repeated_targets(
     """Find targets, directions of approach and cycles in a path.
 
     The direction of approach of a visit follows from the last earlier row at another position, with or without a
-    reading (such as an overshoot or an approach). If the table lacks these rows, two assumptions are made and reported.
-    First, if a target at an end of the range has two successive readings where all other targets have one, the stage
-    reversed with an overshoot between the two. Second, a run that starts at an end of the range, in such a table or in
-    one whose runs all have the same direction, came from beyond that end.
+    reading (such as an overshoot or an approach). If the table lacks rows without a reading, two assumptions are made
+    and reported. First, if a target at an end of the range has two successive readings where all other targets have
+    one, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range, in such
+    a table or in one whose runs all have the same direction, came from beyond that end.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Trends among repeats: drift, run-in, and noise that wanders from reading to reading."""
+"""Trends among repeated readings: drift, run-in, and noise that is correlated from reading to reading."""
 
 import numpy as np
 from numpy.typing import NDArray

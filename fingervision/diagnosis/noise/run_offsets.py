@@ -1,4 +1,4 @@
-"""Offsets of the runs: nuisance parameters of every explanation, fitted as random effects."""
+"""Offsets of the runs: nuisance parameters of every explanation, which are fitted as random effects."""
 
 from dataclasses import dataclass, field
 
@@ -115,9 +115,10 @@ class RunOffsets:
         return self._likeliest(self._tried(residual))
 
     def spread_and_doubt(self, residual: Array) -> tuple[tuple[float, ...], float, float]:
-        """Estimate the spreads as `spread` does, with the doubt about them.
+        """Estimate the spreads of the run offsets as `spread` does, with a penalty for their uncertainty.
 
-        A few runs hardly determine the spread; by this doubt, parameters that act like an offset have Student's tails.
+        A few runs hardly determine the spread of their offsets; with this penalty, parameters that act like an offset
+        have Student's tails.
 
         Returns
         -------
@@ -136,7 +137,7 @@ class RunOffsets:
         return *self._likeliest(tried), doubt
 
     def _likeliest(self, tried: list[tuple[float, Array, Array]]) -> tuple[tuple[float, ...], float]:
-        """The likeliest spread of each channel, and the penalty."""
+        """The most probable spread of the run offsets of each channel, and the penalty."""
         out, total = [], 0.0
         for scale, determinant, gain in tried:
             best = int(np.argmin(determinant - gain))

@@ -43,10 +43,10 @@ def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Para
 
 
 def limited(value: float, parameter: Parameter, drawn: Array, open_ended: Array) -> Estimate:
-    """State a parameter by a one-sided limit, on the side opposite to that to which the open parameter leads it.
+    """State a parameter by a one-sided limit, on the side opposite to that on which another parameter is unbounded.
 
-    The posterior ends where the search range ends. Beyond it lie only values farther from the limit, so that the
-    quantile within the range is a limit for the whole posterior too.
+    The posterior ends where the search range ends. Beyond the search range there are only values farther from the
+    limit, so that the quantile within the range is also a limit for the whole posterior.
 
     Parameters
     ----------
@@ -68,5 +68,5 @@ def limited(value: float, parameter: Parameter, drawn: Array, open_ended: Array)
 
 
 def draws_of(posterior: tuple[Point, ...], effect: str, parameter: str) -> Array:
-    """Posterior draws of one parameter, shape (k,); none where it was not drawn."""
+    """Posterior draws of one parameter, shape (k,); empty if the parameter was not sampled."""
     return np.array([point[effect][parameter] for point in posterior if parameter in point.get(effect, {})])

@@ -56,7 +56,7 @@ class Visits:
 class Target:
     """A target with its readings from either side.
 
-    The reversal is B_i = up - down, with its uncertainty and degrees of freedom.
+    The reversal of target i is B_i, the mean deviation approached from below minus that from above (up - down).
     """
 
     target_mm: float

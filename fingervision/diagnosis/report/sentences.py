@@ -33,7 +33,7 @@ def phrase(effect: NamedEffect) -> str:
 
 
 def limit_words(e: Estimate) -> str:
-    """State a one-sided limit in words; empty for a parameter that the data limit on both sides."""
+    """State a one-sided limit in words; the text is empty for a parameter that the data limit on both sides."""
     unit = f" {e.unit}" if e.unit else ""
     if e.at_least is not None:
         return f"at least {e.at_least:.4g}{unit} (95 %)"

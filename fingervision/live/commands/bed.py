@@ -13,7 +13,7 @@ from fingervision.storage.recipe_toml import read_recipe
 BED, MOTION = "bed", "allow_motion"
 LONGEST_JOG_S = 10.0
 """Longest duration of a jog, after which it ends even if the user's button release was not received."""
-READ_ONLY = "This page may look at the bed and not move it: start the live view with --allow-motion to move it."
+READ_ONLY = "This page may only watch the test bed: to move its stage, start the live view with --allow-motion."
 
 
 def _bench(view: View) -> Bench:
@@ -52,7 +52,7 @@ def _jog(view: View, request: Request) -> Answer:
     bench = _movable(view)
     speed_mm_s, for_s = number(request, "speed_mm_s"), number(request, "for_s")
     if not 0.0 < for_s <= LONGEST_JOG_S:
-        raise UsageError(f"A jog must last more than 0 s and at most {LONGEST_JOG_S:g} s, but {for_s:g} was asked.")
+        raise UsageError(f"A jog must last more than 0 s and at most {LONGEST_JOG_S:g} s, but {for_s:g} was requested.")
     bench.jog(speed_mm_s, for_s)
     return Answer()
 

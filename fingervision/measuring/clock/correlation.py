@@ -96,14 +96,14 @@ def candidates(time_s: Array, gap_mm: Array, drive: DriveHistory) -> list[Candid
 
 
 def _near(grid_s: Array, time_s: Array, reach_s: float) -> Array:
-    """1 for grid points with a sample within `reach_s`, else 0."""
+    """Mask of the time grid: 1 where a sample is within `reach_s`, else 0."""
     after = np.clip(np.searchsorted(time_s, grid_s), 1, time_s.size - 1)
     distance_s = np.minimum(np.abs(grid_s - time_s[after - 1]), np.abs(time_s[after] - grid_s))
     return np.asarray(distance_s <= reach_s, dtype=np.float64)
 
 
 def _known(grid_s: Array, log_s: Array, drive: DriveHistory) -> Array:
-    """1 for grid points at which the log has an input (not between two runs), else 0."""
+    """Mask of the time grid: 1 where the log has an input (not between two runs), else 0."""
     known = np.ones_like(grid_s)
     if drive.run is not None:
         for k, (before, after) in enumerate(pairwise(drive.run)):

@@ -27,8 +27,8 @@ def drawn_paths(path: LogPath) -> Iterator[LogPath]:
 
     Three kinds of error are drawn. A row's noise is averaged by the smoothing over some rows, and common to these. What
     an encoder's rounding leaves open is common to a halt, a turn, or a stretch of a stroke. Between two rows a corner
-    may lie anywhere, and a smooth curve cuts all corners on the same side. Reversals between two of an encoder's lines
-    are cut alike as well, by the rounding and by the smoothing.
+    may lie anywhere, and a smooth curve cuts all corners on the same side. Reversals between two lines of an encoder
+    are cut on the same side as well, by the rounding and by the smoothing.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class SharedErrors:
     begin_s : ndarray of float, shape (g - 1,)
         Start times of the second and the later stretches.
     u_mm : ndarray of float, shape (g,)
-        Standard uncertainty of each stretch's common error.
+        Standard uncertainty of each stretch's shared error.
     halts : ndarray of bool, shape (g,)
         Whether the stretch is a halt or a reversal, whose position determines the state of the play.
     outward : ndarray of float, shape (g,)
@@ -154,7 +154,7 @@ def _shared_errors(
     Returns
     -------
     shared, u_mm : SharedErrors, ndarray of float, shape (n,)
-        The common errors, and the random standard uncertainty of each row.
+        The shared errors, and the random standard uncertainty of each row.
     """
     rounding_mm = step_mm / float(np.sqrt(12.0))
     direction = np.where(np.abs(np.diff(smooth_mm)) <= still_mm, 0, np.sign(np.diff(smooth_mm))).astype(int)

@@ -54,9 +54,9 @@ class Noise:
     weights : ndarray of float, shape (n - p,)
         Weights of the whitened rows: below 1 for rows with an uncertain input; empty if all are equal.
     starts : ndarray of int, shape (g,)
-        First whitened row of each stretch in which the input has one common error; empty if there is none.
+        First whitened row of each stretch in which all inputs share an error; empty if there is none.
     unit : ndarray of float, shape (n - p,)
-        Effect of a common error on the whitened rows, normalised to length 1 within each stretch.
+        Effect of the shared error on the whitened rows, normalised to length 1 within each stretch.
     shrink : ndarray of float, shape (g,)
         Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
     variance_mm2 : float

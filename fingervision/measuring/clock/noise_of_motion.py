@@ -100,7 +100,7 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
 
 
 SEEN_SHARED = 0.5
-"""Least common error, relative to the residual's spread: smaller ones cannot be detected, and subtracting means would
+"""Least shared error, relative to the residual's spread: smaller ones cannot be detected, and subtracting means would
 whiten the noise."""
 
 
@@ -144,11 +144,12 @@ def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Ar
 
 
 def _even_variance(squares: Array, input_mm2: Array) -> float:
-    """Maximum-likelihood variance that must be added to `input_mm2`; a share of the frames may be wrong.
+    """Maximum-likelihood variance that must be added to `input_mm2`, if a share of the frames may be outliers.
 
     Frames with a well-known input determine this variance; a median over all frames would fail if they are a minority.
-    The density is that of a contaminated normal distribution (Tukey 1960). Squares that are only clipped have no
-    density: the smallest variance, at which every frame is clipped, would then be the most likely one.
+    The residuals are assumed to have a contaminated normal distribution (Tukey 1960). If large squares were only
+    clipped, there would be no probability density: the smallest variance, at which every frame is clipped, would then
+    be the most likely one.
     """
     high = max(float(np.median(squares)) / MEDIAN_CHI_SQUARE, 1e-18)
     tried = high * np.geomspace(1e-4, 4.0, TRIED)

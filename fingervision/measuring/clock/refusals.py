@@ -49,8 +49,8 @@ def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset 
 def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
     """Refuse a log of target positions instead of actual ones.
 
-    A gap that follows later leaves residuals like a random walk, and a fit to their differences may explain nothing;
-    the fit to the gap itself shows how much of the jumps is made in their time.
+    If the gap follows later than the log, the residuals resemble a random walk, and a fit to their differences may
+    explain nothing; the fit to the gap itself shows which share of the jumps the gap completes in time.
     """
     share = gap_arrives(motion, found)
     if share is None:

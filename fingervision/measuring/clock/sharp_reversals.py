@@ -19,12 +19,12 @@ ALLOWED = 0.55
 
 
 def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: float) -> Array:
-    """Replace a smoothed reversal by the two strokes that meet there, where every reading allows it.
+    """Replace a smoothed reversal by two straight strokes that meet there, if every reading allows it.
 
-    Smoothing cuts a reversal, and near it no line of the encoder is crossed. All reversals are cut to the inside, so
-    that the play comes out too small by twice the cut, and the offset wrong by the time of a stroke over the cut. A
-    stage that slows down before it turns leaves readings that two straight strokes do not pass: such a reversal stays
-    as smoothed.
+    Smoothing cuts the corner of a reversal, and no line of the encoder is crossed near it. All reversals are cut
+    towards the inside, so that the fitted play is too small by twice the cut, and the offset is wrong by the time that
+    a stroke takes for the cut. If a stage slows down before it reverses, two straight strokes do not pass through its
+    readings: such a reversal stays as smoothed.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm:
 
 
 def _reversals(input_mm: Array, step_mm: float) -> list[int]:
-    """Rows of the extremes between which a path moves by more than a step; smaller ripples are left by smoothing."""
+    """Row numbers of the extremes between which a path moves by more than an encoder step; ripples are ignored."""
     steps = np.diff(input_mm)
     moves = np.flatnonzero(steps)
     rows = moves[1:][np.sign(steps[moves[1:]]) != np.sign(steps[moves[:-1]])]
@@ -89,7 +89,7 @@ class Stroke:
 
 
 def _stroke(time_s: Array, reading_mm: Array, turn: int, rows: NDArray[np.intp], step_mm: float) -> Stroke | None:
-    """Fit the longest straight stroke along rows that lead away from a reversal; None if there is none."""
+    """Fit the longest straight stroke to the rows on one side of a reversal; None if there is none."""
     away = np.abs(reading_mm[rows] - reading_mm[turn])
     crossed = np.flatnonzero(away > 0.5 * step_mm)
     for lines in LINES:

@@ -65,7 +65,7 @@ class HandScrew:
     def jog(self, speed_mm_s: float) -> None:
         """Refuse: a hand-turned screw cannot be stopped by command."""
         raise LimitError(
-            f"A hand screw can only be moved to positions, but a jog at {speed_mm_s:g} mm/s was asked: use move."
+            f"A hand screw can only be moved to positions, but a jog at {speed_mm_s:g} mm/s was requested: use move."
         )
 
     def run_step(self, number: int) -> None:

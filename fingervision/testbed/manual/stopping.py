@@ -42,7 +42,7 @@ def stop_bed(name: str) -> str:
                     "not: switch off the motor's power supply."
                 )
             sleep(LOOK_EVERY_S)
-        words = f"Process {process}, which drove the bed, was ended. "
+        words = f"Process {process}, which drove the test bed, was ended. "
     bed = open_bed(name)
     try:
         bed.actuator.stop()

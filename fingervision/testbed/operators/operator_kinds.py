@@ -31,8 +31,8 @@ class AtTheBed:
     def _ask(self, words: str) -> None:
         if TERMINAL.ask(f"{words} Press Enter when it is done: ") is None:
             raise StateError(
-                f"The recipe asks the operator ({words.rstrip('.').lower()}), but nobody is at the terminal: run it "
-                "from one."
+                f"The recipe asks the operator ({words.rstrip('.').lower()}), but there is no terminal: run the "
+                "command from a terminal."
             )
 
 

@@ -176,7 +176,7 @@ def _reached_mm(leg: Leg) -> Iterator[float]:
 def _beyond(section: Section, key: str, value: float, limit: float, unit: str, what: str) -> None:
     section.refuse(
         key,
-        f"leads beyond the bed's limit of {what}, {limit:g} {unit}: it needs {value:g}, which is "
+        f"leads beyond the test bed's limit of {what}, {limit:g} {unit}: it needs {value:g}, which is "
         f"{value - limit:.3g} {unit} too much. Nothing was moved.",
     )
 
@@ -184,6 +184,6 @@ def _beyond(section: Section, key: str, value: float, limit: float, unit: str, w
 def _below(section: Section, key: str, value: float, limit: float, what: str) -> None:
     section.refuse(
         key,
-        f"leads below the bed's limit of {what}, {limit:g} mm: it needs {value:g}, which is "
+        f"leads below the test bed's limit of {what}, {limit:g} mm: it needs {value:g}, which is "
         f"{limit - value:.3g} mm too little. Nothing was moved.",
     )

@@ -159,7 +159,7 @@ def rows_before(path: Path) -> list[SampleRow]:
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
     rows = read_samples(table)
     if not rows:
-        raise DataError(f"--after must be the folder of an earlier run on the bed, but {path} holds none.")
+        raise DataError(f"--after must be the folder of an earlier run on the test bed, but {path} holds none.")
     return rows
 
 

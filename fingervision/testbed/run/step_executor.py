@@ -69,7 +69,7 @@ def close(watch: Watch, act: Close) -> None:
 
     bed = watch.bed
     watch.follow(partial(bed.actuator.move, bed.limits.lower_mm, act.speed_mm_s), record=True, until=met)
-    why = felt[0] if felt else "nothing was met down to the bed's limit of position"
+    why = felt[0] if felt else "no contact was found down to the test bed's limit of position"
     watch.record.event("closed", f"Closing ended: {why}.", input_mm=watch.sight.position.newest)
 
 

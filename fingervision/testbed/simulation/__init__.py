@@ -1,1 +1,1 @@
-"""Components of simulated parts: stage, gripper, clocks, optics. Neither hardware nor diagnosis imports them."""
+"""Components of simulated parts: stage, gripper, clocks, optics. No hardware module imports these."""
