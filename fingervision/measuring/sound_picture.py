@@ -109,7 +109,12 @@ def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> 
     """Whether the picture shows squares of the codec's grid that the last undamaged picture lacks, shifted or not."""
     if frame.pixels.shape != last.frame.pixels.shape:
         return False
-    rows, columns = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)
+    if frame.coding is Coding.INTRAFRAME:
+        # JPEG codes each block's level as a difference to the one before it: a damaged level raises or lowers all that
+        # follow, up to the next restart marker, so that the only corners may lie far from the fingers.
+        rows, columns = _squares(0, frame.height_px, frame.height_px), _squares(0, frame.width_px, frame.width_px)
+    else:
+        rows, columns = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)
     if rows.stop - rows.start < 2 * SQUARE_PX or columns.stop - columns.start < 2 * SQUARE_PX:
         return False
     least_step = LEAST_STEP * min(abs(last.outcome.left.contrast), abs(last.outcome.right.contrast))

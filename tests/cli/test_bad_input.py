@@ -289,6 +289,17 @@ def test_bad_input_is_one_sentence_and_its_code(
     assert found == code
 
 
+def test_a_link_that_leads_back_to_itself_is_a_sentence_wherever_it_is_met(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    monkeypatch.setattr("fingervision.cli.cli", lambda **_: (tmp_path / "loop").resolve(strict=True))
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
+    assert "leads back to itself" in capsys.readouterr().err
+
+
 def test_a_folder_that_is_gone_is_a_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

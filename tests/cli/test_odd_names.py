@@ -64,6 +64,15 @@ def test_closed_streams_cost_no_result(tmp_path: Path, clip: Path, closed: str) 
     assert (tmp_path / "out" / "summary.json").exists()
 
 
+@pytest.mark.parametrize("closed", ["2>&-", "<&- 2>&- >&-"])
+def test_no_file_takes_the_place_of_a_closed_stream(tmp_path: Path, closed: str) -> None:
+    # FFmpeg writes to stream 2, whatever is open there.
+    code = "import os; from fingervision.cli import _mend_streams; _mend_streams(); f = os.open('new', os.O_CREAT); "
+    command = ["/bin/sh", "-c", f'"$@" {closed}', "sh", sys.executable, "-c", f"{code}raise SystemExit(f)"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    assert subprocess.run(command, cwd=tmp_path, env=environment, timeout=PATIENCE_S, check=False).returncode > 2
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full.")
 def test_a_full_output_is_a_sentence(tmp_path: Path, clip: Path) -> None:
     done = run(tmp_path, "measure", str(clip), *SCALE, "--out", "out", shell="> /dev/full")

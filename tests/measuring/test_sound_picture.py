@@ -78,6 +78,18 @@ def test_steps_and_vibrations_are_motion(coding: Coding, step_px: float) -> None
     assert [type(outcome) for outcome in outcomes] == [GapMeasurement] * COUNT
 
 
+@pytest.mark.parametrize("end", [80, SIZE_PX[1]])
+def test_a_wrong_level_that_goes_on_to_the_end_of_a_jpeg_is_damage(end: int) -> None:
+    # Its two corners lie far from the fingers (ITU-T T.81, F.1.2.1: levels are differences to the block before).
+    def raised(k: int, levels: np.ndarray) -> None:
+        if k == 6:
+            levels[64:end, 24:] = np.minimum(levels[64:end, 24:], 155) + 100
+            levels[80:end, :24] = np.minimum(levels[80:end, :24], 155) + 100
+
+    outcomes = judged(row([70.0 - 0.5 * k for k in range(COUNT)], Coding.INTRAFRAME, raised))
+    assert [isinstance(outcome, LostFrame) for outcome in outcomes] == [k == 6 for k in range(COUNT)]
+
+
 @BOTH
 def test_foreign_squares_that_move_no_edge_cost_no_frame(coding: Coding) -> None:
     frames = row([70.0] * COUNT, coding, lambda k, levels: beside_the_edges(levels) if k == 6 else None)

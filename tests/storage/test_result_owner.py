@@ -1,6 +1,7 @@
 """Results belong to one input: two never share a folder, named or not, and both may move together."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -36,3 +37,13 @@ def test_the_usual_folder_goes_beside_the_results_of_another_input(tmp_path: Pat
 def test_a_mark_that_cannot_be_read_is_nobodys(tmp_path: Path, mark: str) -> None:
     (tmp_path / ".fingervision.json").write_text(mark)
     assert own_folder(tmp_path, tmp_path / "run.mp4", named=True) == tmp_path
+
+
+def test_an_input_whose_name_is_not_utf8_is_found_again(tmp_path: Path) -> None:
+    source = tmp_path / os.fsdecode(b"caf\xe9.csv")
+    source.write_text("a\n")
+    (tmp_path / "out").mkdir()
+    mark_owner(tmp_path / "out", source)
+    assert own_folder(tmp_path / "out", source, named=True) == tmp_path / "out"
+    with pytest.raises(UsageError, match="holds the results of"):
+        own_folder(tmp_path / "out", tmp_path / "other.csv", named=True)
