@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -15,6 +16,10 @@ from fingervision.models.mechanism_state import MechanismState
 from fingervision.storage.simulation_csv import POSE
 
 _STYLES = ("-", "--", "-.")
+_IN_PLOT = 4
+"""Most curves of a plot whose legend fits into it."""
+_STILL = 0.01
+"""Range of a distance, as a share of it, below which it is plotted without its mean, whose digits would hide it."""
 
 
 def write_figures(table: Mapping[str, Mapping[str, float]], path: Path) -> None:
@@ -74,13 +79,16 @@ def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, l
 
 def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[MechanismState]], path: Path) -> None:
     """Plot distances of probe pairs (or single probes), force and stress over the input, for every kind of model."""
-    figure = Figure(figsize=(8.0, 8.5), layout="constrained")
+    figure = Figure(figsize=(9.5, 8.5), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
     for place, (kind, rows) in enumerate(states.items()):
         inputs = [state.input_mm for state in rows]
         style = _STYLES[place % len(_STYLES)]
         for number, (name, lengths) in enumerate(_lengths(mechanism, rows).items()):
-            upper.plot(inputs, lengths, style, color=f"C{number}", label=f"{name} ({kind})")
+            still = np.ptp(lengths) < _STILL * max(np.abs(lengths))
+            rest = round(float(np.mean(lengths)), 6) if still else 0.0
+            shown = f"{name} minus {rest:g} mm" if rest else name
+            upper.plot(inputs, np.array(lengths) - rest, style, color=f"C{number}", label=f"{shown} ({kind})")
         middle.plot(inputs, [state.force_n for state in rows], style, color="0.2", label=kind)
         for number, name in enumerate(rows[0].drives_n if len(mechanism.drives) > 1 else ()):
             forces = [state.drives_n[name] for state in rows]
@@ -88,9 +96,9 @@ def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[Mechanis
         lower.plot(inputs, [state.stress_mpa for state in rows], style, color="0.2", label=kind)
     upper.set_ylabel("distance / mm" if mechanism.pairs else "displacement / mm")
     if upper.lines:
-        upper.legend(fontsize="small")
+        _beside(upper)
     middle.set_ylabel("force of the input / N" if len(mechanism.drives) > 1 else "force at the drive / N")
-    middle.legend(fontsize="small")
+    _beside(middle)
     lower.axhline(mechanism.material.yield_mpa, color="C3", linewidth=0.8, linestyle=":")
     lower.annotate("yield", (1.0, mechanism.material.yield_mpa), xycoords=("axes fraction", "data"), color="C3",
                    xytext=(-4, -3), textcoords="offset points", ha="right", va="top", fontsize="small")  # fmt: skip
@@ -100,6 +108,14 @@ def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[Mechanis
         axes.grid(alpha=0.3)
     upper.set_title(f"{mechanism.name}: over the input")
     figure.savefig(path, dpi=130)
+
+
+def _beside(axes: Axes) -> None:
+    """Put a legend into the plot, or beside it where it would hide the curves."""
+    if len(axes.lines) > _IN_PLOT:
+        axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    else:
+        axes.legend(fontsize="small")
 
 
 def _lengths(mechanism: Mechanism, rows: Sequence[MechanismState]) -> dict[str, list[float]]:

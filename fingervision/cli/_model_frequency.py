@@ -22,6 +22,8 @@ from fingervision.models.modal_model import GAP, FreeModes, ModalModel, describe
 from fingervision.models.motion_in_time import MODES
 
 _MOST_MODES = 60
+_LEAST_RANGE, _LEAST_DEG = 1.1, 1.0
+"""Least range of the axes, as a ratio and in degrees."""
 _STYLES = ("-", "--", "-.")
 
 
@@ -159,6 +161,15 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     for axes in (lower, lower_force):
         axes.set_ylabel("phase / degrees")
         axes.set_xlabel("frequency / Hz")
+    for axes in (upper, upper_force):
+        low, high = axes.get_ylim()
+        if high < _LEAST_RANGE * low:
+            # A decade's ticks on a line next to constant would all read alike.
+            axes.set_yscale("linear")
+            axes.set_ylim(low / _LEAST_RANGE, high * _LEAST_RANGE)
+    for axes in (lower, lower_force):
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, -_LEAST_DEG), max(high, _LEAST_DEG))
     for axes in (upper, lower, upper_force, lower_force):
         axes.grid(alpha=0.3, which="both")
     upper.legend()

@@ -24,6 +24,8 @@ _PICTURES, _PERIODS, _A_SECOND = 24, 4, 24
 """Pictures per period, periods in the film, and pictures per second: one period takes one second for every
 frequency."""
 _FILM_DPI = 80
+_KILO = 1e4
+"""Frequency (Hz) from which on a title tells kilohertz: four digits would be a power of ten."""
 _MARGIN = 0.02
 _MOST_FILM_MODES = 18
 
@@ -91,12 +93,16 @@ def _panels(shapes: Sequence[ModeShape], title: str) -> tuple[Figure, list[tuple
             axes.set_xlim(low[0], high[0])
             axes.set_ylim(low[1], high[1])
             axes.set_aspect("equal")
-            axes.set_title(f"{shape.family}\n{shape.number}: {shape.frequency_hz:.4g} Hz", fontsize="small")
+            axes.set_title(f"{shape.family}\n{shape.number}: {_in_hz(shape.frequency_hz)}", fontsize="small")
             axes.tick_params(labelsize="x-small")
             axes.set_xlabel("x / mm", fontsize="x-small")
             moving.append((axes, curve, shape))
         grid[place][0].set_ylabel("y / mm", fontsize="x-small")
     return figure, moving
+
+
+def _in_hz(frequency_hz: float) -> str:
+    return f"{frequency_hz:.4g} Hz" if frequency_hz < _KILO else f"{1e-3 * frequency_hz:.4g} kHz"
 
 
 def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:

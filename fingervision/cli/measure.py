@@ -172,15 +172,19 @@ def command(
         frames=_frames(frames),
         gauges=gauges,
     )
+    follow = None
+    if mechanism is not None:
+        from fingervision.cli._measure_bodies import body_follower
+
+        # What is wrong with the drawing or its points is said before the recording is measured.
+        follow = body_follower(mechanism, points)
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)
     _report(measured, as_json)
-    if mechanism is not None:
-        from fingervision.cli._measure_bodies import follow_bodies
+    if follow is not None:
         from fingervision.frames.source import Wish, open_source
 
-        source = open_source(recording, Wish(rate_hz=rate_hz))
-        follow_bodies(source, mechanism, points, task, measured.folder.path, as_json)
+        follow(open_source(recording, Wish(rate_hz=rate_hz)), task, measured.folder.path, as_json)
     raise SystemExit(int(measured.exit_code))
 
 

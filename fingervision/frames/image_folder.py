@@ -13,6 +13,9 @@ from fingervision.frames.image_file import IMAGE_SUFFIXES, LOSSY_SUFFIXES, Unrea
 from fingervision.frames.image_times import TIMES_FILE, times_of
 from fingervision.frames.source import Description, Wish
 
+# From a picture in eleven days to the fastest cameras; what lies beyond is a slip, and gives times without meaning.
+LEAST_HZ, GREATEST_HZ = 1e-6, 1e7
+
 
 def accepts(name: str) -> bool:
     """Whether a name is a folder, an image, or a pattern that matches files."""
@@ -55,6 +58,11 @@ class ImageFolder:
     def __post_init__(self) -> None:
         if self.rate_hz is not None and not 0.0 < self.rate_hz < float("inf"):
             raise UsageError(f"--rate-hz must be positive, but is {self.rate_hz:g}.")
+        if self.rate_hz is not None and not LEAST_HZ <= self.rate_hz <= GREATEST_HZ:
+            raise UsageError(
+                f"--rate-hz must be between {LEAST_HZ:g} and {GREATEST_HZ:g} images per second, but is "
+                f"{self.rate_hz:g}."
+            )
         files = _files(self.name)
         times_s = times_of(files)
         if times_s is not None and self.rate_hz is not None:

@@ -18,6 +18,7 @@ from typing import Any
 
 from fingervision.domain.errors import DataError
 from fingervision.gauges.kinds import Kind, Spec, kind_named, kinds
+from fingervision.storage.toml_purpose import refuse_other_file
 from fingervision.storage.toml_section import Section, read_document
 
 SCHEMA = 1
@@ -84,6 +85,7 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
     DataError
         If a value is not allowed; the sentence names the line.
     """
+    refuse_other_file(path, values, "a gauge file", ["a gauge file"])
     top = Section(path, text, "", values)
     top.only(("schema", "gauge"))
     schema = top.whole("schema", low=1)

@@ -89,7 +89,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
         "messages": [[each.number, each.name, each.words] for each in said],
     }
     words = json.dumps(head, ensure_ascii=False).encode()
-    picture = b"" if seen is None else _PICTURES.of(seen, view.choices.zero_mm)
+    picture = b"" if seen is None else _PICTURES.of(seen)
     content = struct.pack(">I", len(words)) + words + picture
     newest = max([known.messages if is_same else 0, *(each.number for each in said)])
     return Next(content, Known(identity, last, newest))
@@ -135,16 +135,9 @@ def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
     }
 
 
-def _picture(seen: Seen, zero_mm: float) -> bytes:
-    if seen.outcome is None:
-        drawn = draw_overlay(seen.frame, _NOTHING, _NOTHING.words)
-    else:
-        row = seen.row
-        words = f"{seen.frame.index}"
-        if row is not None:
-            less = f" less zero {zero_mm:.4f}" if zero_mm else ""
-            words += f"  {row.status.value}" if row.gap_mm is None else f"  gap {row.gap_mm - zero_mm:.4f} mm{less}"
-        drawn = draw_overlay(seen.frame, seen.outcome, words)
+def _picture(seen: Seen) -> bytes:
+    """The picture with the measured points; the page itself says frame and value, in letters of its own size."""
+    drawn = draw_overlay(seen.frame, _NOTHING if seen.outcome is None else seen.outcome, "")
     # OpenCV would want blue first: to turn a whole picture's colours round takes twice as long as to code it.
     return bytes(simplejpeg.encode_jpeg(drawn, JPEG_QUALITY, "RGB", "420"))
 
@@ -153,7 +146,7 @@ def draw_beforehand(view: View) -> None:
     """Render the picture for the next messages in advance, unless the measurement is too slow."""
     seen = view.seen
     if seen is not None and not view.in_a_hurry:
-        _PICTURES.of(seen, view.choices.zero_mm)
+        _PICTURES.of(seen)
 
 
 def is_short(view: View, known: Known) -> bool:
@@ -176,12 +169,12 @@ class _Pictures:
     def __init__(self) -> None:
         self._lock = Lock()
         self._seen: Seen | None = None
-        self._zero_mm, self._coded = 0.0, b""
+        self._coded = b""
 
-    def of(self, seen: Seen, zero_mm: float) -> bytes:
+    def of(self, seen: Seen) -> bytes:
         with self._lock:
-            if self._seen is not seen or self._zero_mm != zero_mm:
-                self._seen, self._zero_mm, self._coded = seen, zero_mm, _picture(seen, zero_mm)
+            if self._seen is not seen:
+                self._seen, self._coded = seen, _picture(seen)
             return self._coded
 
 

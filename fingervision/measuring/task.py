@@ -151,6 +151,13 @@ def task_for_frames(task: Task, description: Description) -> Task:
             f"--roi must lie inside the frame of {width_px}x{height_px} pixels, but is "
             f"{region.x_px},{region.y_px},{region.width_px},{region.height_px} (first column, row, width, height)."
         )
+    below_px = task.below_tip_mm * task.scale.px_per_mm
+    if below_px >= max(width_px, height_px):
+        raise UsageError(
+            f"--below-tip-mm must lie within the picture of {width_px}x{height_px} pixels, but "
+            f"{task.below_tip_mm:g} mm are {below_px:.0f} px at {task.scale.px_per_mm:g} px/mm: state a smaller "
+            "height, or the right scale."
+        )
     if task.drive is not None and not description.has_times:
         raise UsageError(
             f"--drive needs a recording with times, but {description.name} has none: "

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fingervision.domain.gripper import Material
 from fingervision.models.flexure import Flexure
 from fingervision.models.hinge_compliance import beam_compliance
-from fingervision.models.hinge_correction import HingeTheory, hinge_ratio
+from fingervision.models.hinge_correction import SWAY_SHEAR, HingeTheory, hinge_ratio, sway_shear
 from fingervision.models.notch import Notch
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon
@@ -107,8 +107,14 @@ class FlexureSpan:
             notch = self.notch(plate_mm)
             wide = notch if width_effect else replace(notch, plate_mm=_NARROW * notch.thickness_mm)
             root = np.sqrt(hinge_ratio(wide, material, theory)[[0, 1, 5]])
-            parts = [beam_compliance(notch, material, span)[_PLANAR] for span in spans]
-            return np.asarray(root[:, None] * np.array(parts) * root)
+            parts = np.array([beam_compliance(notch, material, span)[_PLANAR] for span in spans])
+            found = root[:, None] * parts * root
+            if corrected:
+                # Sections of a notch are not sheared as a straight beam's are, and bending does not make them yield.
+                beam = _SHEAR * material.youngs_modulus_mpa / material.shear_modulus_mpa
+                shear = sway_shear(notch) - SWAY_SHEAR + root[1] ** 2 * (SWAY_SHEAR - beam)
+                found[:, 1, 1] += shear * parts[:, 0, 0]
+            return np.asarray(found)
         shares = (0.0, 0.0)
         if corrected and width_effect:
             ratio = plate_mm / self.flexure.bent_mm

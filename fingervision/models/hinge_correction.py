@@ -129,6 +129,30 @@ _BLOCKS_OVER_PLANES = (
 )
 
 
+_SWAY = (1.4026, 1.3674, 1.3122, 1.2233, 1.0407, 0.8454, 0.6979)
+"""By t / R up to 0.8: ratio of the shear compliance that makes a notch as compliant to forces across it, with ends that
+stay parallel, as plane-stress elements find it between elastic blocks (`tests/benchmarks/models_sway_table.py`), to
+that of a Timoshenko beam. Its sections are not sheared as a straight beam's are, because they widen quickly."""
+
+
+def sway_shear(notch: Notch) -> float:
+    """Shear compliance of a notch in a body, as a multiple of the integral of 1 / (E b h) over its length.
+
+    In plane stress it does not depend on Poisson's ratio: stresses under given loads do not (Michell's theorem).
+    """
+    return SWAY_SHEAR * _sway_ratio(notch.curvature_ratio)
+
+
+SWAY_SHEAR = 6.0 / 5.0 * 2.0 * (1.0 + _POISSON)
+"""The same for a Timoshenko beam of the material of the tables."""
+
+
+@lru_cache(maxsize=512)
+def _sway_ratio(t_over_r: float) -> float:
+    at = np.log(_T_OVER_R[: len(_SWAY)])
+    return float(PchipInterpolator(at, _SWAY)(np.clip(np.log(t_over_r), at[0], at[-1])))
+
+
 @lru_cache(maxsize=1)
 def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpolator]:
     """Curves over log(t / R): ratios that depend on b / t, plane stress to beam theory, blocks to planes."""

@@ -27,6 +27,8 @@ residual that is accepted as rounding error if it does not fall any more."""
 _ON_MM = 1e-7
 _STEP_MM = 0.5
 _SCALE_MM = 1e-3
+_SMALLER = (1, 4, 16)
+"""Numbers of smaller steps tried where a step does not converge."""
 _CURVE = 3
 """Number of previous equilibria from which the next one is extrapolated."""
 
@@ -61,9 +63,21 @@ class _Tangent:
         step[body.free] = solver.solve(-internal_n[body.free])
         pressed = np.zeros(body.face.size)
         if self.contact:
-            pressed = contact_forces_n(self.compliance, body.face_gap_mm(moved) + step[body.face])
+            try:
+                pressed = contact_forces_n(self.compliance, body.face_gap_mm(moved) + step[body.face])
+            except np.linalg.LinAlgError as error:  # far from an equilibrium a tangent need not be positive definite
+                raise ModelError("The tangent of the deformed shape is not that of an equilibrium.") from error
             step[body.free] += self.by_force @ pressed
         return step, pressed
+
+    def ahead(self, last: Equilibrium, input_mm: float) -> tuple[Array, Array]:
+        """Predict displacements and contact forces at an input from the tangent at the last equilibrium."""
+        body, moved = self.body, last.displacement_mm
+        self.renew(moved)
+        given = np.zeros_like(moved)
+        given[body.driven] = input_mm - last.input_mm
+        step, pressed = self.step(moved + given, body.tangent(moved)[0] @ given + body.internal_force_n(moved))
+        return moved + given + step, pressed
 
 
 def large_equilibrium(
@@ -99,9 +113,32 @@ def large_equilibrium(
 
 def _next(tangent: _Tangent, input_mm: float, path: list[Equilibrium]) -> Equilibrium:
     """Find the next equilibrium of a path."""
+    body, last = tangent.body, path[-1]
+    try:
+        pressed = last.contact_n if tangent.contact else np.zeros(body.face.size)
+        return _settled(tangent, input_mm, _predicted(body, input_mm, path), pressed)
+    except ModelError:
+        pass
+    # The prediction led too far from the equilibria: follow them by their tangents, in smaller steps.
+    for parts in _SMALLER[:-1]:
+        try:
+            return _followed(tangent, input_mm, last, parts)
+        except ModelError:
+            continue
+    return _followed(tangent, input_mm, last, _SMALLER[-1])
+
+
+def _followed(tangent: _Tangent, input_mm: float, last: Equilibrium, parts: int) -> Equilibrium:
+    """Follow the equilibria from the last one to an input in equal steps, each predicted by the tangent."""
+    state = last
+    for at_mm in np.linspace(last.input_mm, input_mm, parts + 1)[1:].tolist():
+        state = _settled(tangent, at_mm, *tangent.ahead(state, at_mm))
+    return state
+
+
+def _settled(tangent: _Tangent, input_mm: float, moved: Array, pressed: Array) -> Equilibrium:
+    """Iterate from a prediction of displacements and contact forces to the equilibrium at an input."""
     body = tangent.body
-    moved = _predicted(body, input_mm, path)
-    pressed = path[-1].contact_n if tangent.contact else np.zeros(body.face.size)
     scale_n = float(np.abs(body.stiffness_n_mm @ body.unit_displacement_mm).max()) * max(abs(input_mm), _SCALE_MM)
     before, renewed, since, stepped = np.inf, 0, 0, False
     while True:

@@ -13,6 +13,8 @@ from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape
 from fingervision.models.width_effect import force_uncertainty
 
+_SIZES_MM = (0.3, 5000.0)
+"""Sizes of flexure mechanisms, from etched silicon to large machines: drawings in metres or micrometres lie outside."""
 _SAME_AREA = 1e-2
 """Relative difference below which two areas count as equal: areas of regions with arcs are computed from polygons, with
 an error of 1e-3."""
@@ -152,6 +154,11 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             "overlap, and let no cut separate them."
         )
     size = region.size_mm
+    if not _SIZES_MM[0] <= size <= _SIZES_MM[1]:
+        raise DataError(
+            f"{name} must be {_SIZES_MM[0]:g} to {_SIZES_MM[1]:g} mm large, but is {size:.3g} mm; check whether all "
+            "lengths are millimetres."
+        )
     uncut = PlanarRegion(mechanism.bodies)
     for flexure in mechanism.flexures:
         t = flexure.thickness_mm

@@ -16,6 +16,7 @@ from fingervision.models.plane_shapes import crosses_itself
 from fingervision.storage.finite import is_number
 from fingervision.storage.plain_file import NotUtf8Error, text_of
 from fingervision.storage.sn_line_toml import check_below_yield, read_sn_line
+from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
@@ -72,6 +73,7 @@ def read_gripper(path: Path) -> Gripper:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
         raise DataError(f"{path} must be TOML, but is not: {error}.") from error
+    refuse_other_file(path, tables, "the drawing of a gripper or mechanism", DRAWINGS)
     return gripper_from_tables(tables, str(path))
 
 

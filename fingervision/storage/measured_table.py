@@ -106,6 +106,7 @@ def measured_rows(
             f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {kept.size}: measure more."
         )
     column = {name: each.value[kept] for name, each in values.items() if each.present[kept].all()}
+    _check_uncertainties(column, kept, path)
     names = [run_cells[row] for row in kept.tolist()] if run_cells is not None else [""] * kept.size
     count = len(set(names))
     if count > MOST_RUNS:
@@ -155,6 +156,17 @@ def measured_rows(
         u_clock_s=u_clock_beside(path),
         channels=channels_of(channels, kept[order]),
     )
+
+
+def _check_uncertainties(column: Mapping[str, NDArray[np.float64]], rows: NDArray[np.intp], path: Path) -> None:
+    """Refuse negative standard uncertainties."""
+    for name, value in column.items():
+        if name.startswith("u_") and value.min() < 0.0:
+            row = int(np.argmin(value))
+            raise DataError(
+                f"{name} is a standard uncertainty and must not be negative, but is {value[row]:g} in data row "
+                f"{rows[row] + 1} of {path}: correct it, or leave the column out."
+            )
 
 
 def _left_out(total: int, kept: int, besides: int) -> list[str]:

@@ -20,6 +20,7 @@ from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
 from fingervision.storage.plain_file import text_of
+from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
 
 _TOP = (
     "schema",
@@ -113,6 +114,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
         raise InputFileError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError, RecursionError) as error:
         raise unreadable(error)(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+    refuse_other_file(path, tables, "the drawing of a mechanism or gripper", DRAWINGS)
     return MechanismDrawing(path, *bare_tables(tables, str(path)))
 
 

@@ -5,7 +5,8 @@ only.
 """
 
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
-from fingervision.vision.patch_registration import PatchReference, Registered, patch_reference, register
+from fingervision.vision.patch_reference import PatchReference, patch_reference
+from fingervision.vision.patch_registration import Registered, register
 from fingervision.vision.straight_edge_fit import (
     Band,
     EdgeStart,

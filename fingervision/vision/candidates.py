@@ -11,6 +11,7 @@ from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise_local
 from fingervision.vision.crossing import CROSSED, is_crossed
 from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, CoarseFingers, find_fingers
+from fingervision.vision.gap_company import LETTERS, has_company
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.part_removal import is_likelier, looks_parted, without_part
 from fingervision.vision.settings import Settings
@@ -57,6 +58,10 @@ def candidates(
                 and fingers.are_cut
             ):
                 fingers = MAY_BE_GROUND
+            # The class that makes up the picture's border may be a sheet of paper.
+            if light_gap is not dark_first and isinstance(fingers, CoarseFingers):
+                mask = split.dark if light_gap else split.light
+                fingers = LETTERS if has_company(mask, fingers, settings.below_tip_px) else fingers
             if isinstance(fingers, CoarseFingers) and not (fingers.is_rooted or fingers.is_joined):
                 unsure.append(
                     (split, fingers, light_gap)

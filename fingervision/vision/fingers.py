@@ -17,7 +17,7 @@ from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.coarse_fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.flanks import follow_down, has_straight_flanks
-from fingervision.vision.likeness import MOST_TURNED, Build, are_alike, build, common_turn, end_alike
+from fingervision.vision.likeness import MOST_TURNED, Build, are_alike, build, common_turn, end_alike, lie_level
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.outlines import Outline, Outlines, find_outlines, longest_first
 from fingervision.vision.tops import Top, find_tops
@@ -34,6 +34,9 @@ ROOTED_BONUS = 2.0
 LYING_HEIGHTS = 6.0
 # Of things that lie in view only those that are so many times as long as wide may be fingers: coins are not.
 LYING_SLENDER = 1.5
+# Fingers are longer than their gap is wide, or a little shorter: two things that lie in view and are farther apart than
+# so many times the length of the shorter one are two things.
+LYING_APART = 2.0
 # A gripper that lies in view is the only thing of its size: no third outline has this share of its length.
 COMPANY_SHARE = 0.4
 # A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
@@ -146,6 +149,10 @@ def _best_pair(
         if is_lying and any(
             top.prominence_px < LYING_SLENDER * one.width_px for top, one in zip((left, right), builds, strict=True)
         ):
+            continue
+        step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
+        is_far = apart_px - 0.5 * sum(one.width_px for one in builds) > LYING_APART * prominence
+        if is_lying and (is_far or not lie_level(step_px, apart_px, below_tip_px, builds)):
             continue
         if _is_open(mask, pair[0], pair[1], orientation, below_tip_px, builds):
             are_cut = builds[0].is_cut and builds[1].is_cut

@@ -101,6 +101,24 @@ def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tupl
     return all(abs(one.lean - turn) <= LEANS_ALIKE for one in builds)
 
 
+def lie_level(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build]) -> bool:
+    """Whether two objects that lie wholly in view end at one height, in the camera's angle that they show themselves.
+
+    Fingers that come in from the picture's border show by this that they belong together, whatever the camera's angle.
+    Nothing of the kind is known of two bars that lie in view: the step between their ends must be that of a camera
+    turned as both of them lean on average.
+
+    Parameters
+    ----------
+    step_px, apart_px, below_tip_px : float
+        As in `end_alike`.
+    builds : (Build, Build)
+        Width and tilt of the left and of the right object.
+    """
+    turn = 0.5 * (builds[0].lean + builds[1].lean)
+    return abs(step_px + turn * apart_px) <= STEP_HEIGHTS * below_tip_px
+
+
 def common_turn(leans: Sequence[float]) -> float:
     """Common tilt of both fingers, as a slope; 0 if their tilts differ or are negligible."""
     turn = 0.5 * sum(leans)

@@ -43,7 +43,7 @@ def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> C
     outcome : GapMeasurement or NoGap
         Result of the measurement.
     words : str
-        Text with the value, or with the reason why there is none.
+        Text with the value, or with the reason why there is none; empty for no text.
 
     Returns
     -------
@@ -62,7 +62,8 @@ def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> C
     if outcome.held is not None:
         held = outcome.held
         _line(canvas, (held.left_x_px, held.left_y_px), (held.right_x_px, held.right_y_px), HELD, size)
-    _write(canvas, words, WORDS if isinstance(outcome, GapMeasurement) else FAILURE, size)
+    if words:
+        _write(canvas, words, WORDS if isinstance(outcome, GapMeasurement) else FAILURE, size)
     return canvas
 
 

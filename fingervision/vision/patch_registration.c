@@ -6,13 +6,13 @@ static void sampled_row(const float *c, int64_t width, int64_t n, float *x, floa
         int32_t column = (int32_t)x[i], row = (int32_t)y[i];
         float f = x[i] - (float)column, g = 1.0f - f, h = y[i] - (float)row, k = 1.0f - h;
         at[i] = (row - 1) * (int32_t)width + column - 1;
-        across[i][0] = g * g * g / 6.0f;
-        across[i][1] = 2.0f / 3.0f - f * f * (0.5f + 0.5f * g);
-        across[i][3] = f * f * f / 6.0f;
+        across[i][0] = g * g * g / 6.0f + (float)CURVATURE * g;
+        across[i][1] = 2.0f / 3.0f - f * f * (0.5f + 0.5f * g) + (float)CURVATURE * (3.0f * f - 2.0f);
+        across[i][3] = f * f * f / 6.0f + (float)CURVATURE * f;
         across[i][2] = 1.0f - across[i][0] - across[i][1] - across[i][3];
-        down[i][0] = k * k * k / 6.0f;
-        down[i][1] = 2.0f / 3.0f - h * h * (0.5f + 0.5f * k);
-        down[i][3] = h * h * h / 6.0f;
+        down[i][0] = k * k * k / 6.0f + (float)CURVATURE * k;
+        down[i][1] = 2.0f / 3.0f - h * h * (0.5f + 0.5f * k) + (float)CURVATURE * (3.0f * h - 2.0f);
+        down[i][3] = h * h * h / 6.0f + (float)CURVATURE * h;
         down[i][2] = 1.0f - down[i][0] - down[i][1] - down[i][3];
     }
     for (int64_t i = 0; i < n; i++) {

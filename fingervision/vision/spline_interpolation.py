@@ -2,6 +2,13 @@
 
 Source: Unser, IEEE Signal Processing Magazine 16(6), 1999, doi:10.1109/79.799930. Gaussian smoothing before the
 interpolation costs no extra time, because it is part of the spline's prefilter.
+
+A spline between pixels holds images of the picture's spectrum about every multiple of the pixels' frequency. They seem
+to move otherwise than the picture, which biases a registration by the sub-pixel phase (Schreier, Braasch & Sutton,
+Optical Engineering 39(11), 2000, doi:10.1117/1.1314593). A kernel `b + c b''`, where b is the B-spline, has the same
+four pixels and order 4 too (Blu, Thevenaz & Unser, IEEE Trans. Image Processing 10(7), 2001, doi:10.1109/83.931101);
+its spectrum `sinc(f)^4 (1 - c (2 pi f)^2)` has one zero more, at a frequency that can be chosen. With coefficients of
+the plain B-spline it smooths a little more.
 """
 
 from functools import cache
@@ -35,19 +42,36 @@ def _prefilter(sigma_px: float) -> Floats:
     return np.asarray(kernel / kernel.sum(), dtype=np.float32)
 
 
+def _symbol(curvature: float) -> Doubles:
+    """Values of the kernel `b + curvature b''` at the pixels -1, 0 and 1."""
+    side = 1.0 / 6.0 + curvature
+    return np.array([side, 1.0 - 2.0 * side, side])
+
+
+def _slope(curvature: float) -> Doubles:
+    """Derivatives of that kernel at the pixels -2 to 2, as means of both sides where it bends."""
+    return np.array([0.5 * curvature, 0.5 - curvature, 0.0, curvature - 0.5, -0.5 * curvature])
+
+
 @cache
-def derivative_power(sigma_px: float = 0.0) -> float:
-    """Variance of the spline's derivative at a pixel along one axis, for pixel noise of unit variance."""
-    kernel = np.convolve(_prefilter(sigma_px).astype(np.float64), [0.5, 0.0, -0.5])
-    across = np.convolve(_prefilter(sigma_px).astype(np.float64), [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0])
+def smoothing(sigma_px: float, curvature: float = 0.0) -> Doubles:
+    """Filter from a picture's levels to the interpolated levels at the pixels: all the smoothing there is."""
+    return np.convolve(_prefilter(sigma_px).astype(np.float64), _symbol(curvature))
+
+
+@cache
+def derivative_power(sigma_px: float = 0.0, curvature: float = 0.0) -> float:
+    """Variance of the interpolation's derivative at a pixel along one axis, for pixel noise of unit variance."""
+    kernel = np.convolve(_prefilter(sigma_px).astype(np.float64), _slope(curvature))
+    across = smoothing(sigma_px, curvature)
     return float(kernel @ kernel) * (float(across @ across) if sigma_px > 0.0 else 1.0)
 
 
 @cache
-def phase_power(sigma_px: float = 0.0, steps: int = 64) -> Doubles:
+def phase_power(sigma_px: float = 0.0, curvature: float = 0.0, steps: int = 64) -> Doubles:
     """Variance of an interpolated level for unit pixel noise, by the fraction of a pixel along one axis."""
     fraction = np.arange(steps) / steps
-    by_phase = np.stack(weights(fraction), axis=1)
+    by_phase = np.stack(weights(fraction, curvature), axis=1)
     kernel = _prefilter(sigma_px).astype(np.float64)
     return np.array([np.sum(np.convolve(kernel, w) ** 2) for w in by_phase])
 
@@ -58,12 +82,12 @@ def interpolated_power(place_px: float) -> float:
     return float(table[round((place_px % 1.0) * table.size) % table.size])
 
 
-def weights(fraction: NDArray[np.floating]) -> tuple[NDArray[np.floating], ...]:
-    """Weights of the cubic B-spline for the four pixels around a position."""
+def weights(fraction: NDArray[np.floating], curvature: float = 0.0) -> tuple[NDArray[np.floating], ...]:
+    """Weights of the kernel `b + curvature b''` for the four pixels around a position."""
     f, g = fraction, 1.0 - fraction
     f2, g2 = f * f, g * g
-    first, last = g2 * g / 6.0, f2 * f / 6.0
-    second = 2.0 / 3.0 - f2 * (0.5 + 0.5 * g)
+    first, last = g2 * g / 6.0 + curvature * g, f2 * f / 6.0 + curvature * f
+    second = 2.0 / 3.0 - f2 * (0.5 + 0.5 * g) + curvature * (3.0 * f - 2.0)
     return first, second, 1.0 - first - second - last, last
 
 
@@ -73,16 +97,16 @@ def coefficients(levels: Floats, sigma_px: float = 0.0) -> Floats:
     return np.asarray(cv2.sepFilter2D(levels, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REFLECT_101))
 
 
-def levels_and_derivatives(c: Floats) -> tuple[Floats, Floats, Floats]:
-    """Values and derivatives (by x and y) of the spline at the pixels, with periodic borders."""
+def levels_and_derivatives(c: Floats, curvature: float = 0.0) -> tuple[Floats, Floats, Floats]:
+    """Values and derivatives (by x and y) of the interpolation at the pixels, with periodic borders."""
+    value, slope = _symbol(curvature).astype(np.float32), _slope(curvature).astype(np.float32)
 
-    def mean(of: Floats, axis: int) -> Floats:
-        return (np.roll(of, 1, axis) + 4 * of + np.roll(of, -1, axis)) / 6.0
+    def along(of: Floats, weight: Floats, axis: int) -> Floats:
+        reach = weight.size // 2
+        return sum((w * np.roll(of, k - reach, axis) for k, w in enumerate(weight.tolist())), np.zeros_like(of))
 
-    def slope(of: Floats, axis: int) -> Floats:
-        return (np.roll(of, -1, axis) - np.roll(of, 1, axis)) * 0.5
-
-    return mean(mean(c, 0), 1), mean(slope(c, 1), 0), mean(slope(c, 0), 1)
+    flat = along(c, value, 0)
+    return along(flat, value, 1), along(flat, slope, 1), along(along(c, value, 1), slope, 0)
 
 
 def sampled(flat: Floats, start: NDArray[np.intp], stride: int, x: Floats, y: Floats) -> Floats:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.patch_registration import LEAST_INFORMATION, MARGIN_PX, ROUNDING
+from fingervision.vision.patch_covariance import LEAST_INFORMATION, ROUNDING
+from fingervision.vision.patch_reference import MARGIN_PX
 from fingervision.vision.spline_interpolation import coefficients, interpolated_power, sampled
 
 Floats = NDArray[np.float32]

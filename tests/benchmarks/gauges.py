@@ -1,6 +1,6 @@
 """Gauges: how well, how sure, how fast, and whether they stay silent where there is nothing.
 
-    python -m tests.benchmarks.gauges [--each 40] [--only patches photographs lines circles markers cost silence]
+    python -m tests.benchmarks.gauges [--each 40] [--seed 1] [--only patches photographs drawings ... silence]
 
 patches      rendered textures moved by tenths of a pixel: bias and SD of shift_x, SD over the bound from the gradient
              of the noiseless picture (both pictures have noise: sigma sqrt(2) (H^-1)^(1/2)), stated u over SD, share of
@@ -8,6 +8,7 @@ patches      rendered textures moved by tenths of a pixel: bias and SD of shift_
 photographs  textures that scikit-image ships (gravel, grass, brick), moved by whole pixels and binned by 10, seen
              through optics of 0.7 and 0.4 px and without any (aliased), at as many places as `--each`: bias at shifts
              of 0.1 to 0.9 px, RMS of the error, median stated u, share within 1.96 u
+drawings     the same of surfaces drawn with sharp edges (`drawn_surfaces`), a new one for each, also moved down
 lines        angle: RMS over the Cramer-Rao bound of a step with known levels and blur, over stated u; within 1.96 u
 circles      RMS of the centre at radius 20, noise 2, blur 0.9; bias of the diameter; share within 1.96 u
 markers      RMS of the middle, over the stated u (the bound of a mark of known shape), share within 1.96 u
@@ -30,6 +31,7 @@ from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.reading import Reading
 from fingervision.vision.pipeline import Settings
+from tests.benchmarks.drawn_surfaces import SURFACES
 from tests.gauges.drawn import Texture, bar, checker, cross, disc, drawn, half_plane, seen
 from tests.gauges.followed import followed, gauges_of, share_within
 
@@ -51,8 +53,8 @@ def _bound(light: np.ndarray, x: int, y: int, half: int) -> float:
     return float(np.sqrt(2 * ROUNDED * np.linalg.inv(g @ g.T)[0, 0]))
 
 
-def patches(each: int, folder: Path) -> None:
-    rng = np.random.default_rng(51)
+def patches(each: int, folder: Path, seed: int = 1) -> None:
+    rng = np.random.default_rng([51, seed])
     gauges = gauges_of(folder, PATCH)
     errors, ratios, u, all_errors, all_u, missing = [], [], [], [], [], 0
     for number in range(each):
@@ -80,40 +82,56 @@ def patches(each: int, folder: Path) -> None:
     )
 
 
-def photographs(each: int, folder: Path) -> None:
+def _shifted(words: str, wholes: Iterator[np.ndarray], each: int, noise: float, seed: int, folder: Path) -> None:
+    """Move surfaces that continue beyond their border by tenths of a pixel, and print what patches say."""
     keys = 'kind="patch"\nx_px=24\ny_px=24\nreach_px=3\n'
     gauges = [gauges_of(folder, f"{keys}width_px={n}\nheight_px={n}") for n in (21, 31)]
-    cases = [(name, blur) for blur in (0.7, 0.4, 0.0) for name in ("gravel", "grass", "brick")]
-    for name, blur in cases:
-        whole = gaussian_filter(np.asarray(getattr(skimage.data, name)(), dtype=float), 10 * blur)
-        whole = 128 + (whole - whole.mean()) * 40 / whole.std()
-        rng = np.random.default_rng(52)
-        errors, u = np.full((each, 9), np.nan), np.full((each, 9), np.nan)
-        for place in range(each):
-            scene = np.roll(whole, rng.integers(0, 512, 2), axis=(0, 1))
-            scene = scene.T if place % 2 else scene
+    rng = np.random.default_rng([52, seed])
+    errors, u = np.full((each, 9, 2), np.nan), np.full((each, 9, 2), np.nan)
+    for place, whole in zip(range(each), wholes, strict=False):
+        scene = 128 + (whole - whole.mean()) * 40 / whole.std()
+        scene = np.roll(scene, rng.integers(0, min(scene.shape), 2), axis=(0, 1))
+        scene = scene.T if place % 2 else scene
 
-            def camera(shift: int, scene: np.ndarray = scene, rng: np.random.Generator = rng) -> np.ndarray:
-                part = np.roll(scene, shift, axis=1)[:490, 11:501]
-                return seen(part.reshape(49, 10, 49, 10).mean(axis=(1, 3)), 0.3, rng)
+        def camera(x: int, y: int, scene: np.ndarray = scene) -> np.ndarray:
+            part = np.roll(scene, (y, x), axis=(0, 1))[:490, 11:501]
+            return seen(part.reshape(49, 10, 49, 10).mean(axis=(1, 3)), noise, rng)
 
-            first = camera(0)
-            for shift in range(1, 10):
-                reading = followed(gauges[place % 2], [first, camera(shift)])[1][0]
-                if reading.quantities:
-                    value, stated = _numbers(reading)[0]
-                    errors[place, shift - 1], u[place, shift - 1] = value - shift / 10, stated
-        there = np.isfinite(errors)
-        biases = " ".join(f"{own[valued].mean():+.4f}" for own, valued in zip(errors.T, there.T, strict=True))
-        print(
-            f"photographs  {name}, blur {blur}: n {there.sum()}  bias {biases} px, RMS "
-            f"{np.sqrt(np.mean(errors[there] ** 2)):.4f}, u {np.median(u[there]):.4f}, within "
-            f"{share_within(errors[there], u[there]):.3f}"
-        )
+        first = camera(0, 0)
+        for shift in range(1, 10):
+            down = int(rng.integers(-9, 10))
+            reading = followed(gauges[place % 2], [first, camera(shift, down)])[1][0]
+            if reading.quantities:
+                value, stated = _numbers(reading)[:2].T
+                errors[place, shift - 1], u[place, shift - 1] = value - (shift / 10, down / 10), stated
+    there = np.isfinite(errors)
+    biases = " ".join(f"{np.nanmean(own):+.4f}" for own in errors[:, :, 0].T) if there.any() else ""
+    print(
+        f"{words}: n {there.sum() // 2} of {9 * each}  bias {biases} px, RMS {np.sqrt(np.nanmean(errors**2)):.4f}, u "
+        f"{np.nanmedian(u):.4f}, within {share_within(errors[there], u[there]):.3f}",
+        flush=True,
+    )
 
 
-def lines(each: int, folder: Path) -> None:
-    rng = np.random.default_rng(53)
+def photographs(each: int, folder: Path, seed: int = 1) -> None:
+    for blur in (0.7, 0.4, 0.0):
+        for name in ("gravel", "grass", "brick"):
+            # Mirrored, it continues beyond its border without a seam, which would be a sharp edge through optics too.
+            tile = np.asarray(getattr(skimage.data, name)(), dtype=float)
+            whole = gaussian_filter(np.pad(tile, ((0, 512), (0, 512)), mode="symmetric"), 10 * blur, mode="wrap")
+            _shifted(f"photographs  {name}, blur {blur}", iter([whole] * each), each, 0.3, seed, folder)
+
+
+def drawings(each: int, folder: Path, seed: int = 1) -> None:
+    for blur, noise in ((0.7, 2.0), (0.4, 0.3), (0.0, 0.3)):
+        for name, draw in SURFACES.items():
+            rng = np.random.default_rng([seed, len(name)])
+            wholes = (gaussian_filter(draw(rng), 10 * blur, mode="wrap") for _ in range(each))
+            _shifted(f"drawings     {name}, blur {blur}, noise {noise}", wholes, each, noise, seed, folder)
+
+
+def lines(each: int, folder: Path, seed: int = 1) -> None:
+    rng = np.random.default_rng([53, seed])
     errors, u, length, blur = [], [], 60.0, 0.9
     for _ in range(each):
         angle, lean = rng.uniform(-180, 180), rng.uniform(-0.1, 0.1)
@@ -133,8 +151,8 @@ def lines(each: int, folder: Path) -> None:
     )
 
 
-def circles(each: int, folder: Path) -> None:
-    rng = np.random.default_rng(54)
+def circles(each: int, folder: Path, seed: int = 1) -> None:
+    rng = np.random.default_rng([54, seed])
     gauges = gauges_of(folder, 'kind = "circle"\nx_px = 55\ny_px = 55\ndiameter_px = 40\nreach_px = 10')
     errors, u = [], []
     for _ in range(each):
@@ -153,8 +171,8 @@ def circles(each: int, folder: Path) -> None:
     )
 
 
-def markers(each: int, folder: Path) -> None:
-    rng = np.random.default_rng(55)
+def markers(each: int, folder: Path, seed: int = 1) -> None:
+    rng = np.random.default_rng([55, seed])
     for shape in ("dot", "cross", "corner"):
         keys = f'kind = "marker"\nx_px = 55\ny_px = 55\nsize_px = 25\nshape = "{shape}"\nreach_px = 8'
         gauges, errors, u = gauges_of(folder, keys), [], []
@@ -175,8 +193,8 @@ def markers(each: int, folder: Path) -> None:
         )
 
 
-def cost(each: int, folder: Path) -> None:
-    rng = np.random.default_rng(56)
+def cost(each: int, folder: Path, seed: int = 1) -> None:
+    rng = np.random.default_rng([56, seed])
     texture = Texture(rng, 420, 4.5, 1.6)
     textured = [seen(texture.light((480, 640), 320 + 0.7 * k, 240 - 0.3 * k, 5e-4 * k), NOISE, rng) for k in range(6)]
     keys = 'kind="patch"\nwidth_px=31\nheight_px=31\n'
@@ -219,8 +237,8 @@ def _empty(rng: np.random.Generator, shape: tuple[int, int], has_texture: bool) 
         number += 1
 
 
-def silence(each: int, folder: Path) -> None:
-    rng = np.random.default_rng(57)
+def silence(each: int, folder: Path, seed: int = 1) -> None:
+    rng = np.random.default_rng([57, seed])
     texture = Texture(rng, 75)
     shown = texture.light(SHAPE, 55, 55, 0.0)
     things = {
@@ -252,17 +270,18 @@ def silence(each: int, folder: Path) -> None:
         )
 
 
-PARTS = {f.__name__: f for f in (patches, photographs, lines, circles, markers, cost, silence)}
+PARTS = {f.__name__: f for f in (patches, photographs, drawings, lines, circles, markers, cost, silence)}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--each", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", nargs="+", choices=sorted(PARTS), default=list(PARTS))
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for name in arguments.only:
-            PARTS[name](arguments.each, Path(folder))
+            PARTS[name](arguments.each, Path(folder), arguments.seed)
 
 
 if __name__ == "__main__":

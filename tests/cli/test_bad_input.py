@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -27,6 +28,8 @@ FILES: dict[str, str | bytes] = {
     "nan.csv": TABLE + "0,0,nan\n",
     "empty.csv": "",
     "head.csv": TABLE,
+    "below.csv": TABLE.replace("\n", ",u_gap_mm\n")
+    + "".join(f"{k},{k},{k},{0.01 - 0.02 * (k == 7)}\n" for k in range(9)),
     "short.csv": TABLE + "0,0,1\n1,1\n",
     "text.csv": "hello world\n",
     "json.csv": '{"a": 1}\n',
@@ -84,6 +87,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scenes = [two_fingers(60.0 + k, below_tip_px=6.0, width_px=40.0, frame=(240, 200)) for k in range(2)]
     frames = (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes))
     write_clip(found / "c.mkv", frames, Ffv1())
+    (found / "good").mkdir()
+    cv2.imwrite(str(found / "good" / "a.png"), render(scenes[0], Camera(), rng))
     for name, content in FILES.items():
         (found / name).parent.mkdir(exist_ok=True)
         (found / name).write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -191,6 +196,7 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (diagnose("nan.csv"), 1, "nan"),
     (diagnose("empty.csv"), 1, "empty"),
     (diagnose("head.csv"), 1, "has 0"),
+    (diagnose("below.csv"), 1, "-0.01 in data row 8"),
     (diagnose("short.csv"), 1, "Line 3"),
     (diagnose("text.csv"), 1, "two numbers"),
     (diagnose("json.csv"), 1, "two numbers"),
@@ -246,6 +252,8 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (measure("zero.png"), 1, "zero.png"),
     (measure("images"), 1, "a.png"),
     (measure("images", "--rate-hz", "-5"), 2, "-5"),
+    (measure("good", "--rate-hz", "1e-300"), 2, "between 1e-06 and 1e+07"),
+    (measure("c.mkv", "--below-tip-mm", "1e9"), 2, "240x200 pixels"),
     (measure("folder"), 1, "folder"),
     (measure("["), 1, "["),
     (measure("\x1b[31mred\x07.mkv"), 1, r"\x1b[31mred\x07.mkv"),

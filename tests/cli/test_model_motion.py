@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from fingervision.cli._model_motion import for_picture
 from fingervision.cli.compare import command as compare
 from fingervision.cli.model import command
 from fingervision.diagnosis.diagnose import diagnose
+from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError, FingervisionError, ModelError, UsageError
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
@@ -239,3 +241,20 @@ def test_an_uncertainty_beyond_sense_leaves_no_results(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"The uncertainty of hinge.thickness_mm must leave .* positive"):
         run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
     assert not (tmp_path / "o").exists()
+
+
+def test_the_plot_of_three_rows_shows_the_first_touch_and_the_vibration() -> None:
+    """Rows between the drive's own, in each run; the drive's stay, and a dense drive is left alone."""
+    drive = DriveHistory(np.array([0.0, 1.0, 2.0, 0.0, 4.0]), np.array([0.0, -1.0, 0.5, 0.0, 1.0]),
+                         ("a", "a", "a", "b", "b"))  # fmt: skip
+    finer = for_picture(drive, 359.0)
+    runs = np.array(finer.run)
+    for name, own in (("a", [0.0, 1.0, 2.0]), ("b", [0.0, 4.0])):
+        times = finer.time_s[runs == name]
+        assert set(own) <= set(times)
+        assert np.all(np.diff(times) > 0.0)
+        assert np.diff(times).max() < 0.002 * np.ptp(times)
+        assert np.diff(times)[:200].max() < 0.1 / 359.0
+    assert np.allclose(finer.input_mm[runs == "a"], np.interp(finer.time_s[runs == "a"], [0, 1, 2], [0, -1, 0.5]))
+    dense = DriveHistory(np.arange(700.0), np.zeros(700))
+    assert for_picture(dense, 359.0) is dense

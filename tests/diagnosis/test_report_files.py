@@ -4,6 +4,8 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from html import escape
+from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,9 @@ from fingervision.effects import catalogue
 
 CHROMIUM = shutil.which("chromium")
 PLAY_MM = 0.05
+# What a name may hold: it begins an element wherever it is not written as text.
+MARKUP = "<img src=x onerror=alert(1)><script>alert(1)<"
+MEASURED, STRAIGHT = f"measured {MARKUP}.csv", f"straight {MARKUP}.csv"
 
 
 def run(*words: object) -> Result:
@@ -36,9 +41,12 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for x in u.tolist():
         place = min(max(place, x - PLAY_MM / 2), x + PLAY_MM / 2)
         gap.append(2.0 + 3.0 * place + 0.001 * rng.standard_normal())
-    rows = "\n".join(f"{0.1 * k:.2f},{x:.6f},{g:.6f}" for k, (x, g) in enumerate(zip(u.tolist(), gap, strict=True)))
-    (folder / "measured.csv").write_text(f"time_s,input_mm,gap_mm\n{rows}\n", encoding="utf-8")
-    (folder / "straight.csv").write_text("input_mm,gap_mm\n-0.1,1.7\n1.1,5.3\n", encoding="utf-8")
+    run = f"1 {MARKUP}/script>"
+    rows = "\n".join(
+        f"{0.1 * k:.2f},{x:.6f},{g:.6f},{run}" for k, (x, g) in enumerate(zip(u.tolist(), gap, strict=True))
+    )
+    (folder / MEASURED).write_text(f"time_s,input_mm,gap_mm,run\n{rows}\n", encoding="utf-8")
+    (folder / STRAIGHT).write_text("input_mm,gap_mm\n-0.1,1.7\n1.1,5.3\n", encoding="utf-8")
     (folder / "steep.csv").write_text("input_mm,gap_mm\n-0.1,1.67\n1.1,5.63\n", encoding="utf-8")
     return folder
 
@@ -46,7 +54,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def answer(rig: Path) -> Path:
     out = rig / "answer"
-    done = run("diagnose", rig / "measured.csv", "--model", rig / "straight.csv", "--out", out)
+    done = run("diagnose", rig / MEASURED, "--model", rig / STRAIGHT, "--out", out)
     assert done.exit_code == 0, done.output
     return out
 
@@ -76,9 +84,33 @@ def test_the_page_asks_nobody(answer: Path) -> None:
     assert len(page) < 2_000_000
 
 
+class Elements(HTMLParser):
+    """Elements of a page with their attributes, and the text within its scripts."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+
+def check_markup_is_text(page: str) -> None:
+    assert "&lt;img src=x" in page
+    assert "<script>alert" not in page
+    for tag, attributes in Elements(page).found:
+        assert not any(name.startswith("on") for name in attributes), (tag, attributes)
+        assert attributes.get("src") != "x", tag
+
+
+def test_markup_in_the_names_of_files_and_runs_is_text(answer: Path) -> None:
+    check_markup_is_text((answer / "report.html").read_text(encoding="utf-8"))
+
+
 def test_figures_are_vectors_and_the_same_each_time(rig: Path, answer: Path) -> None:
     again = rig / "again"
-    assert run("diagnose", rig / "measured.csv", "--model", rig / "straight.csv", "--out", again).exit_code == 0
+    assert run("diagnose", rig / MEASURED, "--model", rig / STRAIGHT, "--out", again).exit_code == 0
     for name in ("gap_against_input", "gap_over_time", "residuals"):
         drawn = (answer / f"{name}.svg").read_bytes()
         assert drawn == (again / f"{name}.svg").read_bytes()
@@ -91,26 +123,27 @@ def test_figures_are_vectors_and_the_same_each_time(rig: Path, answer: Path) -> 
 
 def test_several_models_stand_in_one_table(rig: Path, answer: Path) -> None:
     out = rig / "both"
-    models = [rig / "steep.csv", rig / "straight.csv", answer / "model.toml"]
+    models = [rig / "steep.csv", rig / STRAIGHT, answer / "model.toml"]
     words = [word for model in models for word in ("--model", model)]
-    done = run("compare", rig / "measured.csv", *words, "--out", out, "--json")
+    done = run("compare", rig / MEASURED, *words, "--out", out, "--json")
     assert done.exit_code == 0, done.output
     found = json.loads(done.output)["models"]
     rms = {one["model"]: one["rms_mm"] for one in found}
-    assert list(rms) == ["steep.csv", "straight.csv", "model.toml"]
-    assert rms["model.toml"] < rms["straight.csv"] < rms["steep.csv"]
+    assert list(rms) == ["steep.csv", STRAIGHT, "model.toml"]
+    assert rms["model.toml"] < rms[STRAIGHT] < rms["steep.csv"]
     page = (out / "compare.html").read_text(encoding="utf-8")
-    assert all(name in page for name in rms)
+    assert all(escape(name) in page for name in rms)
+    check_markup_is_text(page)
 
 
 def test_one_model_is_diagnosed_at_a_time(rig: Path) -> None:
-    done = run("diagnose", rig / "measured.csv", "--model", rig / "straight.csv", "--model", rig / "steep.csv")
+    done = run("diagnose", rig / MEASURED, "--model", rig / STRAIGHT, "--model", rig / "steep.csv")
     assert done.exit_code == 2
     assert "compare" in done.output
 
 
 def test_the_same_model_twice_is_refused(rig: Path) -> None:
-    done = run("compare", rig / "measured.csv", "--model", rig / "steep.csv", "--model", rig / "steep.csv")
+    done = run("compare", rig / MEASURED, "--model", rig / "steep.csv", "--model", rig / "steep.csv")
     assert isinstance(done.exception, UsageError)
 
 

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import skimage.data
+from scipy.ndimage import gaussian_filter
 
 from fingervision.gauges.status import GaugeStatus
+from tests.benchmarks.drawn_surfaces import SURFACES
 from tests.gauges.drawn import Texture, seen
 from tests.gauges.followed import followed, gauges_of, share_within
 
@@ -74,6 +76,38 @@ def test_photographed_textures_moved_by_tenths_of_a_pixel(tmp_path: Path, name: 
         rows = followed(gauges, [camera(0), camera(shift)])
         assert rows[1][0].status is GaugeStatus.OK
         assert abs(_numbers(rows[1][0])[0, 0] - shift / by) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("surface", "blur", "most_px"), [("letters", 0.7, 0.004), ("confetti", 0.0, 0.02), ("masonry", 0.3, 0.1)]
+)
+def test_sharp_surfaces_are_as_sure_as_they_say_at_every_phase(
+    tmp_path: Path, surface: str, blur: float, most_px: float
+) -> None:
+    """Surfaces drawn ten times finer than the pixels, moved by tenths of a pixel, with optics and without any.
+
+    Interpolation biases the first by the phase, aliasing the others, and joints along the pixels all by one phase.
+    """
+    rng = np.random.default_rng([25, len(surface)])
+    gauges = gauges_of(tmp_path, 'kind="patch"\nx_px=24\ny_px=24\nwidth_px=31\nheight_px=31\nreach_px=3')
+    errors, u = [], []
+    for _ in range(4):
+        scene = gaussian_filter(SURFACES[surface](rng), 10 * blur, mode="wrap")
+        scene = 128 + (scene - scene.mean()) * 40 / scene.std()
+
+        def camera(x: int, y: int, scene: np.ndarray = scene) -> np.ndarray:
+            part = np.roll(scene, (y, x), axis=(0, 1))[:490, :490]
+            return seen(part.reshape(49, 10, 49, 10).mean(axis=(1, 3)), 0.3, rng)
+
+        places = [(0, 0), *((x, int(rng.integers(-9, 10))) for x in (2, 3, 7, 8))]
+        for (x, y), (reading,) in zip(places[1:], followed(gauges, [camera(*at) for at in places])[1:], strict=True):
+            if reading.quantities:
+                value, stated = _numbers(reading)[:2].T
+                errors += list(value - (0.1 * x, 0.1 * y))
+                u += list(stated)
+    assert len(errors) > 16
+    assert np.sqrt(np.mean(np.square(errors))) < most_px
+    assert share_within(errors, u) > 0.9
 
 
 @pytest.mark.parametrize("what", ["wall", "noise", "shade", "edge", "lattice", "black"])

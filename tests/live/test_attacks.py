@@ -2,11 +2,12 @@
 
 import json
 import re
+import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from socket import create_connection
+from socket import SO_LINGER, SOL_SOCKET, create_connection
 from threading import Event, Thread
 from typing import Any
 from urllib.error import HTTPError
@@ -28,6 +29,7 @@ from fingervision.live.session import Session
 from tests.live.browser import browser, needs_chromium, opened, shown
 
 __all__ = ["browser", "opened"]
+BRIEF_VISITS = 24
 
 
 @pytest.fixture
@@ -117,7 +119,8 @@ def test_missing_stale_and_guessed_tokens_are_refused(page: Page, session: Sessi
     other._listening.close()
 
 
-def test_the_token_is_in_no_log_file_and_no_referrer(page: Page, session: Session, capfd: Any) -> None:
+def test_the_token_is_in_no_log_file_and_no_referrer(capfd: Any, page: Page, session: Session) -> None:
+    # What is printed is caught before the server is made, which looks then for where to log.
     origin, token = parts(page.address)
     with urlopen(page.address) as answer:
         assert answer.headers["Referrer-Policy"] == "no-referrer"
@@ -174,6 +177,31 @@ def test_pages_and_connections_are_limited(session: Session, monkeypatch: pytest
     finally:
         ending.set()
         thread.join()
+
+
+def test_viewers_who_stay_a_millisecond_leave_nothing_behind(page: Page, session: Session) -> None:
+    said = len(session.messages)
+    port = int(page.address.split(":")[2].split("/")[0])
+    with socket_of(page.address) as quiet:
+        assert "refused" not in reply(quiet, {"do": "height", "below_tip_mm": 0.4})
+        for number in range(BRIEF_VISITS):
+            with socket_of(page.viewer_address if number % 2 else page.address) as brief:
+                if number % 3 == 0:
+                    brief.send('{"do": "ack"}')
+                if number % 4 == 0:  # cut off, without a word
+                    brief.socket.setsockopt(SOL_SOCKET, SO_LINGER, struct.pack("ii", 1, 0))
+                    brief.socket.close()
+            with create_connection(("127.0.0.1", port), timeout=10.0) as half:
+                half.sendall(b"GET /socket?token=x HTTP/1.1\r\nHost: "[: 5 + number % 30])
+                half.setsockopt(SOL_SOCKET, SO_LINGER, struct.pack("ii", 1, 0))
+        end_s = time.monotonic() + 10.0
+        while len(page._sockets) > 1:
+            assert time.monotonic() < end_s, "sockets of viewers who have gone are kept"
+            time.sleep(0.02)
+        # Who worked the view still does, and is told nothing of them.
+        assert "refused" not in reply(quiet, {"do": "height", "below_tip_mm": 0.3})
+    assert [each.words for each in session.messages][said:] == []
+    assert status(page.address) == 200
 
 
 def test_no_name_leads_out_of_the_pages_folder(page: Page) -> None:

@@ -186,7 +186,7 @@ def test_a_hidden_backlash_is_named_on_the_page_within_a_minute_of_motion(
     says(page, "Running there and back")
     shown(page, "document.querySelector('#verdict_effects').textContent.includes('backlash')")
     # Motion: the recipe's own 4 s and the way there, less than a minute.
-    found = float(page.inner_text("#verdict_effects").split("play_mm ")[1].split()[0])
+    found = float(page.inner_text("#verdict_effects").split("play ")[1].split()[0])
     assert found == pytest.approx(0.03, abs=0.001)
     assert "named" in page.inner_text("#verdict_words")
     assert page.locator("#bed_stop").is_visible()

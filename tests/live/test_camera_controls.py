@@ -28,6 +28,7 @@ from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.test_wrong_fields import TWENTY
 
 __all__ = ["browser", "opened"]
 
@@ -91,6 +92,17 @@ class PluginCamera:
 
     def close(self) -> None:
         self._closed.set()
+
+
+class AllControls(PluginCamera):
+    """A simulated camera that lets all five settings be set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.values["white balance"] = 5000.0
+
+    def controls(self) -> tuple[CameraControl, ...]:
+        return (*super().controls(), CameraControl("white balance", self.values["white balance"], "K", 2800.0, 6500.0))
 
 
 @pytest.fixture
@@ -170,6 +182,27 @@ def test_what_a_camera_does_not_take_is_a_sentence_beside_its_field(session: Ses
     assert told(session) == before
     measured = session.history.count
     until(lambda: session.history.count > measured)
+
+
+@pytest.mark.parametrize("name", ["exposure", "gain", "focus", "white balance", "frame rate"])
+def test_twenty_wrong_things_in_every_field_of_a_camera_change_nothing(name: str, tmp_path: Path) -> None:
+    camera = AllControls()
+    session = Session(Capture(camera, again=None), Choices(scale=BareScale(34.0)), tmp_path)
+    session.start()
+    until(lambda: session.history.count > 3)
+    before, settings = dict(camera.values), session.choices
+    for wrong in (*TWENTY, 1e9):
+        with pytest.raises(FingervisionError) as refused:
+            put(session, name, wrong)
+        words = str(refused.value)
+        assert words.endswith("."), words
+        assert len(words) < 400, words
+        assert refused.value.field == name  # type: ignore[attr-defined]
+    assert camera.values == before
+    assert session.choices == settings
+    measured = session.history.count
+    until(lambda: session.history.count > measured)
+    session.stop()
 
 
 def test_a_change_during_a_recording_stands_in_its_events_and_focus_waits(session: Session) -> None:

@@ -2,14 +2,22 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from calib.calibration import BareScale
+from fingervision.live.beside import Beside, stand_beside
+from fingervision.live.capture import Capture
+from fingervision.live.choices import Choices
+from fingervision.live.server import Page, bound
+from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.live.test_camera_controls import AllControls
 
 __all__ = ["browser", "opened"]
 pytestmark = [needs_chromium, pytest.mark.slow]
@@ -20,6 +28,12 @@ SCREENS = {
     "wide": ((1920, 1080), "dark"),
 }
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+WIDTHS, SCHEMES = ((390, 844), (1280, 720), (1920, 1080)), ("light", "dark")
+# Chart and colours follow the window and the scheme within this.
+DRAWN_MS = 300
+# What reaches beyond the window's right side.
+TOO_WIDE = """[...document.querySelectorAll("body *")]
+.filter(each => each.getBoundingClientRect().right > innerWidth + 1).map(each => `${each.tagName} ${each.id}`)"""
 CYCLE = 40
 
 
@@ -44,9 +58,7 @@ def covered(tmp_path: Path) -> Path:
     return folder
 
 
-def test_picture_value_chart_and_status_fit_every_screen_and_axe_finds_nothing(
-    live: Callable[..., Any], opened: Callable[..., Any]
-) -> None:
+def test_picture_value_chart_and_status_fit_every_screen(live: Callable[..., Any], opened: Callable[..., Any]) -> None:
     view = live("simulated", "--port", "0")
     for name, ((width, height), scheme) in SCREENS.items():
         page = opened(view.address, viewport={"width": width, "height": height}, color_scheme=scheme)
@@ -57,11 +69,58 @@ def test_picture_value_chart_and_status_fit_every_screen_and_axe_finds_nothing(
             assert 0 <= box["y"] <= box["y"] + box["height"] <= height, (name, part, box)
             assert box["height"] > (80 if part in ("#picture", "#chart") else 10), (name, part, box)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-        for panel in page.locator("#panels details").all():
-            panel.evaluate("each => { each.open = true; }")
-        assert findings(page) == [], name
+        page.close()
+
+
+def check_every_panel(page: Any, way: str, looks: tuple[tuple[tuple[int, int], str], ...]) -> None:
+    """Open all panels, and let axe look at them in windows and schemes that change while the page is shown."""
+    page.evaluate("for (const each of document.querySelectorAll('#panels details')) each.open = true")
+    for (width, height), scheme in looks:
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=scheme)
+        page.wait_for_timeout(DRAWN_MS)
+        assert findings(page) == [], (way, width, scheme)
+        scrolled = page.evaluate("document.documentElement.scrollWidth")
+        assert scrolled <= width, (way, width, page.evaluate(TOO_WIDE))
+
+
+def test_axe_finds_nothing_beside_a_camera_with_all_controls_a_model_and_gauges(
+    opened: Callable[..., Any], tmp_path: Path
+) -> None:
+    model = tmp_path / "model.csv"
+    model.write_text("input_mm,gap_mm\n-1,1\n2,10\n")
+    session = Session(Capture(AllControls(), again=None), Choices(scale=BareScale(34.0)), tmp_path / "out")
+    stand_beside(session, Beside(model=model, gauges=tmp_path / "gauges.toml"))
+    served, end = Page(session, bound("127.0.0.1", 0)), Event()
+    session.start()
+    Thread(target=served.serve, args=(end,), daemon=True).start()
+    try:
+        page = opened(served.address)
+        shown(page, "document.querySelectorAll('#camera_controls form').length === 5")
+        page.evaluate("document.querySelector('#set_up').open = true")
+        # What was refused is shown as well.
+        for number in range(5):
+            page.fill(f"#camera_{number}", "-1e9")
+            page.press(f"#camera_{number}", "Enter")
+            shown(page, f"document.querySelector('#camera_words_{number}').textContent.length > 20")
+        check_every_panel(page, "camera", tuple((size, scheme) for size in WIDTHS for scheme in SCHEMES))
+        page.locator("h1").click()
         page.locator("body").press("?")
-        assert findings(page) == [], name
+        page.locator("#help_dialog").wait_for()
+        assert findings(page) == []
+    finally:
+        end.set()
+        session.stop()
+
+
+def test_axe_finds_nothing_beside_a_bed_and_on_a_recording(
+    live: Callable[..., Any], opened: Callable[..., Any], covered: Path
+) -> None:
+    bed = ("simulated", "--bed", "simulated", "--allow-motion")
+    for source in (bed, (covered, "--rate-hz", "20", "--px-per-mm", "34")):
+        page = opened(live(*source, "--port", "0").address)
+        shown(page, "Number(document.querySelector('#picture').dataset.shown) > 0")
+        check_every_panel(page, str(source[0]), tuple(zip(WIDTHS, ("dark", "light", "dark"), strict=True)))
         page.close()
 
 

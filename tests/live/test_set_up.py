@@ -77,7 +77,13 @@ def test_height_polarity_and_settings(session: Session, tmp_path: Path) -> None:
     obey(session, {"do": "region", "box": None})
     obey(session, {"do": "load_settings", "path": "out/settings.toml"})
     assert session.choices == kept
-    for path in ("../settings.toml", "/etc/passwd", "missing.toml", "", 5):
+    for path in ("/etc/passwd", "missing.toml", "", 5):
         with pytest.raises((UsageError, FingervisionError)):
+            obey(session, {"do": "load_settings", "path": path})
+    # A file that could well be read, were it not outside.
+    outside = tmp_path.parent / f"{tmp_path.name}_settings.toml"
+    outside.write_bytes((tmp_path / "out" / "settings.toml").read_bytes())
+    for path in (str(outside), f"../{outside.name}"):
+        with pytest.raises(UsageError, match="must lie inside"):
             obey(session, {"do": "load_settings", "path": path})
     assert session.choices == kept

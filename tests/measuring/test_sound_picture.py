@@ -45,6 +45,10 @@ def wrong_level(levels: np.ndarray) -> None:
     levels[64:80, 120:136] = 200  # over the left finger's edge
 
 
+def beside_the_edges(levels: np.ndarray) -> None:
+    levels[80:96, 80:96] += np.uint8(40)  # within the left finger, 29 px from its inner edge
+
+
 @pytest.mark.parametrize("damage", [wrong_level])
 @BOTH
 def test_foreign_squares_that_move_the_gap_are_damage(damage: Callable[[np.ndarray], None], coding: Coding) -> None:
@@ -72,6 +76,14 @@ def test_steps_and_vibrations_are_motion(coding: Coding, step_px: float) -> None
     frames = row(gaps_px, coding, lambda k, levels: None)
     outcomes = judged(frames)
     assert [type(outcome) for outcome in outcomes] == [GapMeasurement] * COUNT
+
+
+@BOTH
+def test_foreign_squares_that_move_no_edge_cost_no_frame(coding: Coding) -> None:
+    frames = row([70.0] * COUNT, coding, lambda k, levels: beside_the_edges(levels) if k == 6 else None)
+    before, changed = (frames[k].pixels[32:128].astype(np.float32) for k in (5, 6))
+    assert foreign_corners(changed, before, 13.0) >= 2
+    assert [type(outcome) for outcome in judged(frames)] == [GapMeasurement] * COUNT
 
 
 @BOTH

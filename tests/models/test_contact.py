@@ -9,8 +9,10 @@ from skfem.helpers import ddot, eye, grad, mul, trace, transpose
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.lumped import LumpedGripper
 from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.physics import Physics
+from fingervision.models.static_answer import equilibria
 
 PENALTY_N_MM = 1e6
 """Of each face point: a finger that is pressed with 18 N then sinks in by some 1e-6 mm."""
@@ -109,3 +111,17 @@ def test_the_same_in_the_deformed_shape(gripper: Gripper) -> None:
     assert state.stress_mpa > material.yield_mpa
     inner = mesh.nodes_mm[0] + model.equilibria([-2.0])[0].displacement_mm[model.plate.x_dofs]
     assert inner.min() > -1e-5
+
+
+def test_far_jumps_into_deep_contact_are_followed(gripper: Gripper) -> None:
+    """From the first touch to a deep grip at once: the answer of many small steps, where a prediction is far off."""
+    inputs = np.array([-1.0, -0.52, 0.5])
+    model = LumpedGripper(gripper, Physics(large_rotation=True, contact=True))
+    small = model.respond(np.linspace(-1.0, 0.5, 151))
+    assert small.force_n is not None
+    found = equilibria(model.half, model.physics, inputs.tolist())
+    forces = np.interp(inputs, np.linspace(-1.0, 0.5, 151), small.force_n)
+    assert [state.force_n for state in found] == pytest.approx(forces.tolist(), rel=2e-3)
+    assert min(model.half.face_gap_mm(state.displacement_mm).min() for state in found) > -1e-6
+    for nodes in (3, 5, 9, 17, 40):
+        assert model.body_poses(np.linspace(-1.0, 0.5, nodes))

@@ -19,6 +19,7 @@ from fingervision.models.redrawn import redrawn
 from fingervision.models.static_answer import gap_per_input
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.mechanism_toml import read_drawing
+from tests.benchmarks.models_sway_table import stiffnesses
 
 SLOPE = 5e-4
 """Of bodies condensed to frames: ten times better than the bar that the lumped model is held to."""
@@ -126,3 +127,14 @@ def test_stress_at_fillets_is_that_of_finite_elements() -> None:
         drawn = replace(mechanism, flexures=flexures)
         ours, elements = (kind(drawn).state(1.0).stress_mpa for kind in (MechanismFrame, MechanismPlate))
         assert ours == pytest.approx(elements, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("thickness", "poisson", "depth"), [(0.35, 0.45, 10.0), (1.8, 0.2, 10.0), (6.5, 0.3, 10.0), (1.0, 0.3, 5.0)]
+)
+def test_a_notch_between_guided_blocks_is_as_stiff_as_elements(thickness: float, poisson: float, depth: float) -> None:
+    """Between the nodes of the table, with another material, and an elliptic cut: across 1 %, along 3 %."""
+    for direction, within in (((0, 1), 0.01), ((1, 0), 0.03)):
+        plate, frame = stiffnesses(thickness, direction, poisson=poisson, depth_mm=depth)
+        assert frame == pytest.approx(plate, rel=within)

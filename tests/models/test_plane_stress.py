@@ -175,3 +175,22 @@ def test_cooks_membrane() -> None:
     tip = float(moved[plate.y_dofs[end & (np.abs(y - 52.0) < 1e-9)]][0])
     # The value is printed with four digits.
     assert tip == pytest.approx(23.96, rel=5e-4)
+
+
+def test_tapered_membrane_vibrates() -> None:
+    """NAFEMS FV32 (Abbassian, Dawswell, Knowles, Selected benchmarks for natural frequency analysis, 1987).
+
+    Values as given by ENERCALC 3D's verification problem F-03 and Altair OptiStruct's OS-V: 0440, both public. They are
+    of a mesh of 16 by 8 elements, and public results of other programs lie up to 0.5 % from them.
+    """
+    material = Material("steel", 200e3, 0.3, 8000.0, 1.0)
+    grid = rectangle(1.0, 1.0, 24, 12)
+    s, t = grid.nodes_mm
+    place = 1e3 * np.stack([10.0 * s, (5.0 - 4.0 * s) * (t - 0.5)])
+    plate = PlaneStressPlate(PlaneMesh(place, grid.triangles), material, 50.0)
+    root = plate.nodes_mm[0] < 1e-6
+    free = np.setdiff1d(np.arange(plate.unknowns), np.concatenate([plate.x_dofs[root], plate.y_dofs[root]]))
+    K, M = plate.stiffness_n_mm[free][:, free].tocsc(), plate.mass_t[free][:, free].tocsc()
+    squared = np.sort(eigsh(K, 6, M, sigma=0.0, return_eigenvectors=False, v0=np.ones(free.size)))
+    published = [44.623, 130.03, 162.70, 246.05, 379.90, 391.44]
+    assert np.sqrt(squared) / (2.0 * np.pi) == pytest.approx(published, rel=5e-3)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -153,6 +154,24 @@ def test_a_drawing_without_a_drive_is_refused() -> None:
     for wrong in ({}, {"drive": []}, {"drive": 3}, {"drive": [3]}):
         with pytest.raises(FingervisionError, match=r"drive"):
             mechanism_from_tables({key: part for key, part in tables.items() if key != "drive"} | wrong, "m.toml")
+
+
+@pytest.mark.parametrize("kind", [pytest.param(MechanismPlate, marks=pytest.mark.slow), MechanismFrame])
+def test_drives_that_do_not_hold_it_are_refused(kind: type[MechanismPlate | MechanismFrame]) -> None:
+    """Two faces driven in the mean along x leave it free along y."""
+    loose = ARMS.replace('[[fixed]]\nname = "foot"\nbox_mm = [-6, 6, 0, 0]\n', "")
+    with pytest.raises(FingervisionError, match="must be held by its fixed faces, but can move freely"):
+        _ = kind(drawn(loose)).stiffness_n_mm
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_drawing_in_metres_or_micrometres_is_asked_about(scale: float) -> None:
+    lengths = re.compile(r"(?m)^(plate|box|at|thickness|radius|half_length|depth)_mm =.*$")
+    other = lengths.sub(
+        lambda line: re.sub(r"-?\d+\.?\d*", lambda n: repr(scale * float(n.group())), line.group()), ARMS
+    )
+    with pytest.raises(FingervisionError, match=r"must be 0.3 to 5000 mm large, but is .* millimetres"):
+        drawn(other)
 
 
 def test_drives_that_all_stand_still_are_refused() -> None:

@@ -15,7 +15,7 @@ from tests.benchmarks.scenes.clutter import CLUTTER
 from tests.benchmarks.scenes.empty import DRAWN
 from tests.benchmarks.scenes.gripped import GRIPPED
 from tests.benchmarks.scenes.gripper import BELOW_PX, Shot
-from tests.benchmarks.scenes.shapes import Finger
+from tests.benchmarks.scenes.shapes import Finger, box, disc
 from tests.benchmarks.scenes.whole import whole
 
 SETTINGS = Settings(BELOW_PX)
@@ -117,3 +117,29 @@ def test_a_camera_that_is_turned_too_far_is_told_so() -> None:
     assert isinstance(found, NoGap), found
     assert "turn the camera" in found.words
     assert "30" in found.words
+
+
+@pytest.mark.parametrize(("gap_px", "step_px", "is_pair"), [(60, 0, True), (160, 85, False), (330, 0, False)])
+def test_two_bars_that_lie_in_view_are_fingers_only_where_they_lie_side_by_side(
+    gap_px: int, step_px: int, is_pair: bool
+) -> None:
+    canvas, rng = Canvas(640, 480, 200.0), np.random.default_rng(5)
+    for left_px, top_px in ((300 - gap_px // 2 - 40, 150), (300 + gap_px // 2, 150 + step_px)):
+        canvas.fill(box(left_px, top_px, left_px + 40, top_px + 110), 60.0)
+    found = measure_frame(Frame(canvas.shot(1.0, 2.0, rng), 0), SETTINGS)
+    assert isinstance(found, GapMeasurement) == is_pair
+    assert not isinstance(found, GapMeasurement) or abs(found.gap_px - gap_px) < 0.1
+
+
+def test_the_spaces_of_a_letter_are_no_fingers() -> None:
+    """A letter E among discs of its size: its dark spaces look like bars, its arm between them like the gap."""
+    canvas, rng = Canvas(640, 480, 60.0), np.random.default_rng(6)
+    for x_px in range(80, 640, 130):
+        for y_px in range(80, 480, 150):
+            canvas.fill(disc(x_px, y_px, 50.0), 200.0)
+    canvas.fill(box(270, 160, 420, 300), 60.0)
+    canvas.fill(box(290, 180, 400, 205), 200.0)
+    for arm_px in (290, 333, 376):
+        canvas.fill(box(arm_px, 180, arm_px + 24, 290), 200.0)
+    found = measure_frame(Frame(canvas.shot(1.0, 2.0, rng), 0), SETTINGS)
+    assert isinstance(found, NoGap), found

@@ -22,6 +22,9 @@ SPARE = 3.0
 ADMISSIBLE = 15.0
 """Largest chi-square by which an explanation at distance 4 from the truth is worse than the best: 4 + SURELY * 2 *
 sqrt(4) + SPARE."""
+OUT_OF_REACH = (400.0, 200.0)
+"""Squared distance from the best explanation, and chi-square above it, from which no refit is tried: 20 standard
+deviations away, and farther behind than any refit has gained (`INDISTINGUISHABLE` and `ADMISSIBLE` times ten)."""
 IDLE_SHARE = 0.3
 """Share of the best explanation's gain below which another explanation counts as explaining nothing."""
 PLAIN = 50.0
@@ -44,7 +47,7 @@ def ambiguity_set(
         if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
             return
         near = problem.offsets.squared(target - problem.whitened(other.values), metric)
-        if near > 400.0 and other.score - best.score > 200.0:
+        if near > OUT_OF_REACH[0] and other.score - best.score > OUT_OF_REACH[1]:
             return
         distance = near
         if near >= INDISTINGUISHABLE:

@@ -13,6 +13,14 @@ START_MOVES = 1e-3
 """Least size of a first motion, as a share of the range, that determines from which side a run starts."""
 
 
+SAME_SIZE = (0.2, 3.0)
+"""Coefficients of a column without an amplitude that still mean its own size: beyond them a neighbour on the grid of
+sizes, which is a factor of two to three away, describes the residual better."""
+BEYOND_BOUNDS = 0.3
+"""Share of a parameter's range by which a linear estimate may exceed it: the refit, which is not linear, may come back
+within the bounds."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Signatures:
     """Whitened signatures as columns, with the parameters that produced each of them.
@@ -64,13 +72,12 @@ class Signatures:
         out = np.zeros(coefficient.size, dtype=bool)
         for i, grow in enumerate(self.grows):
             if grow is None:
-                out[i] = 0.2 < coefficient[i] < 3.0
+                out[i] = SAME_SIZE[0] < coefficient[i] < SAME_SIZE[1]
             else:
                 _, neutral, step, lower, upper = grow
                 value = neutral + coefficient[i] * step
-                out[i] = lower - 0.3 * (upper - lower) <= value <= upper + 0.3 * (upper - lower) and (
-                    lower < neutral or value >= neutral
-                )
+                room = BEYOND_BOUNDS * (upper - lower)
+                out[i] = lower - room <= value <= upper + room and (lower < neutral or value >= neutral)
         return out
 
     def begin(self, index: int, coefficient: float) -> dict[str, float]:

@@ -14,6 +14,9 @@ measured with such accuracy."""
 OFF_LINE = 0.01
 """Share of the simulated range: a table that is straight within half of it has a fault where it deviates by more."""
 
+MOST_SET = 0.2
+"""Share of the rows at input 0 from which on they are no row that was set, but a measurement that stands there."""
+
 
 def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
     """Mark the excluded rows, shape (n,), and give the reasons as sentences.
@@ -25,7 +28,7 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
     if table.time_s is not None:
         return out, notes
     put = (table.input_mm == 0.0) & (np.abs(table.gap_mm - rest_gap_mm) <= SET_SHARE * rest_gap_mm)
-    if put.any() and put.sum() < 0.2 * put.size:
+    if put.any() and put.sum() < MOST_SET * put.size:
         out |= put
         notes.append(
             f"the row at input 0 agrees with the simulated rest gap of {rest_gap_mm:.4g} mm to its last digit: "

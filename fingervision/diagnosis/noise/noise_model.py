@@ -37,6 +37,14 @@ class Noise:
         return float(np.hypot(self.white_mm, self.correlated_mm))
 
 
+MEDIAN_SAMPLES, FEWEST_SAMPLES = 7, 9
+"""Samples of the running median, which a pair of outliers cannot move, and the least number of samples of a run for
+which its ends do not make up most of it."""
+CROWDED = 4
+"""Outliers among five successive samples that are a motion: a real reversal moves neighbours too, and an outlier stands
+alone or in a pair."""
+
+
 def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
     """Mark outliers against a running median; shape (n,), True where a value is to be excluded.
 
@@ -50,9 +58,9 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
     rest = residual.copy()
     for run in runs:
         values = residual[run]
-        if ordered and values.size >= 9:
-            padded = np.pad(values, 3, mode="reflect")
-            windows = np.lib.stride_tricks.sliding_window_view(padded, 7)
+        if ordered and values.size >= FEWEST_SAMPLES:
+            padded = np.pad(values, MEDIAN_SAMPLES // 2, mode="reflect")
+            windows = np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_SAMPLES)
             rest[run] = values - np.median(windows, axis=1)
         else:
             rest[run] = values - np.median(values)
@@ -63,9 +71,8 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
         out = np.abs(rest) > sigmas * sigma
         if ordered:
             there = _recurring(out, [*_places(input_mm), *_after_steps(input_mm, runs)])
-            # A real reversal moves neighbours too; an outlier stands alone or in pairs.
             for i in range(2, residual.size - 2):
-                if out[i - 2 : i + 3].sum() >= 4:
+                if out[i - 2 : i + 3].sum() >= CROWDED:
                     out[i - 2 : i + 3] = False
             out &= ~there
     return out

@@ -33,9 +33,16 @@ class _Likelihood:
     rows: Array
 
 
+FEWEST_SAMPLES = 4
+"""Least number of samples of a run that tell more than the straight line taken from them and one correlation."""
+CORRELATIONS = np.linspace(0.0, 0.95, 39)
+"""Correlations that are tried, in steps of a quarter of what a hundred samples determine; beyond 0.95 noise cannot be
+told from a drift in so short a run."""
+
+
 def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags]) -> _Likelihood:
     """Subtract a straight line from each run, and evaluate the likelihood at every tabulated correlation."""
-    grid = np.linspace(0.0, 0.95, 39)
+    grid = CORRELATIONS
     cost = np.empty((len(residuals_mm), grid.size))
     spread = np.empty_like(cost)
     degrees = np.empty(len(residuals_mm))
@@ -44,7 +51,7 @@ def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[
             total, rows, determinants = 0.0, 0, 0.0
             for run in runs:
                 place = np.flatnonzero(~out[run])
-                if place.size < 4:
+                if place.size < FEWEST_SAMPLES:
                     continue
                 line = np.stack([np.ones(place.size), place - place.mean(), residual[run][place]], axis=1)
                 keep = rho ** np.diff(place, prepend=place[0] - 1000)

@@ -14,8 +14,7 @@ BINS = 16
 parts."""
 ENDS = 200
 """Number of ends of a region tried on either side."""
-DRAWS = 200
-QUANTILE = 0.99
+DRAWS, QUANTILE = 200, 0.99
 """Number of draws of noise, and quantile of their maximum: a region is reported in one table of noise in a hundred."""
 MOST = 8
 """Most regions reported; the residual after these is too small to be localised."""

@@ -14,13 +14,9 @@ from fingervision.gauges.quantities import Angle, Shift
 from fingervision.gauges.reading import Mark, Reading
 from fingervision.gauges.status import GaugeStatus
 from fingervision.storage.toml_section import Section
-from fingervision.vision.patch_registration import (
-    MARGIN_PX,
-    PatchReference,
-    patch_reference,
-    reference_covariance,
-    register,
-)
+from fingervision.vision.patch_covariance import reference_covariance
+from fingervision.vision.patch_reference import MARGIN_PX, PatchReference, patch_reference
+from fingervision.vision.patch_registration import register
 from fingervision.vision.template_search import BEYOND_PX, Template, chance_correlation, high_pass_noise
 
 KEYS = ("x_px", "y_px", "width_px", "height_px", "reach_px")
@@ -36,11 +32,6 @@ GUARD, MOST_TIMES = 1.5, 4.0
 TURN_AT = 0.1
 # A patch that is less sure than this (pixels) shows too little to be measured.
 LEAST_SURE_PX = 0.3
-# What aliasing leaves beside noise, of texture that loses so much of its gradients' power along an axis by the
-# smoothing (two thirds of photographs through optics of 0.7 px, 0.8 to 0.9 without any); coarser texture, blurred by
-# 1 px and more, has none. RMS over phases and 24 places beside the noise: 0.003 to 0.005 px of photographed gravel,
-# grass and bricks through such optics, 0.012 px of gravel without any (`tests.benchmarks.gauges --only photographs`).
-ALIASED_PX, FROM_FINE, TO_FINE = 0.012, 0.5, 0.85
 # Contrast below a grey level a pixel is rounding.
 LEAST_SPREAD = 1.0
 
@@ -77,7 +68,7 @@ class FollowedPatch:
         self._around: Floats | None = None
         self._template: Template | None = None
         self._template_turn = 0.0
-        self._least_correlation, self._aliased_px = LEAST_CORRELATION, (0.0, 0.0)
+        self._least_correlation = LEAST_CORRELATION
         self._refused: Reading | None = None
         self._at = (*spec.middle_px, 0.0)
         self._times = 1.0
@@ -156,7 +147,6 @@ class FollowedPatch:
         if chance > MOST_BY_CHANCE:
             return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
         self._least_correlation = max(LEAST_CORRELATION, chance)
-        self._aliased_px = _aliased_px(reference)
         self.reference = reference
         self._around, self._template = part, template
         self._at = (float(column), float(row), 0.0)
@@ -222,25 +212,12 @@ class FollowedPatch:
         off_x, off_y = from_x - round(from_x), from_y - round(from_y)
         to = (x + cos(turn) * off_x - sin(turn) * off_y, y + sin(turn) * off_x + cos(turn) * off_y)
         u_x, u_y, u_turn = (sqrt(float(covariance[i, i])) for i in range(3))
-        u_x, u_y = hypot(u_x, self._aliased_px[0]), hypot(u_y, self._aliased_px[1])
         quantities = (
             Shift((from_x, from_y), to, 0.0, u_x),
             Shift((from_x, from_y), to, 0.5 * np.pi, u_y),
             Angle(to, turn, u_turn, is_turn=True),
         )
         return Reading(GaugeStatus.OK, quantities, (Mark(((from_x, from_y), to)), Mark((to,)), self._zone()), None)
-
-
-def _aliased_px(reference: PatchReference) -> tuple[float, float]:
-    """Standard uncertainties along x and y (px) because of texture that is too fine for the pixels.
-
-    The artefact that such texture leaves in the picture is as large as the stronger gradients, and displaces the patch
-    more along the axis of the weaker ones.
-    """
-    own = [ALIASED_PX * min(max((fine - FROM_FINE) / (TO_FINE - FROM_FINE), 0.0), 1.0) for fine in reference.fine]
-    power = [max(float(reference.hessian[k, k]), 1e-30) for k in range(2)]
-    along_x, along_y = (max(own[j] * sqrt(power[j] / power[k]) for j in range(2)) for k in range(2))
-    return along_x, along_y
 
 
 def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:

@@ -189,5 +189,8 @@ def _in_words(parameters: dict[str, Any]) -> str:
     for name, each in parameters.items():
         if isinstance(each, dict) and "value" in each:
             u = "" if each.get("u") is None else f" ± {2.0 * each['u']:.2g}"
-            words.append(f"{name} {each['value']:.4g}{u} {each.get('unit', '')}".strip())
+            unit = str(each.get("unit", ""))
+            # The unit stands behind the value, and need not be said in the name again.
+            told = name.removesuffix(f"_{unit.lower().replace('/', '_')}").replace("_", " ")
+            words.append(f"{told} {each['value']:.4g}{u} {unit}".strip())
     return ", ".join(words)

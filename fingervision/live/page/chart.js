@@ -2,6 +2,7 @@
 import { at, calm, colour, listen, on, page, tell } from "/page/bus.js";
 import { gaps } from "/page/gap_data.js";
 import { drawFailures } from "/page/chart_failures.js";
+import { values, wide } from "/page/axis_labels.js";
 
 const WINDOW_S = 30, DRAWN_EVERY_MS = 100, CALM_EVERY_MS = 1000, LEAST_WINDOW_S = 0.02, ZOOM = 1.6;
 export const view = { chart: null, zoomed: false, dirty: false, range: null, cursor: -1 };
@@ -17,7 +18,7 @@ function make() {
     legend: { show: false },
     cursor: { drag: { x: true, y: false, dist: 4 } },
     scales: { x: { time: false } },
-    axes: [{ ...axis, label: "time (s)", size: 30 }, { ...axis, label: "gap (mm)", size: 52 }],
+    axes: [{ ...axis, label: "time (s)", size: 30, values }, { ...axis, label: "gap (mm)", size: wide, values }],
     series: [
       { label: "time (s)", value: cell(3) },
       { label: "gap (mm)", stroke: accent, width: 1.5, points: { show: false } },

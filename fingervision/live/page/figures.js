@@ -28,6 +28,7 @@ listen("now", (now) => {
     at("uncertainty").textContent = now.u_mm === null ? "" : `± ${(2000 * now.u_mm).toFixed(2)} µm (${what})`;
   }
   gap.dataset.frame = now ? String(now.frame) : "";
+  say("frame_number", now ? String(now.frame) : "–");
   say("status", now ? now.status : "–", `badge ${now && now.status === "ok" ? "good" : "bad"}`);
   say("why", now ? now.words : "");
   at("unzero").hidden = !now || now.zero_mm === 0;
@@ -39,7 +40,7 @@ listen("now", (now) => {
 
 listen("state", (state) => {
   // Of a long path its end tells most; the whole is what the pointer shows.
-  const parts = state.source.split(/[/\\]/);
+  const parts = state.source.split(/[/\\]+/).filter(Boolean);
   const is_long = state.source.length > LONGEST_SOURCE && parts.length > 2 && !state.source.includes("://");
   say("source", is_long ? `…/${parts.slice(-2).join("/")}` : state.source);
   at("source").title = state.source;

@@ -24,7 +24,7 @@ panel("gauges", 'Gauges <span id="gauge_file" class="quiet"></span>', `
   <form id="gauge_form" hidden><fieldset><legend id="gauge_legend"></legend>
     <div id="gauge_fields"></div>
     <button id="gauge_remove" type="button">Remove</button>
-  </fieldset></form>`, { order: 5 });
+  </fieldset></form>`, { order: 7 });
 at("gauges").hidden = true;
 drawing.said = (words) => say("gauge_words", words);
 drawing.added = () => { at("gauge_new_name").value = ""; drawing.name = ""; build(); };

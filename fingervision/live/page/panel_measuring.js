@@ -30,8 +30,8 @@ panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
   </form>
   <form id="calibrate_form" class="row">
     <select id="kind" aria-label="Kind of reference"><option>bar</option><option>slot</option></select>
-    <label><input id="size_mm" type="number" step="any" min="0" required> mm</label>
-    <label>u <input id="u_size_mm" type="number" step="any" min="0" value="0.001" required> mm</label>
+    <label>size <input id="size_mm" type="number" step="any" min="0" required> mm</label>
+    <label>u (k = 1) <input id="u_size_mm" type="number" step="any" min="0" value="0.001" required> mm</label>
     <button id="drag_reference" type="button" aria-pressed="false">Drag over it</button>
     <button>Calibrate</button>
   </form>`, { open: true, order: 30 });
@@ -55,8 +55,8 @@ submit("calibrate_form", () => {
   return { do: "calibrate", box, kind: at("kind").value, size_mm: number("size_mm"), u_size_mm: number("u_size_mm") };
 });
 listen("state", (state) => {
-  const u = state.u_px_per_mm === null ? " (no uncertainty)" : ` ± ${(2 * state.u_px_per_mm).toFixed(4)}`;
-  say("scale", state.px_per_mm === null ? "not known" : `${state.px_per_mm.toFixed(4)}${u} px/mm`);
+  const u = state.u_px_per_mm === null ? " px/mm (no uncertainty)" : ` ± ${(2 * state.u_px_per_mm).toFixed(4)} px/mm (k = 2)`;
+  say("scale", state.px_per_mm === null ? "not known" : `${state.px_per_mm.toFixed(4)}${u}`);
   if (document.activeElement !== at("tips")) at("tips").value = state.tips;
   if (document.activeElement !== at("below_tip")) at("below_tip").value = state.below_tip_mm;
   const whole = state.region || [0, 0, state.width_px, state.height_px];

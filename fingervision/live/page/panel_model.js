@@ -1,18 +1,19 @@
 // The model beside the measurement: residual with its band, and what diagnose says of it so far.
 import { ask, at, colour, listen, number, on, page, panel, say, submit } from "/page/bus.js";
 import { gaps } from "/page/gap_data.js";
+import { values, wide } from "/page/axis_labels.js";
 
-const HIGH_PX = 120, WINDOW_S = 30, DRAWN_EVERY_MS = 250;
+const HIGH_PX = 140, WINDOW_S = 30, DRAWN_EVERY_MS = 250;
 panel("against", 'Model: <span id="model_residual" class="quiet"></span>', `
-  <p id="model_words"></p>
-  <div id="residual_chart" role="img" aria-label="Residual over time: measured less predicted, with its band"></div>
   <p id="verdict_words" role="status"></p>
   <ul id="verdict_effects"></ul>
   <button id="next_run" hidden>Run what would settle it</button>
+  <div id="residual_chart" role="img" aria-label="Residual over time: measured less predicted, with its band"></div>
+  <p id="model_words" class="quiet"></p>
   <form id="input_form" class="row">
     <label>input now <input id="typed_input" type="number" step="any"> mm</label>
     <button>Set</button>
-  </form>`, { open: true, order: 7 });
+  </form>`, { open: true, order: 6 });
 at("against").hidden = true;
 submit("input_form", () => ({ do: "input", input_mm: number("typed_input") }));
 on("next_run", "click", () => ask({ do: "bed_run", recipe: page.state.model.verdict.next_run }));
@@ -21,9 +22,9 @@ const um = (value) => (value === null ? "–" : `${value.toFixed(1)} µm`);
 listen("state", ({ model, bed, whole }) => {
   at("against").hidden = !model;
   if (!model) return;
-  say("model_residual", model.rms_um === null ? "no residual yet" : `residual ${um(model.mean_um)}, RMS ${um(model.rms_um)}`);
+  say("model_residual", model.rms_um === null ? "no residual yet" : `mean residual ${um(model.mean_um)}, RMS ${um(model.rms_um)}`);
   const input = model.input_mm === null ? "The input is not known yet." : `Input ${model.input_mm.toFixed(4)} mm.`;
-  say("model_words", `${input} ${model.samples} samples against ${model.path}${model.band_um === null ? "" : `; U of one ${um(model.band_um)} (k = 2)`}.`);
+  say("model_words", `${input} ${model.samples} samples against ${model.path}${model.band_um === null ? "" : `; U of one sample ${um(model.band_um)} (k = 2)`}.`);
   const { verdict } = model;
   const waits = model.busy ? "diagnose is at work…" : `A verdict needs 100 samples in motion, there and back: so far ${model.moved}.`;
   say("verdict_words", verdict ? `${verdict.verdict}: ${verdict.sentence} (${verdict.rows} samples)${model.busy ? " – being judged anew" : ""}` : waits);
@@ -50,7 +51,7 @@ function make() {
   chart = new uPlot({
     width: at("residual_chart").clientWidth || 300, height: HIGH_PX, legend: { show: false }, cursor: { show: false },
     scales: { x: { time: false } },
-    axes: [{ ...axis, size: 22 }, { ...axis, size: 56, label: "residual (µm)", labelSize: 16, labelFont: "11px system-ui, sans-serif" }],
+    axes: [{ ...axis, size: 30, values }, { ...axis, size: wide, values, label: "residual (µm)", labelSize: 16, labelFont: "11px system-ui, sans-serif" }],
     series: [{}, { stroke: shade, width: 1.3, points: { show: false } }, hidden, hidden],
     bands: [{ series: [3, 2], fill: `${shade}44` }],
   }, [[], [], [], []], at("residual_chart"));

@@ -64,7 +64,7 @@ listen("state", (state) => {
   const now = state.playback, live = !now;
   at("recording_bar").hidden = live;
   for (const id of ["pause", "record", "follow"]) at(id).hidden = !live;
-  for (const id of ["rate", "jitter", "dropped"]) at(id).parentElement.hidden = !live;
+  for (const id of ["frame_number", "rate", "jitter", "dropped"]) at(id).parentElement.hidden = !live;
   if (live) return;
   say("play", now.playing ? "Stand" : "Play");
   at("play").setAttribute("aria-pressed", String(now.playing));

@@ -1,0 +1,51 @@
+"""Recognise a space between two strokes of a letter, which looks like the gap between two fingers.
+
+Seen in the tone of the paper, the spaces inside and between letters are bars that come in from the picture's border.
+What lies between two such bars is a part of a letter, and there are others of its size; what lies between two fingers
+is the ground, and there is one ground.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.gap import NoGap
+from fingervision.domain.status import Status
+from fingervision.vision.coarse_fingers import CoarseFingers
+from fingervision.vision.way_between import inner_crossing
+
+# Other objects are of one size with that in the gap where they are no shorter and no longer than by this factor. A
+# mechanism that encloses its gap has a few windows of this size; a text has more letters.
+SAME_SIZE, FEWEST_OTHERS = 2.5, 5
+
+LETTERS = NoGap(
+    Status.NO_FINGERS,
+    "What lies between the two is one of several things of its size, as in a text: give the region that holds two "
+    "fingers.",
+)
+
+
+def has_company(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: float) -> bool:
+    """Whether the object between two fingers is one of several of its size.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+        Non-zero where the fingers may be.
+    fingers : CoarseFingers
+        The fingers as found in the mask.
+    below_tip_px : float
+        Distance of the measuring point below the tip.
+    """
+    height = max(finger.top_along_px for finger in (fingers.left, fingers.right)) + below_tip_px
+    across = [inner_crossing(finger.outline, height)[0] for finger in (fingers.left, fingers.right)]
+    x, y = (round(place) for place in fingers.orientation.to_pixels(0.5 * sum(across), height))
+    if not (0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]):
+        return False
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(np.where(mask == 0, 1, 0).astype(np.uint8), connectivity=4)
+    own = int(labels[y, x])
+    if own == 0:
+        return False
+    size = stats[1:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+    ratio = size / size[own - 1]
+    return int(np.count_nonzero((ratio > 1.0 / SAME_SIZE) & (ratio < SAME_SIZE))) > FEWEST_OTHERS
