@@ -42,5 +42,5 @@ def test_without_limits_or_gap_there_is_no_verdict() -> None:
 )
 def test_what_cannot_be_meant_is_a_sentence(choices: Choices, words: str) -> None:
     with pytest.raises(UsageError) as refused:
-        choices.check(DESCRIPTION)
+        choices.for_frames(DESCRIPTION)
     assert str(refused.value).startswith(words)

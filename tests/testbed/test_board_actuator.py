@@ -149,7 +149,9 @@ def test_a_move_that_no_step_makes_is_refused_before_anything_moves(bed: Bed, co
 
 
 def test_before_homing_only_absolute_steps_lead_anywhere(bed: Bed, controller: MotorController) -> None:
-    with pytest.raises(StateError, match=r"^The position must be known before the relative step 3, but is not"):
+    with pytest.raises(
+        StateError, match=r"^The stage's position must be known before the relative step 3, but is unknown"
+    ):
         bed.actuator.run_step(3)
     bed.actuator.move(5.0, 50.0)
     assert stands(bed) == 5.0
@@ -170,7 +172,7 @@ def test_a_stop_drops_the_drive_line_and_the_position_is_unknown_until_an_absolu
     emulated.wait_for(lambda edge: edge.level(6) == 0, since=since)
     assert 0.0 <= stands(bed) < 9.0
     assert bed.actuator.alarm is None
-    with pytest.raises(StateError, match=r"^The position must be known before the relative step 3"):
+    with pytest.raises(StateError, match=r"^The stage's position must be known before the relative step 3"):
         bed.actuator.run_step(3)
     bed.actuator.run_step(2)
     assert stands(bed) == 5.0
