@@ -165,7 +165,7 @@ def test_what_is_no_camera_is_refused_and_opencv_keeps_its_words_to_itself(
 ) -> None:
     device = tmp_path / "video0"
     device.touch()
-    with pytest.raises(DeviceError, match=f"The camera {device} cannot be opened: it is in use"):
+    with pytest.raises(DeviceError, match=f"The camera {device} cannot be opened: another program uses it"):
         CameraFrames(str(device), Wish())
     assert capfd.readouterr().err == ""
 
