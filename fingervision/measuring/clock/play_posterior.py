@@ -20,6 +20,10 @@ nearest minimum."""
 BESIDE_S, BESIDE_STEP_S = 2.0, 0.1
 """Range and step of the offsets tried beside a correlation peak: halts of a staircase motion seldom last longer than 2
 s, and moves that take less than 0.1 s have a narrow minimum of their own."""
+VALLEYS = 4
+"""Number of minima beside a correlation peak from which a fit is started: the halts of a staircase motion within
+`BESIDE_S` are at most about as many, and the lowest value on the grid of offsets and plays need not lie in the lowest
+valley."""
 OUT_OF_REACH = 14.0
 """Twice the logarithm of the likelihood ratio above which a value of the play is neglected: a weight of one in a
 thousand."""
@@ -74,13 +78,17 @@ def beside(motion: Motion, found: Fit, plays: tuple[float, ...]) -> Fit:
     duration of a whole halt.
     """
     longest_mm = _longest_mm(motion)
-    tried = [
-        replace(found.at, offset_s=found.at.offset_s + by_s, play_mm=share * longest_mm)
-        for by_s in np.arange(-BESIDE_S, BESIDE_S + 0.5 * BESIDE_STEP_S, BESIDE_STEP_S)
-        for share in plays
-    ]
-    lowest = min(tried, key=lambda at: squares_at(motion, at))
-    return min(found, fit(motion, lowest, free_play=True), key=lambda one: one.squares)
+    valleys: list[tuple[float, Alignment]] = []
+    for by_s in np.arange(-BESIDE_S, BESIDE_S + 0.5 * BESIDE_STEP_S, BESIDE_STEP_S):
+        tried = [
+            replace(found.at, offset_s=found.at.offset_s + float(by_s), play_mm=share * longest_mm)
+            for share in (*plays, found.at.play_mm / longest_mm)
+        ]
+        valleys.append(min(((squares_at(motion, at), at) for at in tried), key=lambda one: one[0]))
+    squares = np.array([np.inf, *(one for one, _ in valleys), np.inf])
+    is_lowest = (squares[1:-1] <= squares[:-2]) & (squares[1:-1] <= squares[2:])
+    lowest = sorted((valleys[k] for k in np.flatnonzero(is_lowest)), key=lambda one: one[0])[:VALLEYS]
+    return min((found, *(most_likely(motion, at, plays) for _, at in lowest)), key=lambda one: one.squares)
 
 
 def posterior(motion: Motion, best: Fit) -> Posterior:
