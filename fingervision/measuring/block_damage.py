@@ -10,6 +10,7 @@ Wang, H. R. Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of 
 border segment separately.
 """
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +27,7 @@ WAVES = 2.0
 Levels = NDArray[np.float32]
 
 
-def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
+def foreign_corners(picture: Levels, before: Levels, least_step: float, levels_only: bool = False) -> int:
     """Count corners of codec squares that are visible in a picture and were not in the previous one.
 
     Parameters
@@ -35,6 +36,8 @@ def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
         Grey levels of the same part of both pictures, which starts at a corner of a square and contains whole squares.
     least_step : float
         Least step in grey levels; smaller steps also occur with undamaged coding.
+    levels_only : bool
+        Whether only wrong levels of squares are looked for, and no waves in them, which takes a third of the time.
 
     Returns
     -------
@@ -42,8 +45,11 @@ def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
         Number of points where an outstanding step along a vertical border meets one along a horizontal border.
     """
     change = picture - before
-    upright = _outstanding(change, picture, before, least_step)
-    lying = _outstanding(change.T, picture.T, before.T, least_step).T
+    upright = _outstanding(change, picture, before, least_step, levels_only)
+    if not upright.any():  # as in nearly every sound picture
+        return 0
+    turned = np.ascontiguousarray(change.T)
+    lying = _outstanding(turned, picture.T, before.T, least_step, levels_only).T
     # upright[j, i] runs along block row j at the border behind block column i; a corner has one above or below it, and
     # a lying one to its left or right.
     meets_upright = upright[:-1] | upright[1:]
@@ -51,11 +57,14 @@ def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
     return int(np.count_nonzero(meets_upright & meets_lying))
 
 
-def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: float) -> NDArray[np.bool_]:
+def _outstanding(
+    change: Levels, picture: Levels, before: Levels, least_step: float, levels_only: bool
+) -> NDArray[np.bool_]:
     """Border segments between block columns at which the change has a step, shape (block rows, block columns - 1)."""
     at = np.arange(SQUARE_PX - 1, change.shape[1] - 1, SQUARE_PX)
     stands_out = np.zeros((change.shape[0] // SQUARE_PX, len(at)), dtype=bool)
-    for steps, least in ((_levelled, least_step), (_sized, WAVES * least_step)):
+    measures = ((_levelled, least_step), (_sized, WAVES * least_step))
+    for steps, least in measures[:1] if levels_only else measures:
         step = steps(change)
         here = step[:, at]
         left = np.maximum(step[:, at - 1], step[:, at - 2])
@@ -70,11 +79,15 @@ def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: fl
 
 def _levelled(levels: Levels) -> Levels:
     """Absolute value of the mean level step between columns over each block's height, shape (block rows, width - 1)."""
-    rows = levels.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, levels.shape[1]).mean(axis=1)
-    return np.asarray(np.abs(np.diff(rows, axis=1)))
+    return np.asarray(np.abs(np.diff(_block_rows(levels), axis=1)))
 
 
 def _sized(levels: Levels) -> Levels:
     """Mean of the absolute level steps between columns over each block's height, shape (block rows, width - 1)."""
-    steps = np.abs(np.diff(levels, axis=1))
-    return np.asarray(steps.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, -1).mean(axis=1))
+    return _block_rows(np.abs(np.diff(levels, axis=1)))
+
+
+def _block_rows(levels: Levels) -> Levels:
+    """Mean over each block's height, shape (block rows, width); OpenCV does this ten times as fast as NumPy."""
+    size = (levels.shape[1], levels.shape[0] // SQUARE_PX)
+    return np.asarray(cv2.resize(np.ascontiguousarray(levels), size, interpolation=cv2.INTER_AREA), dtype=np.float32)

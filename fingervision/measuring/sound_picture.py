@@ -109,23 +109,38 @@ def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> 
     """Whether the picture shows squares of the codec's grid that the last undamaged picture lacks, shifted or not."""
     if frame.pixels.shape != last.frame.pixels.shape:
         return False
-    if frame.coding is Coding.INTRAFRAME:
-        # JPEG codes each block's level as a difference to the one before it: a damaged level raises or lowers all that
-        # follow, up to the next restart marker, so that the only corners may lie far from the fingers.
-        rows, columns = _squares(0, frame.height_px, frame.height_px), _squares(0, frame.width_px, frame.width_px)
-    else:
-        rows, columns = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)
+    least_step = LEAST_STEP * min(abs(last.outcome.left.contrast), abs(last.outcome.right.contrast))
+    part = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)
+    if _has_squares(frame, outcome, last, part, least_step, levels_only=False):
+        return True
+    if frame.coding is not Coding.INTRAFRAME:
+        return False
+    # JPEG codes each block's level as a difference to the one before it: a damaged level raises or lowers all that
+    # follow, up to the next restart marker, so that the only corners may lie far from the fingers.
+    whole = _squares(0, frame.height_px, frame.height_px), _squares(0, frame.width_px, frame.width_px)
+    return _has_squares(frame, outcome, last, whole, least_step, levels_only=True)
+
+
+def _has_squares(
+    frame: Frame,
+    outcome: GapMeasurement | NoGap,
+    last: _Sound,
+    part: tuple[slice, slice],
+    least_step: float,
+    levels_only: bool,
+) -> bool:
+    """Whether a part of the picture shows squares that the last undamaged picture lacks, shifted or not."""
+    rows, columns = part
     if rows.stop - rows.start < 2 * SQUARE_PX or columns.stop - columns.start < 2 * SQUARE_PX:
         return False
-    least_step = LEAST_STEP * min(abs(last.outcome.left.contrast), abs(last.outcome.right.contrast))
     picture = _levels(frame.pixels[rows, columns])
     before = _levels(last.frame.pixels[rows, columns])
-    if foreign_corners(picture, before, least_step) < FEWEST_CORNERS:
+    if foreign_corners(picture, before, least_step, levels_only) < FEWEST_CORNERS:
         return False
     if isinstance(outcome, NoGap):
         return True
     moved = _moved(_levels(last.frame.pixels), last.outcome, outcome)[rows, columns]
-    return foreign_corners(picture, moved, least_step) >= FEWEST_CORNERS
+    return foreign_corners(picture, moved, least_step, levels_only) >= FEWEST_CORNERS
 
 
 def _part(outcome: GapMeasurement, frame: Frame) -> tuple[slice, slice]:
