@@ -68,10 +68,31 @@ OPTIONS = (
         "--roi", metavar="X,Y,W,H", help="Region of interest: first column, first row, width, height in pixels."
     ),
 )
+PICTURE_OPTIONS = (
+    click.option(
+        "--response",
+        default="auto",
+        show_default=True,
+        metavar="auto|linear|srgb|bt709|FILE",
+        help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
+    ),
+    click.option(
+        "--bits",
+        type=click.IntRange(8, 16),
+        help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
+    ),
+    click.option(
+        "--fingers",
+        type=click.Choice(["auto", "dark", "light"]),
+        default="auto",
+        show_default=True,
+        help="Whether the fingers are darker or lighter than the background.",
+    ),
+)
 
 
 def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of this module to a command."""
+    """Add the options of scale, height, direction and region to a command."""
 
     @wraps(command)
     def with_one_scale(**options: Any) -> Any:
@@ -91,6 +112,13 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(OPTIONS):
         decorated = option(decorated)
     return decorated
+
+
+def how_to_read_pictures(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of response, bit depth and polarity to a command."""
+    for option in reversed(PICTURE_OPTIONS):
+        command = option(command)
+    return command
 
 
 def region_of(words: str | None) -> "Region | None":

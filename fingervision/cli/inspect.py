@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from fingervision.cli._where_to_measure import region_of, where_to_measure
+from fingervision.cli._where_to_measure import how_to_read_pictures, region_of, where_to_measure
 from fingervision.domain.errors import ExitCode, UsageError
 
 EXAMPLES = """
@@ -27,25 +27,7 @@ WITHOUT_SCALE_PX = 10.0
 @where_to_measure
 @click.option("--seconds", type=float, default=5.0, show_default=True, help="Duration of the inspection in seconds.")
 @click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
-@click.option(
-    "--response",
-    default="auto",
-    show_default=True,
-    metavar="auto|linear|srgb|bt709|FILE",
-    help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
-)
-@click.option(
-    "--bits",
-    type=click.IntRange(8, 16),
-    help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
-)
-@click.option(
-    "--fingers",
-    type=click.Choice(["auto", "dark", "light"]),
-    default="auto",
-    show_default=True,
-    help="Whether the fingers are darker or lighter than the background.",
-)
+@how_to_read_pictures
 @click.option(
     "--picture",
     type=click.Path(path_type=Path),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fingervision.cli._columns_option import columns_option
-from fingervision.cli._where_to_measure import region_of, where_to_measure
+from fingervision.cli._where_to_measure import how_to_read_pictures, region_of, where_to_measure
 from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
@@ -58,25 +58,7 @@ Exit codes: 0 done; 1 failed, or no frame has a gap; 2 wrong usage;
     type=float,
     help="Clock offset in seconds, added to the drive's times; determined from the motion if not given.",
 )
-@click.option(
-    "--response",
-    default="auto",
-    show_default=True,
-    metavar="auto|linear|srgb|bt709|FILE",
-    help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
-)
-@click.option(
-    "--bits",
-    type=click.IntRange(8, 16),
-    help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
-)
-@click.option(
-    "--fingers",
-    type=click.Choice(["auto", "dark", "light"]),
-    default="auto",
-    show_default=True,
-    help="Whether the fingers are darker or lighter than the background.",
-)
+@how_to_read_pictures
 @click.option(
     "--face",
     type=click.Choice(["front", "outline"]),
