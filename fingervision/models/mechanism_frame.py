@@ -29,7 +29,7 @@ from fingervision.models.mechanism import Contact, Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps, MechanismEquilibrium
 from fingervision.models.mechanism_faces import per_input_of
-from fingervision.models.mechanism_state import MechanismState, changes, named_forces_n, observables, pair_distances_mm
+from fingervision.models.mechanism_state import MechanismState, changes, observables, state_in_equilibrium
 from fingervision.models.modal_model import FreeModes, ModalModel
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
@@ -255,19 +255,7 @@ class MechanismFrame:
                                         width_effect=self._width_effect)
                      for span, own in zip(self.spans, self.segments, strict=True))  # fmt: skip
         poses = plate_poses(self.plate, self.bodies, self._field(moved, large=large_rotation), large=large_rotation)
-        pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
-        pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
-        return MechanismState(
-            input_mm,
-            found.force_n,
-            probes,
-            pairs,
-            stress,
-            moved,
-            pressed,
-            poses,
-            named_forces_n(mechanism, found.drives_n),
-        )
+        return state_in_equilibrium(mechanism, input_mm, found, probes, stress, poses, large=large_rotation)
 
     @cached_property
     def bodies(self) -> tuple[LinkBody, ...]:

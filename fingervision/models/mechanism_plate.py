@@ -15,7 +15,7 @@ from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, MechanismEquilibrium
 from fingervision.models.mechanism_faces import driven_components, mean_weights, per_input_of, supports_of, turns_with
-from fingervision.models.mechanism_state import MechanismState, changes, named_forces_n, observables, pair_distances_mm
+from fingervision.models.mechanism_state import MechanismState, changes, observables, state_in_equilibrium
 from fingervision.models.modal_model import FreeModes, ModalModel
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
@@ -191,21 +191,9 @@ class MechanismPlate:
     def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:
         mechanism, moved = self.mechanism, found.displacement
         probes = {name: (float(rows[0] @ moved), float(rows[1] @ moved)) for name, rows in self.probe_rows.items()}
-        pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
-        pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
         stress = self.stress_mpa(moved, large=large_rotation)
         poses = plate_poses(self.plate, self.bodies, moved, large=large_rotation)
-        return MechanismState(
-            input_mm,
-            found.force_n,
-            probes,
-            pairs,
-            stress,
-            moved,
-            pressed,
-            poses,
-            named_forces_n(mechanism, found.drives_n),
-        )
+        return state_in_equilibrium(mechanism, input_mm, found, probes, stress, poses, large=large_rotation)
 
     def stress_mpa(self, moved: Array, *, large: bool = False) -> float:
         """Largest von Mises stress in the flexures at given displacements (MPa)."""

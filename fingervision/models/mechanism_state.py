@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_equilibrium import MechanismEquilibrium
 from fingervision.models.modal_model import Observable
 from fingervision.models.rigid_motion import BodyPose
 
@@ -53,6 +54,45 @@ class MechanismState:
 def named_forces_n(mechanism: Mechanism, forces_n: NDArray[np.float64]) -> dict[str, float]:
     """Forces of the driven faces (N), by the names of the faces."""
     return {drive.face.name: float(force) for drive, force in zip(mechanism.drives, forces_n, strict=True)}
+
+
+def state_in_equilibrium(
+    mechanism: Mechanism,
+    input_mm: float,
+    found: MechanismEquilibrium,
+    probes_mm: dict[str, tuple[float, float]],
+    stress_mpa: float,
+    bodies: Mapping[str, BodyPose],
+    *,
+    large: bool,
+) -> MechanismState:
+    """State of a mechanism in an equilibrium, with what the model's kind has read from its displacements.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    input_mm : float
+        Input.
+    found : MechanismEquilibrium
+        Displacements and forces.
+    probes_mm, stress_mpa, bodies
+        As in `MechanismState`.
+    large : bool
+        Whether the distances of the pairs are those of displaced points, instead of linear in the displacements.
+    """
+    pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
+    return MechanismState(
+        input_mm,
+        found.force_n,
+        probes_mm,
+        pair_distances_mm(mechanism, probes_mm, large=large),
+        stress_mpa,
+        found.displacement,
+        pressed,
+        bodies,
+        named_forces_n(mechanism, found.drives_n),
+    )
 
 
 def pair_distances_mm(
