@@ -4,13 +4,14 @@ import shutil
 import ssl
 import subprocess
 from collections.abc import Iterator
+from http.client import HTTPSConnection
 from pathlib import Path
 from threading import Event, Thread
 from urllib.error import HTTPError, URLError
+from urllib.parse import urlsplit
 from urllib.request import urlopen
 
 import pytest
-from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from calib.calibration import BareScale
@@ -51,6 +52,17 @@ def page(tmp_path: Path) -> Iterator[tuple[Page, ssl.SSLContext]]:
     session.capture.stop()
 
 
+def handshake_status(target: str, headers: dict[str, str], trusting: ssl.SSLContext) -> int:
+    """HTTP status that answers a request to open a WebSocket."""
+    address = urlsplit(target)
+    connection = HTTPSConnection(address.netloc, timeout=10.0, context=trusting)
+    try:
+        connection.request("GET", f"{address.path}?{address.query}", headers=headers)
+        return connection.getresponse().status
+    finally:
+        connection.close()
+
+
 def test_page_and_socket_are_encrypted_and_nothing_else_is_spoken(page: tuple[Page, ssl.SSLContext]) -> None:
     served, trusting = page
     assert served.address.startswith("https://127.0.0.1:")
@@ -62,9 +74,16 @@ def test_page_and_socket_are_encrypted_and_nothing_else_is_spoken(page: tuple[Pa
     target = served.address.replace("https://", "wss://").replace("/?", "/socket?")
     with connect(target, origin=origin, ssl=trusting, max_size=None) as socket:  # type: ignore[arg-type]
         assert len(socket.recv(timeout=20.0)) > 4
-    plain_origin = origin.replace("https", "http")
-    with pytest.raises(InvalidStatus):
-        connect(target, origin=plain_origin, ssl=trusting)  # type: ignore[arg-type]
+    # Asked by hand: the client above writes and reads one TLS connection from two threads, and now and then loses an
+    # answer that is followed by the end of the connection.
+    handshake = {
+        "Connection": "Upgrade",
+        "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "MDEyMzQ1Njc4OWFiY2RlZg==",
+    }
+    for page_origin, status in ((origin.replace("https", "http"), 403), (origin, 101)):
+        assert handshake_status(target, {**handshake, "Origin": page_origin}, trusting) == status
     with pytest.raises((URLError, ConnectionError, OSError)):
         urlopen(served.address.replace("https", "http"), timeout=5.0)
     # Who does not know the certificate is warned by its own browser.
