@@ -168,7 +168,7 @@ class CalibrationReader:
         total = self._covariance(self._content.get("covariance"), "covariance", 2)
         for name, variance in (("u_px_per_mm", total[0, 0]), ("u_edge_bias_px", total[1, 1])):
             u = self._number(self._content, name)
-            if u < 0.0 or not isclose(u**2, variance, rel_tol=SAME_U, abs_tol=1e-18):
+            if u < 0.0 or not isclose(u, variance**0.5, rel_tol=0.5 * SAME_U, abs_tol=1e-9):
                 self._refuse(f"{name} must be the root of its variance in covariance, {variance**0.5:g}, but is {u:g}")
         stated = budget.get("parts")
         if stated is None:

@@ -188,7 +188,7 @@ def driven_nodes(plate: PlaneStressPlate) -> NDArray[np.bool_]:
     """Nodes of the drive's face."""
     mechanism, (x, y) = drawn(), plate.nodes_mm
     near = 1e-6 * mechanism.region.size_mm
-    x0, x1, y0, _ = mechanism.drive.face.box_mm
+    x0, x1, y0, _ = mechanism.drives[0].face.box_mm
     return np.asarray((x > x0 - near) & (x < x1 + near) & (np.abs(y - y0) < near))
 
 

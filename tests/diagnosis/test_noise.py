@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from fingervision.diagnosis.noise.noise_model import Noise, gate
+from fingervision.diagnosis.noise.residual_scatter import most_noise
 from fingervision.diagnosis.noise.restricted_likelihood import noise_of_short_runs
 from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
 
@@ -115,3 +116,27 @@ def test_the_two_last_samples_at_the_end_of_the_range_are_no_outliers() -> None:
     residual[[0, 170]] = 30.0, residual[399]
     residual[399] = 0.0
     assert np.flatnonzero(gate(residual, input_mm, (slice(0, 400),), True, 7.0)).tolist() == [0, 170]
+
+
+def there_and_back(passes: int) -> NDArray[np.float64]:
+    """Input of a stage that waits, goes there and back, and waits."""
+    way = np.linspace(0.0, 1.0, 60)
+    return np.concatenate([np.zeros(20), *(way[:: 1 - 2 * (k % 2)] for k in range(passes)), np.full(20, passes % 2)])
+
+
+def test_what_every_pass_repeats_is_no_noise() -> None:
+    rng = np.random.default_rng(SEED)
+    at = there_and_back(2)
+    # A rough map of position errors: over time it looks like white noise, but in the holds.
+    rough = np.interp(at, np.linspace(0.0, 1.0, 40), rng.standard_normal(40))
+    most = most_noise(rough + 0.05 * rng.standard_normal(at.size), at, (slice(0, at.size),), 0.0)
+    assert most < 0.3 * float(np.std(rough))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
+def test_noise_stays_possible_as_noise(rho: float) -> None:
+    rng = np.random.default_rng(SEED)
+    at = there_and_back(4)
+    most = [most_noise(drawn(rng, at.size, rho), at, (slice(0, at.size),), 0.0) for _ in range(DRAWS)]
+    assert np.median(most) > 0.9
+    assert min(most) > 0.5

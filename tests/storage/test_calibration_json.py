@@ -80,6 +80,7 @@ NONSENSE: list[tuple[dict[str, Any], str]] = [
     ({"px_per_mm": True}, "px_per_mm must be a positive number, but is True"),
     ({"edge_bias_px": "0.6"}, "edge_bias_px must be a number, but is '0.6'"),
     ({"u_px_per_mm": 0.5}, "u_px_per_mm must be the root of its variance in covariance"),
+    ({"u_px_per_mm": 1e300}, "u_px_per_mm must be the root of its variance in covariance"),
     ({"covariance": [[1e-4, 0.0]]}, "covariance must be 2 by 2 numbers"),
     ({"covariance": [[-1e-4, 0.0], [0.0, 1e-2]]}, "covariance must be symmetric and not negative"),
     ({"covariance": [[5e-6, 1.0], [1.0, 5e-4]]}, "covariance must be symmetric and not negative"),
@@ -95,7 +96,7 @@ NONSENSE: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("edit", "sentence"), NONSENSE, ids=[sentence[:40] for _, sentence in NONSENSE])
+@pytest.mark.parametrize(("edit", "sentence"), NONSENSE, ids=[str(edit)[:40] for edit, _ in NONSENSE])
 def test_nonsense_is_refused(tmp_path: Path, edit: dict[str, Any], sentence: str) -> None:
     path = tmp_path / "calibration.json"
     write_calibration(calibration(), path)

@@ -11,7 +11,7 @@ from fingervision.diagnosis.input.observations import FORM_SHARE_OF_RIGS, Observ
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.residual_scatter import most_noise
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, Flags
 from fingervision.domain.report import Verdict
 
 STANDING_SHARE = 0.05
@@ -103,7 +103,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
     n, both, runs = history.input_mm.size, history.both_edges, history.runs
-    aside = problem.whitener.aside[:n]
+    aside = problem.whitener.aside[:n] & ~_leans(after_mm[:n], problem.whitener.aside[:n], runs)
     noises = [noise.total_mm for noise in problem.whitener.noises]
     if history.commanded:
         # What the stage does after each jump is no noise, and passes for it in the spectrum.
@@ -115,7 +115,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         # Slow structure passes for correlated noise, which leaves traces in what changes from sample to sample.
         parts = np.split(after_mm, len(data.channels))
         digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
-        most = [most_noise(part, runs, digits) for part in parts]
+        most = [most_noise(part, history.input_mm, runs, digits) for part in parts]
         noises = [min(noise, limit or noise) for noise, limit in zip(noises, most, strict=True)]
     if data.table.u_random_mm is not None:
         stated = TRUSTED * float(np.median(data.table.u_random_mm))
@@ -136,6 +136,24 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     rounding_mm = 0.5 * resolution(data.table.gap_mm) if data.repeats is not None else 0.0
     kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
     return Standing(rms(before_mm), rms(after_mm), noise, kept, degrees, rounding_mm, gross)
+
+
+def _leans(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
+    """Mark the rows set aside as gross errors that are the peak of something wider, and so part of the disagreement.
+
+    A gross error stands alone. Beside a peak, the nearest row that was kept lies off in the same direction by more than
+    half as much.
+    """
+    leans = np.zeros(aside.size, dtype=bool)
+    for run in runs:
+        kept = np.flatnonzero(~aside[run]) + run.start
+        if not kept.size:
+            continue
+        rows = np.flatnonzero(aside[run]) + run.start
+        after = np.searchsorted(kept, rows)
+        for beside in (kept[np.maximum(after - 1, 0)], kept[np.minimum(after, kept.size - 1)]):
+            leans[rows] |= residual_mm[beside] * residual_mm[rows] > 0.5 * residual_mm[rows] ** 2
+    return leans
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:

@@ -1,6 +1,9 @@
-"""Upper bound of the noise in a residual: slow changes are structure, or indistinguishable from structure."""
+"""Upper bound of the noise in a residual: slow changes are structure, and so is what each pass over a place repeats."""
+
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.effect import Array
 
@@ -11,22 +14,61 @@ STRETCH = 20
 WANDERING = 1.65
 """Largest ratio of noise to its scatter within such stretches: that of an autoregression of 0.9 (simulated; 1.3 for
 0.8). With only the limit on the scatter from sample to sample, a third of a creep counted as noise."""
+FEWEST_PAIRS = 20
+"""Fewest readings with another pass over their place: the scatter of as many has a relative uncertainty of a sixth."""
 
 
-def most_noise(residual_mm: Array, runs: tuple[slice, ...], digits_mm: float) -> float:
+def most_noise(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...], digits_mm: float) -> float:
     """Largest standard deviation that the noise of a residual may have (mm); 0 if the runs are too short.
 
     Parameters
     ----------
     residual_mm : ndarray of float, shape (n,)
         Residual of an explanation.
+    input_mm : ndarray of float, shape (n,)
+        Recorded input.
     runs : tuple of slice
         Rows of each run.
     digits_mm : float
         Standard deviation of the rounding of a reading.
     """
-    limits = ((CORRELATED, _short_scatter(residual_mm, runs)), (WANDERING, _local_scatter(residual_mm, runs)))
+    limits = (
+        (CORRELATED, _short_scatter(residual_mm, runs)),
+        (WANDERING, _local_scatter(residual_mm, runs)),
+        (1.0, _scatter_between_passes(residual_mm, input_mm, runs)),
+    )
     return min((times * max(scatter, digits_mm) for times, scatter in limits if scatter or digits_mm), default=0.0)
+
+
+def _scatter_between_passes(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...]) -> float:
+    """Standard deviation of one reading from the difference of successive passes over the same places; 0 without them.
+
+    A rough map of position errors looks like noise over time, but the way back repeats it. The mean difference of two
+    passes may be hysteresis and is removed. What is interpolated between two readings has at least half the variance of
+    one, so that the result is not too small for noise that is independent between the passes.
+    """
+    found = []
+    for run in runs:
+        ways = [part + run.start for part in _passes(input_mm[run])]
+        for there, back in pairwise(ways):
+            order = np.argsort(input_mm[back])
+            low, high = input_mm[back[order[0]]], input_mm[back[order[-1]]]
+            within = there[(input_mm[there] >= low) & (input_mm[there] <= high)]
+            if within.size > 1:
+                beside = np.interp(input_mm[within], input_mm[back[order]], residual_mm[back[order]])
+                apart = residual_mm[within] - beside
+                found.append(np.abs(apart - np.median(apart)))
+    differences = np.concatenate(found) if found else np.zeros(0)
+    # 0.6745 is the normal median; a bump that only one pass has is large in a few differences only.
+    return float(np.median(differences) / 0.6745 / np.sqrt(1.5)) if differences.size >= FEWEST_PAIRS else 0.0
+
+
+def _passes(input_mm: Array) -> list[NDArray[np.int64]]:
+    """Indices of the samples of each stretch over which the input moves in one direction, without its holds."""
+    step = np.sign(np.diff(input_mm))
+    moving = np.flatnonzero(step)
+    turns = np.flatnonzero(np.diff(step[moving])) + 1
+    return [part + 1 for part in np.split(moving, turns) if part.size > 1]
 
 
 def _short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
