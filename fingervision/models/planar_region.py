@@ -106,7 +106,7 @@ class PlanarRegion:
                 at += crossings(curve, Curve(np.array(mark), np.array([1e-12, 0.0]), None, 0.0, 1.0))
             at = sorted(at)
             pieces += [curve.part(a, b) for a, b in pairwise(at)]
-        return _chained(self._on_outline(pieces), _SAME * self.size_mm)
+        return _chained(self._on_outline(pieces), 10.0 * _SAME * self.size_mm, 2.0 * apart)
 
     def _on_outline(self, pieces: list[Curve]) -> list[Curve]:
         """Keep the pieces that separate the body from the void, directed so that the body lies on their left."""
@@ -155,12 +155,19 @@ def _box_mm(curve: Curve) -> tuple[Array, Array]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
+def _chained(pieces: list[Curve], same_mm: float, unresolved_mm: float) -> tuple[Loop, ...]:
+    """Join pieces to loops where one ends and the next begins.
+
+    A piece between two shapes that nearly touch may be too short for its sides to be told apart; the pieces before and
+    after it are joined across the gap of at most `unresolved_mm` that it leaves.
+    """
     starts = np.array([p.start_mm for p in pieces]).reshape(-1, 2)
     following: dict[int, int] = {}
     for place, piece in enumerate(pieces):
         distance = np.hypot(*(starts - piece.end_mm).T)
-        near = np.flatnonzero(distance < 10.0 * same_mm)
+        near = np.flatnonzero(distance < same_mm)
+        if near.size == 0:
+            near = np.flatnonzero(distance < unresolved_mm)
         if near.size != 1:
             x, y = piece.end_mm
             what = "ends" if near.size == 0 else "touches itself in a point"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.gripper_mechanism import half_mechanism
@@ -86,7 +87,12 @@ def main() -> None:
         began = time.perf_counter()
         gripper = drawn(sample, row)
         fine = REFINED * 0.2 * gripper.hinge.thickness_mm
-        reference = FiniteElementGripper(gripper, mesh=mesh_outline(gripper, ElementSize(fine, REFINED * 2.5)))
+        try:
+            mesh = mesh_outline(gripper, ElementSize(fine, REFINED * 2.5))
+        except DataError as error:  # some drawn at random have no body where a notch lies
+            print(f"{row[0].name:18s} {row[1]:6.3f} {row[2]:4.2f} {row[3]:5.2f} | {error}", flush=True)
+            continue
+        reference = FiniteElementGripper(gripper, mesh=mesh)
         model, lumped = FiniteElementGripper(gripper), LumpedGripper(gripper)
         cells = []
         for other in (model, lumped):

@@ -60,6 +60,21 @@ def test_area_and_loops_and_quality(name: str) -> None:
     assert mesh.quality().min() > LEAST_QUALITY
 
 
+@pytest.mark.parametrize("axis_deg", [100.0, 150.0])
+@pytest.mark.parametrize("beside_mm", [-3e-6, -1e-5, 1e-5])
+def test_a_slot_that_passes_close_by_a_corner_closes_the_outline(axis_deg: float, beside_mm: float) -> None:
+    # The corner of the box and the disc's cut, and the side of the slot, leave a piece of outline finer than is told.
+    across = np.array([np.cos(np.radians(axis_deg)), np.sin(np.radians(axis_deg))])
+    along = np.array([-across[1], across[0]])
+    middle = np.array([1.0, 4.0]) + (beside_mm - 0.25) * across
+    slot = bar(*(middle - 6.0 * along), *(middle + 6.0 * along), 0.5)
+    body = region((True, box(-4, 4, 0, 4)), (False, Ellipse((0, 4), (1, 1))), (False, slot))
+    x = np.linspace(-4.0, 4.0, 801)[1::2]
+    y = np.linspace(0.0, 4.0, 401)[1::2]
+    by_points = 32.0 * float(np.mean(body.holds(np.array([part.ravel() for part in np.meshgrid(x, y)]))))
+    assert sum(loop.area_mm2 for loop in body.loops) == pytest.approx(by_points, abs=0.05)
+
+
 def test_bodies_that_touch_in_a_point_are_refused() -> None:
     with pytest.raises(DataError, match=r"touches itself in a point at \(1, 1\) mm"):
         _ = region((True, box(0, 1, 0, 1)), (True, box(1, 2, 1, 2))).loops
