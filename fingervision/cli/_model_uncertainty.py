@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from matplotlib.figure import Figure
 
+from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.models.gripper_figures import unit_of
 from fingervision.models.kinds import by_trust
 from fingervision.models.uncertainty import FigureUncertainty
@@ -65,7 +66,7 @@ def write_uncertainty(
     width = max((len(figure) for figure in stated), default=0) + 2
     for figure, own in stated.items():
         most = ", ".join(f"{n} {100.0 * share:.0f} %" for n, share in own.shares if share >= 0.005)
-        words = f"{float(rows[best][figure] or 0.0):.5g} +- {own.u:.2g} {unit_of(figure)}"
+        words = f"{with_uncertainty(float(rows[best][figure] or 0.0), own.u)} {unit_of(figure)}"
         click.echo(f"  {figure:<{width}}{words:<34}{_method(own):<9}{most}")
 
 
@@ -90,7 +91,7 @@ def _draw(stated: Mapping[str, FigureUncertainty], row: Mapping[str, float | Non
             left += 100.0 * share
     for place, n in enumerate(inputs):
         axes.barh(0, 0.0, color=f"C{place}", label=n)
-    labels = [f"{n}\n{float(row[n] or 0.0):.4g} +- {stated[n].u:.2g} {unit_of(n)}" for n in names]
+    labels = [f"{n}\n{with_uncertainty(float(row[n] or 0.0), stated[n].u)} {unit_of(n)}" for n in names]
     axes.set_yticks(range(len(names)), labels, fontsize="small")
     axes.invert_yaxis()
     axes.set_xlim(0.0, 100.0)

@@ -13,6 +13,7 @@ from calib.measured_scale import Calibration
 from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK, OUT_OF_VIEW, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.gauges.picture import Picture, picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.measuring.body_outlines import BodyOutline, outlines_of
@@ -180,7 +181,7 @@ class BodyTracker:
         if abs(error) < SURE * u or abs(error) < LEAST_SIZE_ERROR:
             return
         words = (
-            f"the bodies of {self.mechanism.name} are seen {100.0 * abs(error):.2g} +- {200.0 * u:.1g} % (95 %) "
+            f"the bodies of {self.mechanism.name} are seen {with_uncertainty(100.0 * abs(error), 200.0 * u)} % (95 %) "
             f"{'larger' if error > 0.0 else 'smaller'} than drawn at {self.scale.px_per_mm:.5g} px/mm"
         )
         if abs(error) > MOST_SIZE_ERROR:

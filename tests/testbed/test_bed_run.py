@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
+from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.frames.source import open_source
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.samples_csv import read_samples
@@ -94,7 +95,7 @@ def test_every_kind_of_step_is_done(tmp_path: Path) -> None:
     (slot,) = json.loads((tmp_path / "run" / "run.json").read_text())["reference_slots"]
     # 0.01 px of each edge, at 34 px/mm.
     assert slot["measured_mm"] == pytest.approx(4.0, abs=5e-4)
-    assert said == [f"The slot of 4 mm measures {slot['measured_mm']:.4f} +- {slot['u_random_mm']:.2g} mm."]
+    assert said == [f"The slot of 4 mm measures {with_uncertainty(slot['measured_mm'], slot['u_random_mm'])} mm."]
     # Closed at 0.5 mm/s until the spring gave 0.5 N (2.08 N/mm): the stage stands within a frame's way of that.
     assert rows[-1].input_mm == pytest.approx(-0.24, abs=0.05)
 

@@ -9,6 +9,7 @@ from fingervision.diagnosis.bodies.place_candidates import PAIRS
 from fingervision.diagnosis.bodies.place_findings import Fitted
 from fingervision.domain.drawing_form import DrawnPart
 from fingervision.domain.report import Place
+from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.models.place_answers import PlaceAnswers
 
 COVER = 2.0
@@ -23,12 +24,12 @@ MOST = 6
 
 
 def fitted_words(fitted: Fitted) -> str:
-    """Sentence on a fitted explanation, such as `right hinge 2: 14 +- 3 % too soft`."""
+    """Sentence on a fitted explanation, such as `right hinge 2: 14.2 +- 2.9 % too soft`."""
     candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
     if candidate.part is DrawnPart.PIVOT:
-        return f"{where}: {1e3 * size:.3g} +- {1e3 * u:.2g} um of play"
-    share = f"{100.0 * abs(size):.3g} +- {100.0 * u:.2g} %"
+        return f"{where}: {with_uncertainty(1e3 * size, 1e3 * u)} um of play"
+    share = f"{with_uncertainty(100.0 * abs(size), 100.0 * u)} %"
     if candidate.part is DrawnPart.HINGE:
         return f"{where}: {share} too {'stiff' if size > 0.0 else 'soft'}"
     if candidate.part is DrawnPart.LINK:
@@ -37,7 +38,7 @@ def fitted_words(fitted: Fitted) -> str:
         alike = candidate.part is DrawnPart.LINKS_ALIKE
         way, what = ("alike", "the opening is") if alike else ("oppositely", "the right finger's share is")
         return f"{where}, off {way}: {what} {share} too {'large' if size > 0.0 else 'small'}, {candidate.detail}"
-    return f"{candidate.name}: {100.0 * size:+.3g} +- {100.0 * u:.2g} %"
+    return f"{candidate.name}: {with_uncertainty(100.0 * size, 100.0 * u, '+')} %"
 
 
 def set_words(members: Sequence[Fitted]) -> str:

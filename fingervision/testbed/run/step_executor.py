@@ -5,6 +5,7 @@ from math import sin, tau
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
+from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.run.motion_segments import Close, Frames, Go, Slot, Stand, Swing
 from fingervision.testbed.run.reference_slot import measured_slot
@@ -92,7 +93,9 @@ def slot(watch: Watch, act: Slot) -> dict[str, float]:
         "u_size_mm": act.u_size_mm,
         **measured_slot([item for item in items if isinstance(item, Frame)], act.size_mm, scale),
     }
-    words = f"The slot of {act.size_mm:g} mm measures {found['measured_mm']:.4f} +- {found['u_random_mm']:.2g} mm."
+    words = (
+        f"The slot of {act.size_mm:g} mm measures {with_uncertainty(found['measured_mm'], found['u_random_mm'])} mm."
+    )
     watch.record.event("reference_slot", words, **found)
     watch.say(words)
     watch.find_fingers()
