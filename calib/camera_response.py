@@ -126,7 +126,7 @@ class CameraResponse:
     def linearised(self, grey: Grey, top_level: int) -> NDArray[np.uint16]:
         """Convert a picture to values proportional to light, in 16 bits; where it is cut off, to full scale."""
         table = self.table(top_level, int(np.iinfo(grey.dtype).max) + 1, self.cut_off_at(grey, top_level))
-        return np.rint(table * (65535.0 / table[top_level])).astype(np.uint16)[grey]
+        return np.asarray(np.rint(table * (65535.0 / table[top_level])).astype(np.uint16)[grey])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,7 @@ from fingervision.measuring.clock.joint_fit import Fit, fit
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.noise_of_motion import noise_of
+from fingervision.measuring.clock.other_valleys import other_valleys
 from fingervision.measuring.clock.play_posterior import beside, most_likely, posterior
 from fingervision.measuring.clock.refusals import (
     FEWEST_FRAMES,
@@ -81,12 +82,15 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     refused = unlike(motion, whole)
     if refused is not None:
         return refused
-    motion, whole, rounding = with_corners(motion, whole)
+    motion, whole, spread = with_corners(motion, whole)
     rivals, runner_up = unrefuted(motion, drive, whole, [one for one, _, _ in fits if one is not best], frame_s)
     if rivals:
         return ambiguous([whole.at.offset_s, *rivals])
+    far_s, beside_best = other_valleys(motion, whole, QUICK_PLAYS, frame_s)
+    if far_s:
+        return ambiguous([whole.at.offset_s, *far_s])
     at = posterior(motion, whole)
-    return stated(motion, at, whole, rounding, frame_s, runner_up)
+    return stated(motion, at, whole, spread + beside_best, frame_s, runner_up)
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
