@@ -48,5 +48,7 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
                         f"{NAMES.get(channel, channel)}\nmeasured - model, {'N' if channel == 'force' else 'mm'}"
                     )
         if after is not None:
-            grid[0][0].legend(frameon=False, ncols=2, markerscale=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
+            grid[0][0].legend(
+                frameon=False, ncols=2, markerscale=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1
+            )
     return figure
