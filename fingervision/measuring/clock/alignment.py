@@ -31,8 +31,8 @@ OUTLIER_SIGMAS = 6.0
 """Robust standard deviations beyond which a frame's gap counts as wrong and is left out of the fit."""
 CREEP_GAIN = 18.5
 """Chi-square of four more parameters that chance reaches once in a thousand recordings, a stretch of the recording
-being one datum (`corner_rounding.STRETCHES`): what is wrong about a log is common to the frames of a move, and by frames it
-was taken for creep in 7 of 29 drawn recordings that had none."""
+being one datum (`corner_rounding.STRETCHES`): what is wrong about a log is common to the frames of a move, and by
+frames it was taken for creep in 7 of 29 drawn recordings that had none."""
 REFINEMENTS = 3
 """Rounds in which noise and fit are estimated alternately; the third round changes an uncertainty by less than a
 tenth."""

@@ -82,9 +82,11 @@ def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Spread]:
     fits = [tried[share][1] for share in shares]
     squares = np.array([one.squares for one in fits])
     best = int(np.argmin(squares))
+    # What a creep makes of a turn looks like a slow turn: the frames do not tell these durations apart.
+    data = 0 if motion.creeps else min(STRETCHES, found.degrees)
     # Every duration stands for those about it.
     widths = np.gradient(shares) if shares.size > 1 else np.ones(1)
-    weights = widths * (squares / squares[best]) ** (-0.5 * min(STRETCHES, found.degrees))
+    weights = widths * (squares / squares[best]) ** (-0.5 * data)
     at = np.array([[one.at.offset_s, one.at.rate, one.at.play_mm] for one in fits])
     return *tried[shares[best]], Spread.over(at, weights, at[best])
 
