@@ -17,6 +17,11 @@ from calib.errors import CalibrationError
 Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
+# Lossy codecs return a white that was cut off within this share of full scale; it is one level of 8 bits.
+WHITE_SLACK = 1.0 / 255.0
+# Pixels brighter than white, relative to those at white, above which a video uses the levels beyond white: an uncut
+# plateau at white with noise of 3 levels has 0.8, rings of a codec about a white that was cut off below 0.1.
+MOST_BRIGHTER = 0.25
 # A curve through fewer measured points than this is a guess.
 FEWEST_POINTS = 8
 
@@ -35,6 +40,8 @@ class CameraResponse:
         Light as a share of the light that gives full scale, from 0 to 1, increasing.
     top_level : int or None
         Full scale of the pictures on which the response was measured; None if it is valid for any bit depth.
+    white : float
+        Level of white as a share of full scale; below 1 for a video with studio range.
 
     Raises
     ------
@@ -46,6 +53,7 @@ class CameraResponse:
     level: Floats
     light: Floats
     top_level: int | None = None
+    white: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse an impossible response."""
@@ -70,7 +78,7 @@ class CameraResponse:
                 f"{level[0]:.3g} to {level[-1]:.3g} of it."
             )
 
-    def table(self, top_level: int, size: int) -> Floats:
+    def table(self, top_level: int, size: int, highest: int | None = None) -> Floats:
         """Light for every stored level, on the scale of the levels: 0 gives 0, full scale gives full scale.
 
         Parameters
@@ -79,6 +87,9 @@ class CameraResponse:
             Full scale of the pictures.
         size : int
             Length of the table; levels beyond full scale are assigned the light of full scale.
+        highest : int or None
+            Level at which the pictures are cut off, and beyond which all levels have the same light; None for full
+            scale.
 
         Raises
         ------
@@ -90,13 +101,32 @@ class CameraResponse:
                 f"The camera response {self.name} was measured on levels up to {self.top_level}, but these pictures "
                 f"have levels up to {top_level}: measure it on pictures of this depth, or state --bits."
             )
-        share = np.minimum(np.arange(size) / top_level, 1.0)
+        share = np.minimum(np.arange(size), top_level if highest is None else highest) / top_level
         return np.asarray(top_level * np.interp(share, self.level, self.light))
 
+    def cut_off_at(self, grey: Grey, top_level: int) -> int:
+        """Level at which a picture is cut off: full scale, or white if hardly any pixel of a video is brighter.
+
+        Many cameras use the levels above the white of studio range as well; their pictures are cut off at full scale.
+
+        Parameters
+        ----------
+        grey : ndarray, shape (height, width)
+            Stored levels.
+        top_level : int
+            Full scale of the pictures.
+        """
+        if self.white == 1.0:
+            return top_level
+        white, slack = round(self.white * top_level), max(1, round(WHITE_SLACK * top_level))
+        brighter = np.count_nonzero(grey > white + slack)
+        at_white = np.count_nonzero(grey >= white - slack) - brighter
+        return top_level if brighter > MOST_BRIGHTER * at_white else white - slack
+
     def linearised(self, grey: Grey, top_level: int) -> NDArray[np.uint16]:
-        """Convert a picture to values proportional to light, in 16 bits."""
-        table = self.table(top_level, int(np.iinfo(grey.dtype).max) + 1) * (65535.0 / top_level)
-        return np.rint(table).astype(np.uint16)[grey]
+        """Convert a picture to values proportional to light, in 16 bits; where it is cut off, to full scale."""
+        table = self.table(top_level, int(np.iinfo(grey.dtype).max) + 1, self.cut_off_at(grey, top_level))
+        return np.asarray(np.rint(table * (65535.0 / table[top_level])).astype(np.uint16)[grey])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,4 +227,5 @@ def standard_response(name: str) -> CameraResponse:
         raise CalibrationError(f"A standard camera response must be one of {', '.join(CURVES)}, but is {name}.")
     level = np.linspace(0.0, 1.0, 4097)
     light = np.asarray(CURVES[name](level), dtype=np.float64)
-    return CameraResponse(name, level, (light - light[0]) / (light[-1] - light[0]))
+    bits, _, white = STUDIO[name.removesuffix("_studio")] if name.endswith("_studio") else (8, 0, 255)
+    return CameraResponse(name, level, (light - light[0]) / (light[-1] - light[0]), white=white / (2**bits - 1))

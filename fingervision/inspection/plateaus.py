@@ -42,11 +42,12 @@ class Plateaus:
 
 def plateaus(sample: Sample) -> Plateaus:
     """Read the levels of background and fingers beside both inner edges in every inspected frame."""
-    found = [_of(look, sample.top_level) for look in sample.looks]
+    response, top = sample.settings.response, sample.top_level
+    found = [_of(look, top, response.cut_off_at(look.upright, top)) for look in sample.looks]
     return Plateaus(*(float(np.median([each[k] for each in found])) for k in range(4)))
 
 
-def _of(look: Look, top: int) -> tuple[float, float, float, float]:
+def _of(look: Look, top: int, cut_off_at: int) -> tuple[float, float, float, float]:
     outside: list[Floats] = []
     inside: list[Floats] = []
     edges = look.edges
@@ -70,6 +71,6 @@ def _of(look: Look, top: int) -> tuple[float, float, float, float]:
     return (
         float(np.median(bright)) / top,
         float(np.median(dark)) / top,
-        float(np.mean(bright >= top)),
+        float(np.mean(bright >= cut_off_at)),
         float(np.mean(dark <= 0)),
     )

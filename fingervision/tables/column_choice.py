@@ -68,6 +68,14 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     if "gap" not in chosen and "time" in roles and kind == "simulation":
         roles.pop("time")
     sides = all(side in chosen or len(roles.get(side, ())) == 1 for side in ("left", "right"))
+    suggested: set[int] = set()
+
+    def suggest(candidates: Sequence[int]) -> int:
+        """Choose a column that no other question suggests, so that all suggestions can be followed at once."""
+        place = next((k for k in candidates if k not in suggested), candidates[0])
+        suggested.add(place)
+        return place
+
     for role in (*NEEDED[kind], *WANTED[kind]):
         if role in chosen:
             continue
@@ -84,15 +92,15 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
                 continue
             listed = " or ".join(f"'{raw.columns[k].name}'" for k in candidates)
             about.questions.append(
-                Question(f"the {role} may be {listed}", f"columns.{role}={raw.columns[candidates[0]].name}")
+                Question(f"the {role} may be {listed}", f"columns.{role}={raw.columns[suggest(candidates)].name}")
             )
         elif role in NEEDED[kind] and not (role == "gap" and sides):
-            free = [column.name for k, column in enumerate(raw.columns) if k not in set(chosen.values())]
-            listed = ", ".join(f"'{name}'" for name in free[:12]) + (" ..." if len(free) > 12 else "")
+            free = [k for k in range(len(raw.columns)) if k not in set(chosen.values())]
+            listed = ", ".join(f"'{raw.columns[k].name}'" for k in free[:12]) + (" ..." if len(free) > 12 else "")
             about.questions.append(
                 Question(
                     f"no column is called as the {role} is (the columns are {listed or 'taken'})",
-                    f"columns.{role}={free[0] if free else 'NAME'}",
+                    f"columns.{role}={raw.columns[suggest(free)].name if free else 'NAME'}",
                     CANONICAL[role],
                 )
             )

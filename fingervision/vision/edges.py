@@ -115,7 +115,7 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     light : ndarray of float, shape (levels,)
         Light for every grey level (look-up table), on the same scale as the levels.
     top_level : int
-        Highest level of the scale.
+        Highest level of the scale; its light is where the picture is cut off.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     coarse = lines.coarse + lines.outward * np.floor(position).astype(np.intp)
     lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
     levels = line_levels(upright, lines, light, filters.reach_px)
-    return _fit(upright, light, levels, lines, blur, filters, float(top_level))
+    return _fit(upright, light, levels, lines, blur, filters, float(light[top_level]))
 
 
 def _fit(

@@ -177,10 +177,12 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     if min(grey.shape) < SMALLEST_SIDE_PX:
         return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to hold two fingers."))
     scale = _scale(grey, settings)
+    highest = settings.response.cut_off_at(grey, scale)
     denoised = denoise(grey)
     binary = binarise(denoised, scale)
     # The grey picture itself is counted only where denoising has left it nearly white.
-    if binary.full_scale_share > 0.9 and np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
+    is_bright = binary.full_scale_share > 0.9 or highest < scale
+    if is_bright and np.count_nonzero(grey >= highest) > SATURATED_SHARE * grey.size:
         words = "The picture is white: nearly every pixel is at full scale."
         return _Attempt(NoGap(Status.SATURATED, words), binary)
     if binary.contrast < CONTRAST_FLOOR * scale:
@@ -228,7 +230,8 @@ def _edges_and_gap(
     upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coded: _Coded
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
     """Fit the edges of a pair of fingers, and derive the result."""
-    light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
+    levels, highest = int(np.iinfo(upright.dtype).max) + 1, settings.response.cut_off_at(upright, scale)
+    light = _light(settings.response, scale, levels, highest)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
     edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
     if fingers.orientation.direction.is_vertical:
@@ -305,8 +308,8 @@ def _scale(grey: GreyImage, settings: Settings) -> int:
 
 
 @lru_cache(maxsize=4)
-def _light(response: CameraResponse, scale: int, levels: int) -> NDArray[np.float64]:
-    return response.table(scale, levels)
+def _light(response: CameraResponse, scale: int, levels: int, highest: int) -> NDArray[np.float64]:
+    return response.table(scale, levels, highest)
 
 
 def _shifted(measured: GapMeasurement | NoGap, region: Region | None) -> GapMeasurement | NoGap:

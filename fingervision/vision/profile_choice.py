@@ -110,7 +110,7 @@ def with_profile(
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
         return _unsure_of_width(edges, displaced_px)
-    if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
+    if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
         return sharp

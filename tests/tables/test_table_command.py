@@ -79,6 +79,12 @@ def test_a_key_that_is_said_once_is_used_by_the_next_call_and_nothing_is_written
         read_measured_table(table)
 
 
+def test_two_open_questions_suggest_two_columns(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("alpha,beta,gamma\n0,1,2\n1,2,3\n2,4,5\n", encoding="utf-8")
+    with pytest.raises(OpenQuestionError, match=r"columns\.input=alpha --set columns\.gap=beta"):
+        call("table", tmp_path / "log.csv", "--as", "measured")
+
+
 def test_the_papers_table_is_read_as_it_is(tmp_path: Path) -> None:
     """Gaps of the paper's Table 1 in mm, inputs from m."""
     table = Path(shutil.copy(TABLE1, tmp_path))

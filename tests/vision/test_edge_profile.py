@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from calib.camera_response import standard_response
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
@@ -59,3 +60,22 @@ def test_clean_edges_show_neither(options: dict, blur_px: float) -> None:
         found, _ = _measured(number, Camera(blur_px=blur_px, noise_grey=2.0), **options)
         assert isinstance(found, GapMeasurement)
         assert found.u_shift_px == 0.0
+
+
+@pytest.mark.parametrize("exposure", [1.0, 1.5])
+def test_white_of_studio_range_is_cut_off(exposure: float) -> None:
+    """A limited-range video is cut off at level 235: too much light is refused as it is at full scale."""
+    light = Light(ground=200.0, exposure=exposure * 255.0 / 200.0)
+    scene = two_fingers(gap_px=141.3, tip_at_px=120.4, radius_px=30.0, light=light)
+    pixels = render(scene, Camera(blur_px=1.5, noise_grey=2.0), np.random.default_rng(96)) / 255.0
+    signal = np.where(pixels < 0.018, 4.5 * pixels, 1.0993 * pixels**0.45 - 0.0993)
+    stored = np.rint(16.0 + 219.0 * signal).astype(np.uint8)
+    response = standard_response("bt709_studio")
+    found = measure_frame(Frame(stored, 0), Settings(10.2, Direction.UP, response=response))
+    assert found.status is (Status.OK if exposure == 1.0 else Status.SATURATED)
+    # A camera that uses the levels above white is not cut off there.
+    above = np.minimum(stored, 225) + np.random.default_rng(97).integers(0, 30, stored.shape).astype(np.uint8)
+    assert response.cut_off_at(above, 255) == 255
+    assert standard_response("bt709").cut_off_at(stored, 255) == 255
+    # For calibrations, too, what is cut off is the end of the scale.
+    assert response.linearised(stored, 255).max() == 65535

@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from fingervision.diagnosis.report.gap_curves import GapCurves
 from fingervision.diagnosis.report.vector_figure import plain_style
@@ -11,6 +12,8 @@ from fingervision.domain.effect import Array, Flags
 MEASURED = "#222222"
 LINES = (("#c0392b", "--"), ("#1f618d", "-"), ("#7d3c98", "-."), ("#117a65", ":"))
 """Colour and line style of the predictions in their order, distinguishable in black and white too."""
+RETRACED = 0.005
+"""Share of the range of a predicted gap within which its opening and closing are one line: half the width of a line."""
 FEW_ROWS = 80
 """Number of rows up to which each reading has a marker with an error bar; more error bars would merge."""
 
@@ -27,7 +30,11 @@ def gap_against_input(curves: GapCurves, title: str) -> Figure:
             if which.any():
                 _readings(axes, curves.input_mm[which], curves, which, marker, face, label)
         for (name, gap_mm), (colour, dash) in zip(curves.predictions.items(), LINES, strict=False):
-            _path(axes, curves.input_mm, gap_mm, curves.runs, colour, dash, name)
+            once = _in_order(curves, gap_mm)
+            if once is None:
+                _path(axes, curves.input_mm, gap_mm, curves.runs, colour, dash, name)
+            else:
+                axes.plot(curves.input_mm[once], gap_mm[once], dash, color=colour, lw=1.3, label=name)
         axes.set_xlabel("input of the stage, mm")
         axes.set_ylabel("gap between the fingertips, mm")
         axes.set_title(title)
@@ -62,6 +69,24 @@ def _readings(axes: Axes, x: Array, curves: GapCurves, which: Flags, marker: str
         )
     else:
         axes.plot(x, gap_mm, marker, color=MEASURED, mfc=face, ms=2.5, mew=0.5, ls="none", label=label)
+
+
+def _in_order(curves: GapCurves, gap_mm: Array) -> NDArray[np.intp] | None:
+    """Rows in order of the input if a prediction retraces itself; None if its opening differs from its closing.
+
+    Dashes that are drawn forth and back over the same line fill each other's spaces.
+    """
+    order = np.argsort(curves.input_mm, kind="stable")
+    forth, back = order[curves.opens[order]], order[~curves.opens[order]]
+    same_mm = RETRACED * float(np.ptp(gap_mm))
+    if forth.size and back.size:
+        apart_mm = np.interp(curves.input_mm[back], curves.input_mm[forth], gap_mm[forth]) - gap_mm[back]
+        within = curves.input_mm[back] <= curves.input_mm[forth[-1]]
+        if np.any(np.abs(apart_mm[within]) > same_mm):
+            return None
+    back_and_forth_mm = np.diff(gap_mm[order])
+    turned = np.flatnonzero(back_and_forth_mm[1:] * back_and_forth_mm[:-1] < 0.0)
+    return None if np.any(np.abs(back_and_forth_mm[turned]) > same_mm) else order
 
 
 def _path(axes: Axes, x: Array, gap_mm: Array, runs: tuple[slice, ...], colour: str, dash: str, name: str) -> None:

@@ -36,11 +36,11 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
                 panels.append((clock, "time, s" if history.shared_clock else "sample"))
             for column, (x, label) in enumerate(panels):
                 axes = grid[row][column]
-                size = 9 if x.size < 60 else 3
+                size = 6 if x.size < 60 else 3
                 axes.axhline(0.0, color="0.6", linewidth=0.8)
-                axes.plot(x, before[channel], ".", color=BEFORE, markersize=size, label="before")
+                axes.plot(x, before[channel], "x", color=BEFORE, markersize=size, mew=0.7, label="before")
                 if after is not None:
-                    axes.plot(x, after[channel], ".", color=AFTER, markersize=size, label="after")
+                    axes.plot(x, after[channel], "o", color=AFTER, markersize=0.6 * size, label="after")
                 if row == len(before) - 1:
                     axes.set_xlabel(label)
                 if column == 0:
@@ -48,5 +48,7 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
                         f"{NAMES.get(channel, channel)}\nmeasured - model, {'N' if channel == 'force' else 'mm'}"
                     )
         if after is not None:
-            grid[0][0].legend(frameon=False, ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
+            grid[0][0].legend(
+                frameon=False, ncols=2, markerscale=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1
+            )
     return figure

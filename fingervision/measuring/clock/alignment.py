@@ -12,8 +12,9 @@ from fingervision.measuring.clock.corner_rounding import STRETCHES, with_corners
 from fingervision.measuring.clock.correlation import candidates
 from fingervision.measuring.clock.joint_fit import Fit, fit
 from fingervision.measuring.clock.log_path import LogPath
-from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.motion_model import WHITE, Motion
 from fingervision.measuring.clock.noise_of_motion import noise_of
+from fingervision.measuring.clock.other_valleys import other_valleys
 from fingervision.measuring.clock.play_posterior import beside, most_likely, posterior
 from fingervision.measuring.clock.refusals import (
     FEWEST_FRAMES,
@@ -28,10 +29,10 @@ from fingervision.measuring.clock.stated_offset import stated
 
 OUTLIER_SIGMAS = 6.0
 """Robust standard deviations beyond which a frame's gap counts as wrong and is left out of the fit."""
-CREEP_GAIN = 14.0
-"""Chi-square of two more parameters that chance reaches once in a thousand recordings, a stretch of the recording being
-one datum (`corner_rounding.STRETCHES`): what is wrong about a log is common to the frames of a move, and by frames it
-was taken for creep in 7 of 29 drawn recordings that had none."""
+CREEP_GAIN = 18.5
+"""Chi-square of four more parameters that chance reaches once in a thousand recordings, a stretch of the recording
+being one datum (`corner_rounding.STRETCHES`): what is wrong about a log is common to the frames of a move, and by
+frames it was taken for creep in 7 of 29 drawn recordings that had none."""
 REFINEMENTS = 3
 """Rounds in which noise and fit are estimated alternately; the third round changes an uncertainty by less than a
 tenth."""
@@ -81,20 +82,35 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     refused = unlike(motion, whole)
     if refused is not None:
         return refused
-    motion, whole, rounding = with_corners(motion, whole)
+    motion, whole, spread = with_corners(motion, whole)
     rivals, runner_up = unrefuted(motion, drive, whole, [one for one, _, _ in fits if one is not best], frame_s)
     if rivals:
         return ambiguous([whole.at.offset_s, *rivals])
+    far_s, beside_best = other_valleys(motion, whole, QUICK_PLAYS, frame_s)
+    if far_s:
+        return ambiguous([whole.at.offset_s, *far_s])
     at = posterior(motion, whole)
-    return stated(motion, at, whole, rounding, frame_s, runner_up)
+    return stated(motion, at, whole, spread + beside_best, frame_s, runner_up)
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
-    """Include creep of the gap in the model if it improves the fit by more than noise would."""
-    creeping = replace(motion, creeps=True)
-    slow = fit(creeping, found.at, free_play=found.at.play_mm > 0.0)
-    gain = min(STRETCHES, found.degrees) * float(np.log(found.squares / slow.squares))
-    return (creeping, slow) if gain > CREEP_GAIN else (motion, found)
+    """Include creep of the gap in the model if it improves the fit by more than noise would.
+
+    The autoregression takes up what a creep leaves in the residuals, and hides it. The fit is therefore compared with
+    white noise as well, and the noise is estimated again beside the creep.
+    """
+    for noise in (motion.noise, WHITE):
+        without = replace(motion, noise=noise)
+        plain = found if noise is motion.noise else most_likely(without, found.at)
+        creeping = replace(without, creeps=True)
+        slow = fit(creeping, plain.at, free_play=plain.at.play_mm > 0.0)
+        gain = min(STRETCHES, plain.degrees) * float(np.log(plain.squares / slow.squares))
+        if gain > CREEP_GAIN:
+            for _ in range(REFINEMENTS):
+                creeping = replace(creeping, noise=noise_of(creeping, slow))
+                slow = most_likely(creeping, slow.at)
+            return creeping, slow
+    return motion, found
 
 
 def _information(motion: Motion, found: Fit) -> float:

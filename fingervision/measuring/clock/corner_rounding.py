@@ -1,6 +1,5 @@
 """Duration of a stage's reversal that lies between two rows of its log, estimated from the frames."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +12,9 @@ from fingervision.measuring.clock.play_posterior import most_likely
 
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 """Durations of a corner that are tried, over the time between two rows: a longer one would show in the rows."""
+HALF_WAY = 0.125
+"""Step to the durations beside the best one that are tried as well: frames that follow one another faster than the rows
+tell durations apart that differ by less than those in `SHARES`."""
 STRETCHES = 24
 """Independent stretches of a recording: what is wrong about a corner is common to the frames of a move, so that a
 likelihood by frames would be far too sure (as `offset_covariance.CLUSTERS`)."""
@@ -21,8 +23,8 @@ NEAR_PLAYS = (0.02, 0.08)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rounding:
-    """Spread of the clock fit over the possible durations of the stage's reversals.
+class Spread:
+    """Spread of the clock fit over several possible answers.
 
     Parameters
     ----------
@@ -34,6 +36,18 @@ class Rounding:
 
     shift: Array
     covariance: Array
+
+    @classmethod
+    def over(cls, at: Array, weights: Array, best: Array) -> "Spread":
+        """Mean and covariance of `at`, shape (n, 3), with weights of shape (n,), as seen from the best."""
+        weights = weights / weights.sum()
+        shift = weights @ at - best
+        away = at - best - shift
+        return cls(shift, np.einsum("k,ki,kj->ij", weights, away, away))
+
+    def __add__(self, other: "Spread") -> "Spread":
+        """Spread over both, as independent of each other."""
+        return Spread(self.shift + other.shift, self.covariance + other.covariance)
 
 
 def rounded(path: LogPath, corner_s: float) -> LogPath:
@@ -47,7 +61,7 @@ def rounded(path: LogPath, corner_s: float) -> LogPath:
     return replace(path, drive=replace(path.drive, input_mm=input_mm))
 
 
-def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Rounding]:
+def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Spread]:
     """Choose the duration of all corners that explains the frames best, and the spread of the fit over other durations.
 
     The rows before and after a corner lie on two lines, whether the stage turned at once where these lines meet or over
@@ -57,19 +71,27 @@ def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Rounding]:
     """
     path = motion.path
     row_s = float(np.median(np.diff(path.rows.time_s)))
-    tried = list(_tried(motion, found, row_s)) if path.parts.corner_s.size else [(motion, found)]
-    squares = np.array([one.squares for _, one in tried])
+    tried = {0.0: (motion, found)}
+    if path.parts.corner_s.size:
+        tried = {share: _turned(motion, found, share * row_s) for share in SHARES}
+        first = min(SHARES, key=lambda share: tried[share][1].squares)
+        for share in (first - HALF_WAY, first + HALF_WAY):
+            if 0.0 < share < SHARES[-1]:
+                tried[share] = _turned(motion, found, share * row_s)
+    shares = np.array(sorted(tried))
+    fits = [tried[share][1] for share in shares]
+    squares = np.array([one.squares for one in fits])
     best = int(np.argmin(squares))
-    weights = (squares / squares[best]) ** (-0.5 * min(STRETCHES, found.degrees))
-    weights /= weights.sum()
-    at = np.array([[one.at.offset_s, one.at.rate, one.at.play_mm] for _, one in tried])
-    shift = weights @ at - at[best]
-    away = at - at[best] - shift
-    return *tried[best], Rounding(shift, np.einsum("k,ki,kj->ij", weights, away, away))
+    # What a creep makes of a turn looks like a slow turn: the frames do not tell these durations apart.
+    data = 0 if motion.creeps else min(STRETCHES, found.degrees)
+    # Every duration stands for those about it.
+    widths = np.gradient(shares) if shares.size > 1 else np.ones(1)
+    weights = widths * (squares / squares[best]) ** (-0.5 * data)
+    at = np.array([[one.at.offset_s, one.at.rate, one.at.play_mm] for one in fits])
+    return *tried[shares[best]], Spread.over(at, weights, at[best])
 
 
-def _tried(motion: Motion, found: Fit, row_s: float) -> Iterator[tuple[Motion, Fit]]:
-    for share in SHARES:
-        turned = replace(motion, path=rounded(motion.path, share * row_s))
-        near = fit(turned, found.at, free_play=True)
-        yield turned, min(near, most_likely(turned, found.at, NEAR_PLAYS), key=lambda one: one.squares)
+def _turned(motion: Motion, found: Fit, corner_s: float) -> tuple[Motion, Fit]:
+    turned = replace(motion, path=rounded(motion.path, corner_s))
+    near = fit(turned, found.at, free_play=True)
+    return turned, min(near, most_likely(turned, found.at, NEAR_PLAYS), key=lambda one: one.squares)

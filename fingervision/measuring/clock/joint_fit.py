@@ -184,7 +184,7 @@ def solve(motion: Motion, at: Alignment) -> Solved:
     bends = design.shape[1] - 2
     priors = np.full(bends, BEND_PRIOR)
     if motion.creeps:
-        priors[-len(CREEP_S) :] = CREEP_PRIOR
+        priors[-2 * len(CREEP_S) :] = CREEP_PRIOR
     hold = spread / (priors * max(abs(float(straight[1])), 1e-12))
     rows = np.hstack([np.zeros((bends, 2)), np.diag(hold)])
     whole, aim = np.vstack([white_design, rows]), np.concatenate([white_gap, np.zeros(bends)])

@@ -197,7 +197,8 @@ def _shared_errors(
             count = max(1, round((last - first) * averaged))
             found += [(int(row), error_mm, False, 0.0) for row in np.linspace(first, last, count + 1)[:-1]]
         if last < end:  # a turn without a halt: its place is known to a step
-            found.append((max(last, first), rounding_mm, True, float(np.sign(smooth_mm[end] - smooth_mm[begin]))))
+            turn = min(max(last, first), end)
+            found.append((turn, rounding_mm, True, float(np.sign(smooth_mm[end] - smooth_mm[begin]))))
     for begin, end in unseen:
         near_rows = slice(max(begin, 0), min(end, time_s.size - 1) + 1)
         scatter_mm[near_rows] = np.maximum(scatter_mm[near_rows], rounding_mm)

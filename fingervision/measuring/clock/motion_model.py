@@ -129,8 +129,9 @@ class Motion:
         """Regressors of the gap: 1, z, max(0, z - z_k) and creep, with z the play's output relative to the log's range.
 
         The gap is a piecewise linear function of the input that may bend at every knot z_k; it represents a gripper's
-        curve, and the kink where the fingers meet. Creep has one column per time constant: the lag behind the input.
-        The result has shape (n, 2 + knots [+ 2]).
+        curve, and the kink where the fingers meet. Creep has two columns per time constant: the lag behind the input,
+        and the decay of the lag that the motion before the log's first row left. The result has shape
+        (n, 2 + knots [+ 4]).
         """
         low, high = float(self.drive.input_mm.min()), float(self.drive.input_mm.max())
         half = 0.5 * max(high - low, 1e-12)
@@ -138,7 +139,11 @@ class Motion:
         z = (inputs - 0.5 * (low + high)) / half
         count = min(MOST_KNOTS, self.time_s.size // FRAMES_A_KNOT)
         knots = np.linspace(-1.0, 1.0, count + 2)[1:-1]
-        lags = [(self._lagging(at, states, tau_s) - inputs) / half for tau_s in CREEP_S] if self.creeps else []
+        lags = []
+        if self.creeps:
+            since_s = np.maximum(self.log_time_s(at) - float(self.drive.time_s[0]), 0.0)
+            lags = [(self._lagging(at, states, tau_s) - inputs) / half for tau_s in CREEP_S]
+            lags += [np.exp(-since_s / tau_s) for tau_s in CREEP_S]
         return np.column_stack([np.ones_like(z), z, np.maximum(z[:, None] - knots, 0.0), *lags])
 
     def _lagging(self, at: Alignment, states: Array, tau_s: float) -> Array:

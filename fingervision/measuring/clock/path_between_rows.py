@@ -11,6 +11,11 @@ from fingervision.stage_record.differences import differences
 
 FINER = 6
 """Points that a row becomes: the sag of a chord falls with its square, to a thirtieth."""
+REACH, ABOUT_CORNER = 0.625, 15
+"""Time about a corner, in rows, within which the path has more points, and their number on either side. A corner that
+takes up to 1.25 rows is rounded there (`corner_rounding`); a chord over a 24th of a row cuts a turn that takes a
+quarter of a row by a 50th of the rounding, and one over a sixth of a row cut it by a fifth, which the fitted play took
+up."""
 FEWEST = 5
 """Rows that draw a curve, and of which fourth differences are taken."""
 CORNER = 0.07
@@ -33,15 +38,15 @@ def piece(
     if time_s.size < FEWEST:
         none = np.zeros(0)
         return time_s, input_mm, u_mm, np.zeros(time_s.size), np.arange(time_s.size), none, none
-    places = np.arange(FINER * (time_s.size - 1) + 1) / FINER
-    interval = np.minimum(places.astype(int), time_s.size - 2)
-    fine_s = np.interp(places, np.arange(time_s.size), time_s)
     second_signed = np.pad(differences(input_mm, time_s, 2), 1, mode="edge")
     second = np.abs(second_signed)
     fourth = np.abs(np.pad(differences(input_mm, time_s, 4), 2, mode="edge"))
     between = CORNER * np.minimum(fourth[:-1] + fourth[1:], 3.0 * np.minimum(second[:-1], second[1:]))
-    fine_mm = _curve(time_s, input_mm, fine_s, interval)
     found = _corners(time_s, input_mm, second, u_mm)
+    at_s = np.array([one.at_s for one in found])
+    fine_s = _points(time_s, at_s)
+    interval = np.clip(np.searchsorted(time_s, fine_s, side="right") - 1, 0, time_s.size - 2)
+    fine_mm = _curve(time_s, input_mm, fine_s, interval)
     for one in found:
         inside = (fine_s >= time_s[one.first]) & (fine_s <= time_s[one.last])
         fine_mm[inside] = one.at_mm + np.where(fine_s < one.at_s, one.before, one.after)[inside] * (
@@ -49,15 +54,21 @@ def piece(
         )
         between[one.first : one.last] = one.u_mm
     errors = np.hypot(between[interval], np.interp(fine_s, time_s, u_mm))
-    at_s = np.array([one.at_s for one in found])
-    new = np.searchsorted(fine_s, at_s)
-    out_s, of = np.insert(fine_s, new, at_s), np.insert(interval, new, interval[np.maximum(new - 1, 0)])
-    out_mm = np.insert(fine_mm, new, [one.at_mm for one in found])
-    share = (out_s - time_s[of]) / np.diff(time_s)[of]
-    bent = second_signed[of] + second_signed[of + 1]
-    curve_mm = -np.sign(bent) * between[of] * BUMP * share * (1.0 - share)
+    share = (fine_s - time_s[interval]) / np.diff(time_s)[interval]
+    bent = second_signed[interval] + second_signed[interval + 1]
+    curve_mm = -np.sign(bent) * between[interval] * BUMP * share * (1.0 - share)
     turn_mm_s = np.array([one.after - one.before for one in found])
-    return out_s, out_mm, np.insert(errors, new, [one.u_mm for one in found]), curve_mm, of, at_s, turn_mm_s
+    return fine_s, fine_mm, errors, curve_mm, interval, at_s, turn_mm_s
+
+
+def _points(time_s: Array, corner_s: Array) -> Array:
+    """Times of the path's points: `FINER` for each row, each corner, and more points about it."""
+    places = np.arange(FINER * (time_s.size - 1) + 1) / FINER
+    even_s = np.interp(places, np.arange(time_s.size), time_s)
+    near = np.linspace(-REACH, REACH, 2 * ABOUT_CORNER + 1) * float(np.median(np.diff(time_s)))
+    about_s = (corner_s[:, None] + near).ravel()
+    about_s = about_s[(about_s > time_s[0]) & (about_s < time_s[-1])]
+    return np.unique(np.concatenate([even_s, about_s]))
 
 
 @dataclass(frozen=True, slots=True)

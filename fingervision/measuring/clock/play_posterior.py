@@ -63,7 +63,7 @@ def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIR
     but not at, the minimum. The best two fits, and the starting point, are therefore refined with the play as a free
     parameter.
     """
-    longest_mm = _longest_mm(motion)
+    longest_mm = longest_play_mm(motion)
     held = [fit(motion, replace(start, play_mm=share * longest_mm), free_play=False) for share in plays]
     held.sort(key=lambda one: one.squares)
     begun = [start] if start.play_mm > 0.0 else []
@@ -77,7 +77,7 @@ def beside(motion: Motion, found: Fit, plays: tuple[float, ...]) -> Fit:
     The correlation ignores play; a play as wide as a step of a staircase motion shifts the correlation's peak by the
     duration of a whole halt.
     """
-    longest_mm = _longest_mm(motion)
+    longest_mm = longest_play_mm(motion)
     valleys: list[tuple[float, Alignment]] = []
     for by_s in np.arange(-BESIDE_S, BESIDE_S + 0.5 * BESIDE_STEP_S, BESIDE_STEP_S):
         tried = [
@@ -98,7 +98,7 @@ def posterior(motion: Motion, best: Fit) -> Posterior:
     far from normal. The likelihood is therefore evaluated at each value of the play, as a Student distribution, because
     the residual variance is estimated.
     """
-    longest_mm, degrees = _longest_mm(motion), best.degrees
+    longest_mm, degrees = longest_play_mm(motion), best.degrees
     known: dict[float, Fit] = {}
 
     def at(play_mm: float, near: Alignment) -> Fit:
@@ -160,5 +160,6 @@ def posterior(motion: Motion, best: Fit) -> Posterior:
     return Posterior(top, float(mean[0]), float(mean[1]), covariance, play_mm, u_play_mm)
 
 
-def _longest_mm(motion: Motion) -> float:
+def longest_play_mm(motion: Motion) -> float:
+    """Largest play (mm) that is searched."""
     return min(MOST_PLAY_MM, MOST_OF_STROKE * float(np.ptp(motion.drive.input_mm)))

@@ -5,6 +5,7 @@ import numpy as np
 from fingervision.domain.effect import Array
 from fingervision.measuring.clock.joint_fit import Fit
 from fingervision.measuring.clock.motion_model import Motion
+from fingervision.stage_record.encoder import input_sigma
 
 STANDS = 0.1
 """Change in a neighbouring interval, relative to that of a jump, below which the log counts as constant on that
@@ -36,7 +37,10 @@ def gap_arrives(motion: Motion, found: Fit) -> float | None:
     before, after = np.insert(steps[:-1], 0, 0.0), np.append(steps[1:], 0.0)
     least = STANDS * float(np.ptp(rows.input_mm))
     jumps = np.flatnonzero((steps > least) & (np.maximum(before, after) < STANDS * steps))
-    if jumps.size < FEWEST_JUMPS or steps[jumps].sum() < JUMPING * steps.sum():
+    # Over many rows the noise of a log adds up to more than its motion; an encoder's rows at rest have none.
+    noise_mm, encoder_mm = input_sigma(rows.input_mm, (slice(0, rows.time_s.size),), rows.time_s)
+    noise_steps_mm = 0.0 if encoder_mm > 0.0 else steps.size * noise_mm * 2.0 / np.sqrt(np.pi)
+    if jumps.size < FEWEST_JUMPS or steps[jumps].sum() < JUMPING * (steps.sum() - noise_steps_mm):
         return None
     frame_s = float(np.median(np.diff(motion.time_s)))
     expected_mm = motion.gap_mm - found.residual_mm

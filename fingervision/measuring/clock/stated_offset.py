@@ -3,13 +3,12 @@
 import numpy as np
 
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
-from fingervision.measuring.clock.corner_rounding import Rounding
+from fingervision.measuring.clock.corner_rounding import Spread
 from fingervision.measuring.clock.correlation import LARGEST_RATE
 from fingervision.measuring.clock.joint_fit import Fit, allowance_for_creep
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.offset_covariance import inflation
-from fingervision.measuring.clock.path_between_rows import FINER
 from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
 from fingervision.measuring.clock.rivals import RunnerUp
@@ -39,21 +38,21 @@ def crossed_in_s(path: LogPath) -> float:
 
 
 def stated(
-    motion: Motion, at: Posterior, best: Fit, rounding: Rounding, frame_s: float, runner_up: RunnerUp | None
+    motion: Motion, at: Posterior, best: Fit, spread: Spread, frame_s: float, runner_up: RunnerUp | None
 ) -> ClockOffset | NoClockOffset:
     """Convert the fitted offset to the time of the log's first row."""
     first_s = float(motion.drive.time_s[0])
     more = np.sqrt(inflation(motion, best.at))
-    offset_s, rate = at.offset_s + float(rounding.shift[0]), at.rate + float(rounding.shift[1])
+    offset_s, rate = at.offset_s + float(spread.shift[0]), at.rate + float(spread.shift[1])
     covariance = at.covariance * np.outer(more[:2], more[:2])
     shift, growth = allowance_for_creep(motion, best)
     # Without its correlation: by chance it would cancel at one instant what is off at all others.
-    covariance = covariance + np.diag(shift[:2] ** 2 + growth[:2] * more[:2] ** 2) + rounding.covariance[:2, :2]
+    covariance = covariance + np.diag(shift[:2] ** 2 + growth[:2] * more[:2] ** 2) + spread.covariance[:2, :2]
     # Recording's time at which the log begins; there the offset is middle's plus the rate times the way to it.
     begins_s = (first_s + offset_s - rate * motion.middle_s) / (1.0 - rate)
     away_s = np.append(motion.time_s, begins_s) - motion.middle_s
     variance = covariance[0, 0] + 2.0 * away_s * covariance[0, 1] + away_s**2 * covariance[1, 1]
-    row_s = float(np.median(np.diff(motion.path.drive.time_s))) * FINER
+    row_s = float(np.median(np.diff(motion.path.rows.time_s)))
     variance += (SYSTEMATIC * np.hypot(frame_s, row_s)) ** 2
     # The frames see at what time within its interval the stage jumped, and the log does not. A programme that drives
     # and logs by one cycle jumps at the same place in each, so that many jumps do not average.
@@ -120,9 +119,9 @@ def stated(
         u_rate=u_rate,
         reference_s=first_s,
         u_time_s=u_time_s,
-        play_mm=max(at.play_mm + float(rounding.shift[2]), 0.0),
+        play_mm=max(at.play_mm + float(spread.shift[2]), 0.0),
         u_play_mm=float(
-            np.sqrt((at.u_play_mm**2 + growth[2]) * more[2] ** 2 + shift[2] ** 2 + rounding.covariance[2, 2])
+            np.sqrt((at.u_play_mm**2 + growth[2]) * more[2] ** 2 + shift[2] ** 2 + spread.covariance[2, 2])
         ),
         explained_share=share,
         notes=tuple(notes),
