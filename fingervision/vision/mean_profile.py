@@ -22,8 +22,8 @@ LEFT_OUT = 4.0
 # one also where they lie so near to a curve. The degrees that are tried:
 STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
 STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
-# It is fitted so many times, each time without the rows that lie farther from it than so many robust standard deviations
-# and a little more (pixels): dust.
+# It is fitted so many times, each time without the rows that lie farther from it than so many robust standard
+# deviations and a little more (pixels): dust.
 LOOKS, SIGMAS_IN_MEDIAN, DUST, LEAST_DUST_PX = 3, 1.4826, 3.0, 1e-3
 
 _bins, _robust_line = loop("mean_profile_bins"), loop("mean_profile_robust_line")
