@@ -87,8 +87,8 @@ static int is_kind(const Py_buffer *view, char kind) {
 
 /* Take one array; 0 where it is not what the loop takes, with Python's error set. */
 static int take(PyObject *object, char letter, Arg *arg, Py_buffer *view, const Loop *loop, Py_ssize_t number) {
-    int written = letter == 'f' || letter == 'j' || letter == 'b' || letter == 'P';
-    char kind = letter == 'f' ? 'F' : letter == 'j' ? 'I' : letter == 'b' ? 'B' : letter == 'P' ? 'p' : letter;
+    int written = letter == 'f' || letter == 'j' || letter == 'b' || letter == 's' || letter == 'P';
+    char kind = letter == 'f' ? 'F' : letter == 'j' ? 'I' : letter == 'b' ? 'B' : letter == 's' ? 'S' : letter == 'P' ? 'p' : letter;
     if (PyObject_GetBuffer(object, view, STRIDES | FORMAT | (written ? WRITABLE : 0))) return 0;
     Py_ssize_t packed = view->itemsize;
     int is_packed = 1;

@@ -6,7 +6,7 @@
    takes, a letter an argument:
      d float          F float64 array        p picture: uint8 or uint16, two-dimensional, any strides
      i int            I int64 array          P picture that is written to
-                      B bool or uint8 array  f, j, b as F, I, B: written to
+                      B bool or uint8 array  f, j, b, s as F, I, B, S: written to
                       O int32 array          S float32 array
    gives, a letter a number that comes back: d float, i int, b bool. Arrays are contiguous, and made by the caller.
 

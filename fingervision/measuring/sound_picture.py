@@ -16,7 +16,7 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.measuring.block_damage import SQUARE_PX, Levels, foreign_corners
-from fingervision.vision.grey import to_grey
+from fingervision.vision.grey import GreyImage, to_grey
 
 # A jump: farther from where the last two frames lead than so many standard uncertainties of that difference.
 JUMP_U = 3.0
@@ -133,13 +133,13 @@ def _has_squares(
     rows, columns = part
     if rows.stop - rows.start < 2 * SQUARE_PX or columns.stop - columns.start < 2 * SQUARE_PX:
         return False
-    picture = _levels(frame.pixels[rows, columns])
-    before = _levels(last.frame.pixels[rows, columns])
+    picture = to_grey(frame.pixels[rows, columns])
+    before = to_grey(last.frame.pixels[rows, columns])
     if foreign_corners(picture, before, least_step, levels_only) < FEWEST_CORNERS:
         return False
     if isinstance(outcome, NoGap):
         return True
-    moved = _moved(_levels(last.frame.pixels), last.outcome, outcome)[rows, columns]
+    moved = _moved(to_grey(last.frame.pixels), last.outcome, outcome)[rows, columns]
     return foreign_corners(picture, moved, least_step, levels_only) >= FEWEST_CORNERS
 
 
@@ -167,12 +167,9 @@ def _squares(least: float, most: float, size: int) -> slice:
     return slice(begin, max(begin, end))
 
 
-def _levels(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> Levels:
-    return np.asarray(to_grey(pixels), dtype=np.float32)
-
-
-def _moved(levels: Levels, before: GapMeasurement, now: GapMeasurement) -> Levels:
+def _moved(grey: GreyImage, before: GapMeasurement, now: GapMeasurement) -> Levels:
     """Shift each finger's half of a picture by the displacement of that finger."""
+    levels = np.asarray(grey, dtype=np.float32)
     vertical = now.direction.is_vertical
     middle = 0.5 * ((now.left.x_px + now.right.x_px) if vertical else (now.left.y_px + now.right.y_px))
     halves = []

@@ -203,10 +203,11 @@ def _along_axes(blur: Floats, lines: ProfileLines) -> Floats:
     along the fingers.
     """
     out = blur.copy()
-    for k in range(2):
-        seen = blur[k] ** 2
-        if np.ptp(seen) < UNLIKE * seen.max():
+    squared = blur**2
+    for k, pair in enumerate(squared.tolist()):
+        if max(pair) - min(pair) < UNLIKE * max(pair):
             continue
+        seen = squared[k]
         of_other = lines.weight[k] * lines.slope[k] ** 2 / (1.0 + lines.slope[k] ** 2)
         total, other = (np.bincount(BLUR_OF_LINE[:PLACES], a, minlength=2) for a in (lines.weight[k], of_other))
         share = other / np.maximum(total, 1e-9)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import blurred_step
 from fingervision.vision.profile_lines import INNER, ProfileLines
 
@@ -10,12 +11,14 @@ Floats = NDArray[np.float64]
 # Places of the left and of the right finger's inner lines that lie in the same rows.
 Facing = tuple[NDArray[np.int_], NDArray[np.int_]]
 
+_are_apart = loop("facing_are_apart")
+
 
 def facing_lines(lines: ProfileLines, reach: int) -> Facing | None:
     """Indices of the inner lines of left and right finger in the same rows, where one window contains both edges."""
-    filled = [int(n) for n in lines.weight[:, :INNER].sum(axis=1)]
-    if min(filled) == 0 or lines.coarse[1, : filled[1]].min() - lines.coarse[0, : filled[0]].max() >= 2 * reach:
+    if _are_apart(lines.coarse, lines.weight, 2 * reach):
         return None
+    filled = [int(n) for n in lines.weight[:, :INNER].sum(axis=1)]
     _, left, right = np.intersect1d(lines.fixed[0, : filled[0]], lines.fixed[1, : filled[1]], return_indices=True)
     near = lines.coarse[1, right] - lines.coarse[0, left] < 2 * reach
     return (left[near], right[near]) if near.any() else None

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Coding
-from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
+from fingervision.domain.gap import FingerEdge, GapMeasurement, HeldPart, NoGap
+from fingervision.domain.loops import loop
 from fingervision.domain.status import Status
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
@@ -23,7 +24,7 @@ from fingervision.vision.measuring_point import MeasuringPoint, measuring_point,
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
 from fingervision.vision.polygonal_outline import polygonal_measuring_point
-from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW
+from fingervision.vision.profile_lines import INNER, PLACES, ROWS
 from fingervision.vision.residuals import (
     SHARED_POINTS,
     has_flanks,
@@ -56,7 +57,6 @@ LEAST_SURE_PX = 0.5
 LEAST_SURE_AT_FIRST_PX = 5.0
 # What may have moved both edges is stated up to here (pixels): more is a strip as broad as the window that was fitted.
 LEAST_SURE_SHIFT_PX = 5.0
-IS_TIP = ~IS_ROW
 BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
 TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
 SMEARED = "The fingers moved while the shutter was open"
@@ -64,6 +64,8 @@ SMEARED = "The fingers moved while the shutter was open"
 SMEARED_PX = 4.0
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
+
+_lines_within = loop("gap_lines_within")
 
 
 def measure_gap(
@@ -155,7 +157,9 @@ def measure_gap(
             measured.append(own)
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
-    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, least_px**2 * SHARED_POINTS[coding])
+    largest_variance = least_px**2 * SHARED_POINTS[coding]
+    roughness_px = 0.0 if rough is None else rough.deviation_px
+    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
     if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
         words = f"{SMEARED}, by about {way_px:.0f} px: expose shorter, or move slower while frames are taken."
         outcome = NoGap(Status.BLURRED, words)
@@ -171,7 +175,7 @@ def measure_gap(
         )
     if isinstance(outcome, NoGap):
         return replace(outcome, held=held) if held is not None else outcome
-    return replace(outcome, held=held, roughness_px=0.0 if rough is None else rough.deviation_px)
+    return outcome
 
 
 def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> list[MeasuringPoint]:
@@ -198,25 +202,21 @@ def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
     """Return the reason why the edges give no gap; None if there is no such reason."""
-    real = edges.lines.weight > 0
-    inner = real & IS_INNER
-    if np.count_nonzero(inner) < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
-        inner = real & IS_TIP
-    if np.count_nonzero(inner) < FEWEST_ROWS:
+    seen = (edges.lines.weight, edges.contrast, edges.is_clipped)
+    left, right, contrast, clipped = _lines_within(*seen, 0, INNER)
+    left_tip, right_tip, tip_contrast, tip_clipped = _lines_within(*seen, ROWS, PLACES)
+    if left + right < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
+        left, right, contrast, clipped = left_tip, right_tip, tip_contrast, tip_clipped
+    if left + right < FEWEST_ROWS:
         return NoGap(Status.NO_FINGERS, "The inner edges are too short to be measured.")
-    seen = np.count_nonzero(inner, axis=1)
-    if seen.min() == 0 and seen.max() >= FEWEST_ROWS:
+    if min(left, right) == 0 and max(left, right) >= FEWEST_ROWS:
         return NoGap(Status.NO_FINGERS, "Only one of the two inner edges can be seen.")
-    contrast = middle(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
+    contrast *= 1.0 if light_gap else -1.0
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
         return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
-    tips = real & IS_TIP
-    if tips.any() and abs(middle(edges.contrast[tips])) < TIP_CONTRAST * abs(contrast):
+    if left_tip + right_tip and abs(tip_contrast) < TIP_CONTRAST * abs(contrast):
         return NoGap(Status.NO_FINGERS, "What is in view fades away where a finger's tip would be.")
-    if (
-        2 * np.count_nonzero(edges.is_clipped[inner]) > np.count_nonzero(inner)
-        or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT
-    ):
+    if 2 * clipped > left + right or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT:
         return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
     blur = sqrt(max(edges.blur_px[:, 0].tolist()) ** 2 + PIXEL_VARIANCE)
     if blur > BLUR_LIMIT_PX:
@@ -265,6 +265,8 @@ def _assemble(
     below_tip_px: float,
     light_gap: bool,
     largest_variance: float,
+    roughness_px: float,
+    held: HeldPart | None,
 ) -> GapMeasurement | NoGap:
     """Transform the result from the fingers' axes to the picture; refuse one with a larger variance than allowed."""
     orientation = fingers.orientation
@@ -291,7 +293,16 @@ def _assemble(
     u_shift = float(abs(sum(mark.shift_px for mark in edges.marks)))
     if u_shift > LEAST_SURE_SHIFT_PX:
         return THIRD_TONE
-    return GapMeasurement(found[0], found[1], orientation.direction, sqrt(variance), light_gap, u_shift)
+    return GapMeasurement(
+        found[0],
+        found[1],
+        orientation.direction,
+        sqrt(variance),
+        light_gap,
+        u_shift,
+        roughness_px=roughness_px,
+        held=held,
+    )
 
 
 def _finger_edge(

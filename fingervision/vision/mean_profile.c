@@ -1,3 +1,33 @@
+/* after median */
+/* after first_guess */
+/* Line through the edges of a flank's rows without those that are dust: rows, edges; which of them are kept (all at first).
+   Gives their number, intercept, slope, and the spread of those that the last line went through. */
+LOOP(mean_profile_robust_line, "IFb", "iddd") {
+    int64_t n = in[0].n, kept = n;
+    double *t = floats(3 * n), *v = t + n, *away = v + n, intercept = 0.0, slope = 0.0, spread = 0.0;
+    for (int look = 0; look < LOOKS && kept >= FEWEST_ROWS; look++) {
+        kept = 0;
+        for (int64_t i = 0; i < n; i++)
+            if (FLAGS(2)[i]) {
+                t[kept] = (double)INTS(0)[i];
+                v[kept++] = FLOATS(1)[i];
+            }
+        line(t, v, kept, &intercept, &slope);
+        for (int64_t i = 0; i < kept; i++) away[i] = fabs(v[i] - (intercept + slope * t[i]));
+        spread = SIGMAS_IN_MEDIAN * median_in_place(away, kept);
+        kept = 0;
+        for (int64_t i = 0; i < n; i++) {
+            double off = fabs(FLOATS(1)[i] - (intercept + slope * (double)INTS(0)[i]));
+            kept += FLAGS(2)[i] = off < DUST * spread + LEAST_DUST_PX;
+        }
+    }
+    out[0].i = kept;
+    out[1].d = intercept;
+    out[2].d = slope;
+    out[3].d = spread;
+    free(t);
+}
+
 /* Sums over the pixels beside a flank, in bins of distance from its edge: picture, light of every level, rows, edge and
    slope of each row, direction outwards, reach outwards; number of pixels, their distances and their light in each bin.
    A bin's pixels are taken row by row, as they stand. */

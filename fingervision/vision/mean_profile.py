@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
 from fingervision.vision.edges import EdgePoints
-from fingervision.vision.first_guess import line
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.median import median
 
@@ -23,8 +22,11 @@ LEFT_OUT = 4.0
 # one also where they lie so near to a curve. The degrees that are tried:
 STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
 STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
+# It is fitted so many times, each time without the rows that lie farther from it than so many robust standard
+# deviations and a little more (pixels): dust.
+LOOKS, SIGMAS_IN_MEDIAN, DUST, LEAST_DUST_PX = 3, 1.4826, 3.0, 1e-3
 
-_bins = loop("mean_profile_bins")
+_bins, _robust_line = loop("mean_profile_bins"), loop("mean_profile_robust_line")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,24 +81,27 @@ def mean_profile(
     curve: Line | Polynomial
     for degree in curves:
         keep = np.ones(rows.size, dtype=bool)
-        for _look in range(3):
-            if degree == 1:  # a hundred times faster
-                curve = Line(*line(fixed[keep].astype(np.float64), found[keep]))
-            else:
-                curve = Polynomial.fit(fixed[keep], found[keep], degree)
-            away = found - curve(fixed)
-            spread = 1.4826 * median(np.abs(away[keep]))
-            keep = np.abs(away) < 3.0 * spread + 1e-3
-            if np.count_nonzero(keep) < FEWEST_ROWS + degree - 1:
+        if degree == 1:
+            seen, intercept, slope, spread = _robust_line(fixed, found, keep)
+            if seen < FEWEST_ROWS:
                 return None
+            curve = Line(intercept, slope)
+        else:
+            for _look in range(LOOKS):
+                curve = Polynomial.fit(fixed[keep], found[keep], degree)
+                away = found - curve(fixed)
+                spread = SIGMAS_IN_MEDIAN * median(np.abs(away[keep]))
+                keep = np.abs(away) < DUST * spread + LEAST_DUST_PX
+                if np.count_nonzero(keep) < FEWEST_ROWS + degree - 1:
+                    return None
         if spread <= STRAIGHT_PX:
             break
     else:
         return None
-    fixed = _rows_between(fixed[keep])
-    edge, slope = curve(fixed), curve.deriv()(fixed)
+    between = _rows_between(fixed[keep])
+    edge, slopes = curve(between), curve.deriv()(between)
     count, distance, total = np.empty((3, int((3 * REACH_PX + room + 2) / BIN_PX)))
-    _bins(upright, light, fixed, edge, slope, outward, room, count, distance, total)
+    _bins(upright, light, between, edge, slopes, outward, room, count, distance, total)
     full = count >= FEWEST_IN_BIN
     return MeanProfile(distance[full] / count[full], total[full] / count[full], count[full])
 

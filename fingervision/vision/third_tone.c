@@ -1,4 +1,3 @@
-/* after median */
 /* The lines of one side of a finger that are looked at, thinned out. */
 typedef struct {
     int64_t count, row[2 * MOST_ROWS + 2], edge[2 * MOST_ROWS + 2], outward;
@@ -18,16 +17,28 @@ static Side side_of(const int64_t *fixed, const double *position, const double *
     return side;
 }
 
+/* Upper median of a few levels by rank: without branches on the levels, twice as fast for noise as a selection. */
+static int32_t middle_by_rank(const int32_t *levels, int32_t n) {
+    for (int32_t i = 0; i < n; i++) {
+        int32_t below = 0, alike = 0;
+        for (int32_t j = 0; j < n; j++) {
+            below += levels[j] < levels[i];
+            alike += levels[j] == levels[i];
+        }
+        if (below <= n / 2 && n / 2 < below + alike) return levels[i];
+    }
+    return 0;
+}
+
 /* Median level at a distance outwards from the edge; 0 where too few rows are in the picture. */
 static int level_at(const Arg *upright, const Side *side, int64_t d, double *level) {
-    double levels[2 * MOST_ROWS + 2];
-    int64_t n = 0;
+    int32_t levels[2 * MOST_ROWS + 2], n = 0;
     for (int64_t i = 0; i < side->count; i++) {
         int64_t x = side->edge[i] + side->outward * d;
-        if (x >= 0 && x < upright->shape[1]) levels[n++] = (double)pixel(upright, side->row[i], x);
+        if (x >= 0 && x < upright->shape[1]) levels[n++] = (int32_t)pixel(upright, side->row[i], x);
     }
     if (n < FEWEST_ROWS) return 0;
-    *level = middle_in_place(levels, n);
+    *level = (double)middle_by_rank(levels, n);
     return 1;
 }
 

@@ -13,6 +13,7 @@ from fingervision.vision.blur_uncertainty import Displacement, u_squared_blur
 from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.mean_profile import FEWEST_ROWS
+from fingervision.vision.median import median
 from fingervision.vision.profile_lines import INNER, ROWS
 
 Floats = NDArray[np.float64]
@@ -68,7 +69,7 @@ def are_outer_flanks_in_view(edges: EdgePoints) -> bool:
     inner = size[:, :INNER][is_real[:, :INNER]]
     if not inner.size:
         return False
-    is_in_view = is_real[:, INNER:ROWS] & (size[:, INNER:ROWS] > EDGE_SHARE * np.median(inner))
+    is_in_view = is_real[:, INNER:ROWS] & (size[:, INNER:ROWS] > EDGE_SHARE * median(inner))
     return int(np.count_nonzero(is_in_view, axis=1).min()) >= FEWEST_ROWS
 
 

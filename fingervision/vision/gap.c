@@ -1,0 +1,19 @@
+/* after median */
+/* Lines of both fingers within some of their places: weight, contrast, whether clipped (2, PLACES), first place and the one
+   behind the last; lines of the left and of the right finger, their usual contrast, and how many are clipped. */
+LOOP(gap_lines_within, "FFBii", "iidi") {
+    int64_t places = in[0].shape[1], count = 0, clipped = 0, before;
+    double *contrast = floats(2 * places);
+    for (int k = 0; k < 2; k++) {
+        before = count;
+        for (int64_t i = k * places + in[3].i; i < k * places + in[4].i; i++)
+            if (FLOATS(0)[i] > 0.0) {
+                contrast[count++] = FLOATS(1)[i];
+                clipped += FLAGS(2)[i] != 0;
+            }
+        out[k].i = count - before;
+    }
+    out[2].d = middle_in_place(contrast, count);
+    out[3].i = clipped;
+    free(contrast);
+}
