@@ -58,6 +58,13 @@ static double half_level(const Corner *c, const Spot *at, double ux, double uy, 
     return 0.5 * blur * blur / larger(c->radius, blur) * share;
 }
 
+/* Cosine between a line of pixels and the outline's normal where it meets the line. A point that is found along a line moves
+   along the normal by so much only. */
+static double slant(const Corner *c, const Spot *at, int is_row) {
+    double flank = is_row ? c->flank_x : c->flank_y, top = is_row ? c->top_x : c->top_y;
+    return larger(fabs(at->to_flank * flank + at->to_top * top), LEAST_SLANT);
+}
+
 /* Compare the points of a half-level outline with a shape: distances, their change with every parameter, and whether a
    point counts. A fillet's centre follows the two sides that it touches: the distance of a point on it changes as if both
    sides, seen from the centre, moved along their normals. */
@@ -71,9 +78,7 @@ static void compared(const double *p, const double *origin, const double *x, con
         const Corner *c = &corners[outer];
         Spot at = spot(c, x[i], y[i]);
         double *by = jacobian + i * PARAMETERS;
-        /* A point that is found along a line moves along the normal by its slant only. */
-        double flank = is_row[i] ? c->flank_x : c->flank_y, top = is_row[i] ? c->top_x : c->top_y;
-        double scale = 1.0 / (u[i] * larger(fabs(at.to_flank * flank + at.to_top * top), LEAST_SLANT));
+        double scale = 1.0 / (u[i] * slant(c, &at, is_row[i]));
         distance[i] = (at.distance + half_level(c, &at, x[i] - c->centre_x, y[i] - c->centre_y, blur[i])) * scale;
         double reach = -(SHARP_REACH * blur[i] + c->radius);
         counts[i] = c->radius >= SHARP_IN_BLURS * blur[i] || at.alpha <= reach || at.beta <= reach;
@@ -124,6 +129,21 @@ LOOP(finger_shape_on_flanks, "FFFFb", "") {
     for (int64_t i = 0; i < in[2].n; i++) {
         Spot at = spot(&corners[x[i] <= between ? 1 : 0], x[i], y[i]);
         FLAGS(4)[i] = !at.is_on_fillet && at.to_flank == 1.0;
+    }
+}
+
+/* The corner to which each point belongs, and the slant of its line of pixels to the outline: the cosine between them, by
+   which an error along the line is larger than one along the normal. */
+LOOP(finger_shape_seen, "FFFFBbf", "") {
+    const double *p = FLOATS(0), *origin = FLOATS(1), *x = FLOATS(2), *y = FLOATS(3);
+    Corner corners[2] = {corner(p, origin, 0), corner(p, origin, 1)};
+    double between = 0.5 * (corners[0].centre_x + corners[1].centre_x);
+    for (int64_t i = 0; i < in[2].n; i++) {
+        int outer = x[i] <= between;
+        const Corner *c = &corners[outer];
+        Spot at = spot(c, x[i], y[i]);
+        FLAGS(5)[i] = (uint8_t)outer;
+        FLOATS(6)[i] = slant(c, &at, FLAGS(4)[i]);
     }
 }
 

@@ -24,6 +24,7 @@ LEAST_STEEPNESS = 1e-3
 
 _compared = loop("finger_shape_compared")
 _on_flanks = loop("finger_shape_on_flanks")
+_seen = loop("finger_shape_seen")
 _corner_tops = loop("finger_shape_corner_tops")
 _inner_edge = loop("finger_shape_inner_edge")
 
@@ -54,6 +55,21 @@ def on_flanks(p: Floats, origin: Floats, x: Floats, y: Floats) -> Flags:
     is_on = np.empty(x.size, dtype=np.bool_)
     _on_flanks(p, origin, x, y, is_on)
     return is_on
+
+
+def seen(p: Floats, origin: Floats, x: Floats, y: Floats, is_row: Flags) -> tuple[Flags, Floats]:
+    """Corner of each point of the outline, and the cosine between its line of pixels and the outline's normal.
+
+    Returns
+    -------
+    is_outer : ndarray of bool, shape (n,)
+        Whether the point belongs to the outer half of the finger (its outer flank, corner and half of the top).
+    slant : ndarray of float, shape (n,)
+        A deviation d along the normal is d / slant along the line of pixels; at least `LEAST_SLANT`.
+    """
+    is_outer, slant = np.empty(x.size, dtype=np.bool_), np.empty(x.size)
+    _seen(p, origin, x, y, is_row, is_outer, slant)
+    return is_outer, slant
 
 
 def corner_tops(p: Floats, origin: Floats) -> tuple[float, float, float, float]:

@@ -34,7 +34,7 @@ from fingervision.vision.residuals import (
     spread,
 )
 from fingervision.vision.rough_corner import with_corner_doubt
-from fingervision.vision.roughness import roughness, shared_along, with_roughness
+from fingervision.vision.roughness import best_linear, roughness, with_roughness
 from fingervision.vision.third_tone import THIRD_TONE
 
 Floats = NDArray[np.float64]
@@ -110,9 +110,10 @@ def measure_gap(
         chains = _polygonal(points, below_tip_px, noise_shared)
         rough = None if chains else rough
     if rough is not None:
-        bare, points = points, (with_roughness(points[0], rough), with_roughness(points[1], rough))
+        bare = points
+        points = (with_roughness(points[0], rough, fits[0]), with_roughness(points[1], rough, fits[1]))
         fits = [
-            shared_along(p, fit_from_any_radius(p, *guess), guess[2], own, rough)
+            best_linear(p, fit_from_any_radius(p, *guess), guess[0], guess[2], own, rough)
             for p, guess, own in zip(points, guesses, bare, strict=True)
         ]
         noise_shared = max(noise_shared, rough.shared_px)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_C, INNER_M, INNER_R, OUTER_C, OUTER_M, OUTER_R, TOP_C, TOP_M
+from fingervision.vision.finger_shape import INNER_C, INNER_M, INNER_R, OUTER_C, OUTER_M, OUTER_R, TOP_C, TOP_M, seen
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
 from fingervision.vision.polygon import Polygon, Side
@@ -111,7 +111,8 @@ def _cut(
     if read is None:
         return None
     away = np.max([(points.x - s.x) * np.sin(s.angle) - (points.y - s.y) * np.cos(s.angle) for s in sides], axis=0)
-    excess = 0.0
+    _, slant = seen(p, end.origin, points.x, points.y, points.is_row)
+    normal_u, excess = points.u * slant, 0.0
     for (x, y), radius in zip(vertices, radii, strict=True):
         near = np.hypot(points.x - x, points.y - y) < NEAR_RADII * max(radius, SMALLEST_PX)
         if not near.any():
@@ -119,7 +120,7 @@ def _cut(
         # So many points of this stretch of outline share their errors.
         stretch = (2.0 * NEAR_RADII - 0.43) * radius
         alike = max(shared_px * float(np.count_nonzero(near)) / max(stretch, 1.0), 1.0)
-        cut, fillet = np.abs(away[near] / points.u[near]), np.abs(end.residual[near])
+        cut, fillet = np.abs(away[near] / normal_u[near]), np.abs(end.residual[near])
         most = MOST_SIGMAS
         excess += float(np.sum(np.minimum(cut, most) ** 2 - np.minimum(fillet, most) ** 2)) / alike
     return excess, read.tip, read.edge

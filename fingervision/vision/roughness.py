@@ -17,16 +17,18 @@ from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import compared, on_flanks
+from fingervision.vision.finger_shape import INNER_R, OUTER_R, compared, on_flanks, seen
 from fingervision.vision.outline_points import OutlinePoints
 from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE
 
 Floats = NDArray[np.float64]
 
-# Standard deviations (pixels) and lengths (pixels along the edge) that are tried. The shortest length is white: points
-# that are less sure than their own noise says, each by itself. Longer waves than the longest are the finger's shape.
-DEVIATIONS_PX = np.geomspace(0.03, 0.9, 12)
-LENGTHS_PX = np.array([0.3, 1.0, 1.5, 2.3, 3.5, 5.3, 8.0, 12.0])
+# Standard deviations (pixels, in steps of a fifth: as well as some thirty waves tell it) and lengths (pixels along the
+# edge) that are tried. Blur of 1 px makes whatever lies along an edge alike over 2 sqrt(pi) px, which is the integral of
+# the correlation for a length of 1.5: shorter ones look like white noise where points lie far apart, and would give that
+# too much weight. Longer waves than the longest are the finger's shape.
+DEVIATIONS_PX = np.geomspace(0.03, 0.9, 18)
+LENGTHS_PX = np.array([1.5, 2.3, 3.5, 5.3, 8.0, 12.0])
 # Each flank has its own level, slope and curvature. It needs so many points, and of more than so many every second one
 # is looked at, or every third.
 OWN, FEWEST_POINTS, MOST_POINTS = 3, 12, 40
@@ -35,6 +37,9 @@ OWN, FEWEST_POINTS, MOST_POINTS = 3, 12, 40
 SUSPECT, SIGNIFICANT = 1.5, 8.0
 # The covariance is tabulated for whole pixels of distance up to so many.
 FARTHEST_PX = 64
+
+# Steps to the best linear estimate, from a robust fit near it, and the weight that stands for none.
+STEPS, LEAST_WEIGHT = 5, 1e-4
 
 _likelihood = loop("roughness_likelihood")
 _errors = loop("roughness_errors")
@@ -105,37 +110,61 @@ def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd
     return Roughness(covariance)
 
 
-def with_roughness(points: OutlinePoints, found: Roughness) -> OutlinePoints:
-    """Return the points with their variances increased by the variance of the edge about its mean line."""
-    u = np.hypot(points.u, found.deviation_px)
+def with_roughness(points: OutlinePoints, found: Roughness, end: FingerEnd) -> OutlinePoints:
+    """Return the points with their variances increased by the variance of the edge about its mean line.
+
+    Roughness displaces an edge along its normal, and a point is found along a line of pixels: at a slant the point
+    moves by more (1.4 times as far on a corner at 45 degrees).
+
+    Parameters
+    ----------
+    points, end : OutlinePoints, FingerEnd
+        Points with the uncertainty of their own noise, and the shape fitted to them.
+    found : Roughness
+        Roughness of the edge.
+    """
+    _, slant = seen(end.parameters, end.origin, points.x, points.y, points.is_row)
+    u = np.hypot(points.u, found.deviation_px / slant)
     return OutlinePoints(points.x, points.y, u, points.side, points.blur)
 
 
-def shared_along(
-    points: OutlinePoints, end: FingerEnd, u_prior: Floats, bare: OutlinePoints, found: Roughness
+def best_linear(
+    points: OutlinePoints, end: FingerEnd, start: Floats, u_prior: Floats, bare: OutlinePoints, found: Roughness
 ) -> FingerEnd:
-    """The fitted finger end, with the covariance that follows from deviations correlated along the edge.
+    """The finger end of least variance under deviations correlated along the edge (generalised least squares).
+
+    The best linear unbiased estimate (Aitken, Proc. R. Soc. Edinburgh 55, 1936, 42, doi:10.1017/S0370164600014346) by
+    Gauss-Newton steps from the robust fit. What that fit set aside (dust) stays aside, and a point of less weight has a
+    variance of its own that is larger in proportion.
 
     Parameters
     ----------
     points, end : OutlinePoints, FingerEnd
         Points whose uncertainties include roughness, and the shape fitted to them.
-    u_prior : ndarray of float, shape (8,)
-        Standard uncertainties of the weak priors of that fit.
+    start, u_prior : ndarray of float, shape (8,)
+        Means and standard uncertainties of the weak priors of that fit.
     bare : OutlinePoints
         The same points with the uncertainty of their own noise only.
     found : Roughness
         Roughness of the edge.
     """
-    _, jacobian, _ = compared(
-        end.parameters, end.origin, points.x, points.y, points.u, points.is_row, points.side == OUTER_SIDE, points.blur
-    )
-    influence = np.ascontiguousarray(end.covariance @ (jacobian * end.robust[:, None]).T)
-    errors = np.empty((points.x.size, points.x.size))
-    _errors(points.x, points.y, points.u, bare.u, found.covariance, errors)
-    covariance = influence @ errors @ influence.T
-    silent = (end.covariance / u_prior**2) @ end.covariance
-    return FingerEnd(end.parameters, covariance + silent, end.origin, 1.0, end.residual, end.robust)
+    x, y, is_row, parameters = points.x, points.y, points.is_row, end.parameters
+    is_outer, slant = seen(parameters, end.origin, x, y, is_row)
+    errors = np.empty((x.size, x.size))
+    _errors(x, y, points.u * slant, bare.u * slant, found.covariance, errors)
+    errors[np.diag_indices(x.size)] += 1.0 / np.maximum(end.robust, LEAST_WEIGHT) - 1.0
+    # No combination of points is surer than their own noise: rounding of the tabulated covariance may say so.
+    values, vectors = np.linalg.eigh(errors)
+    whitening = vectors / np.sqrt(np.maximum(values, float(np.min((bare.u / points.u) ** 2))))
+    prior = np.diag(1.0 / u_prior**2)
+    for _ in range(STEPS):
+        residual, jacobian, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
+        white = whitening.T @ np.column_stack([jacobian, residual])
+        covariance = np.linalg.inv(white[:, :-1].T @ white[:, :-1] + prior)
+        parameters = parameters - covariance @ (white[:, :-1].T @ white[:, -1] + prior @ (parameters - start))
+        parameters[[INNER_R, OUTER_R]] = np.maximum(parameters[[INNER_R, OUTER_R]], 0.0)
+    residual, _, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
+    return FingerEnd(parameters, covariance, end.origin, 1.0, residual, end.robust)
 
 
 def _correlation(distance: Floats, length: float) -> Floats:

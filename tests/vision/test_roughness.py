@@ -12,9 +12,10 @@ from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.finger_end import FingerEnd, fit_finger_end
 from fingervision.vision.first_guess import first_guess
 from fingervision.vision.longer_flanks import is_surer
+from fingervision.vision.measuring_point import measuring_point, squared
 from fingervision.vision.outline_points import OutlinePoints
 from fingervision.vision.pipeline import Settings, measure_frame
-from fingervision.vision.roughness import Roughness, roughness
+from fingervision.vision.roughness import Roughness, best_linear, roughness, with_roughness
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, plain, texture
 from tests.benchmarks.camera_artefacts.optics import Surface
 
@@ -59,6 +60,55 @@ def test_waves_give_back_what_they_were_drawn_with(length: float) -> None:
     assert deviation - 3.0 * u_mean < values.mean() < 1.5 * deviation + 3.0 * u_mean
     shared = np.array([one.shared_px for one in seen if one is not None])
     assert 0.8 < np.median(shared) / (np.sqrt(2.0 * np.pi) * length) < 2.0
+
+
+def rounded(rng: np.random.Generator, errors: Roughness, radius: float) -> tuple[OutlinePoints, OutlinePoints]:
+    """A finger with fillets, displaced along its normals by waves of this covariance: without and with their u."""
+    rows, columns = np.arange(0.3 * radius, 64.0, 2.0), np.arange(-WIDTH + 0.3 * radius, -0.3 * radius + 1.0, 2.0)
+
+    def inset(d: np.ndarray) -> np.ndarray:
+        return np.asarray(radius - np.sqrt(np.maximum(radius**2 - np.maximum(radius - d, 0.0) ** 2, 0.0)))
+
+    x = np.concatenate((-inset(rows), columns, -WIDTH + inset(rows)))
+    y = np.concatenate((rows, inset(np.minimum(-columns, columns + WIDTH)), rows))
+    side = np.repeat([0, 1, 2], [rows.size, columns.size, rows.size])
+    u, blur = np.full(x.size, U_POINT), np.full(x.size, 0.3)
+    shape = np.array((0.0, -WIDTH, 0.0, 0.0, radius, radius, 0.0, 0.0))
+    end = FingerEnd(shape, np.eye(8), np.zeros(2), 1.0, np.zeros(x.size), np.ones(x.size))
+    distance = np.hypot(x[:, None] - x, y[:, None] - y)
+    covariance = np.interp(distance, np.arange(errors.covariance.size), errors.covariance, right=0.0)
+    waves = np.linalg.cholesky(covariance + 1e-4 * np.eye(x.size)) @ rng.standard_normal(x.size)
+    inside = np.column_stack((np.clip(x, -WIDTH + radius, -radius), np.maximum(y, radius)))
+    normal = np.column_stack((x, y)) - inside
+    normal /= np.hypot(*normal.T)[:, None]
+    along_line = waves / np.where(side == 1, normal[:, 1], normal[:, 0])
+    moved = OutlinePoints(x + np.where(side == 1, 0, along_line), y + np.where(side == 1, along_line, 0), u, side, blur)
+    return moved, with_roughness(moved, errors, end)
+
+
+def test_a_rough_fillet_is_as_sure_as_it_says() -> None:
+    """Errors of tip and edge on a slanted fillet by waves of a known covariance, in units of what is stated."""
+    errors = Roughness(0.3**2 * np.exp(-0.5 * (np.arange(65.0) / 4.0) ** 2))
+    rng, below, radius = np.random.default_rng(21), 6.0, 25.0
+    truth = np.array((0.0, np.sqrt(radius**2 - (radius - below) ** 2) - radius))
+    squares = []
+    for _ in range(150):
+        bare, points = rounded(rng, errors, radius)
+        start, origin, u_prior = first_guess(points, below)
+        end = best_linear(points, fit_finger_end(points, start, origin, u_prior), start, u_prior, bare, errors)
+        read = measuring_point(squared(end), below, 0.3)
+        squares.append((np.array((read.tip, read.edge)) - truth) ** 2 / np.diag(read.covariance))
+    # Chi-square of 150 lies between 106 and 202 in 99.4 of 100 cases.
+    assert np.all(np.sum(squares, axis=0) > 106.0)
+    assert np.all(np.sum(squares, axis=0) < 202.0)
+
+
+def test_a_row_sees_more_of_roughness_on_a_slant() -> None:
+    """On a fillet at 45 degrees a row moves by sqrt(2) of what the edge moves along its normal."""
+    errors, radius = Roughness(np.full(65, 0.3**2)), 25.0
+    points = rounded(np.random.default_rng(1), errors, radius)[1]
+    at_45 = np.argmin(np.abs(points.y[points.side == 0] - (1.0 - np.sqrt(0.5)) * radius))
+    assert points.u[at_45] == pytest.approx(np.hypot(U_POINT, 0.3 * np.sqrt(2.0)), rel=0.1)
 
 
 def test_noise_alone_is_not_rough() -> None:
