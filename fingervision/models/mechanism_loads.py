@@ -128,8 +128,8 @@ class GrippedPair:
         """
         if not self.per_input:
             raise ModelError(
-                f"Pair {self.pair} of {self.model.mechanism.name} must close by its drive to grip a part, but its "
-                f"distance changes by less than {_STILL:g} of the input."
+                f"The drive of {self.model.mechanism.name} must change the distance of pair {self.pair} so that it "
+                f"grips a part, but the distance changes by less than {_STILL:g} of the input."
             )
         return (part.width_mm - self.rest_mm) / self.per_input
 

@@ -43,8 +43,8 @@ class Notch:
     def __post_init__(self) -> None:
         if not self.web_mm > self.thickness_mm:
             raise DataError(
-                f"A notch must leave less than its bar's height of {self.web_mm:g} mm, but leaves "
-                f"{self.thickness_mm:g}."
+                f"The thickness left by a notch must be below the height of its bar, {self.web_mm:g} mm, but is "
+                f"{self.thickness_mm:g} mm."
             )
         for name in ("thickness_mm", "half_length_mm", "depth_mm", "plate_mm"):
             value = getattr(self, name)
