@@ -22,7 +22,7 @@ an error of 1e-3."""
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A face of the body: the nodes of the outline inside an upright box from x to x and from y to y (mm)."""
+    """A face of the body: the nodes of the outline inside a box with sides parallel to x and y (mm)."""
 
     name: str
     box_mm: tuple[float, float, float, float]

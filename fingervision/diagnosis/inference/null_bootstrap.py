@@ -61,11 +61,12 @@ def linear_thresholds(
     rng: np.random.Generator,
     among: Flags | None = None,
 ) -> dict[str, float]:
-    """Significance thresholds: gains that the best column of a family of shapes seldom exceeds in noise alone.
+    """Significance threshold of each effect: the gain that its best signature seldom exceeds in noise alone.
 
-    A family of many shapes gains more from noise than a single shape does; a threshold for all families together would
-    be that of the largest family. Therefore each family is compared with its own upper quantile, and the probability of
-    an excess in any family is limited: the families have equal shares of the false positives (Beran 1988).
+    The signatures of one effect, one for each starting value of its parameters, form a family. The best of many
+    signatures gains more from noise than a single signature does; a common threshold for all families would be that of
+    the largest family. Therefore each family is compared with its own upper quantile, and the probability of an excess
+    in any family is limited: all families contribute equally to the false positives (Beran 1988).
 
     Parameters
     ----------
