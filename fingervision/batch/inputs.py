@@ -38,7 +38,9 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
         for match in matches or [name]:
             found.setdefault(_absolute(match), match)
     if not matched and inside:
-        raise UsageError(f"--out must be a folder without inputs, but the inputs are in {out}: name another folder.")
+        raise UsageError(
+            f"--out must not be a folder that contains the inputs, but they are in {out}: name another folder."
+        )
     if not matched:
         words = ", ".join(names)
         raise InputFileError(

@@ -221,7 +221,8 @@ def _check_folder(job: Job) -> None:
         )
     if entries and (command := _command_of(job.out / MARK)) != job.command:
         raise OutputError(
-            f"--out must be a folder of batch {job.command}, but {job.out} is one of batch {command}: name another."
+            f"--out must be a folder of `batch {job.command}`, but {job.out} was written by `batch {command}`: name "
+            "another folder."
         )
 
 

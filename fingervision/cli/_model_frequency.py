@@ -49,7 +49,7 @@ def parse_band(text: str) -> Band:
         first, last = 0.0, 0.0
     if not (isfinite(first) and isfinite(last) and 0.0 < first < last):
         raise UsageError(
-            f"--frequency must be A:B, two rising positive frequencies in Hz such as 1:500, but is {text}."
+            f"--frequency must be A:B, two positive frequencies in Hz with A below B, such as 1:500, but is {text}."
         )
     return Band(first, last)
 

@@ -289,8 +289,8 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
         parts = [part for part in recordings[0] if all(len(each.get(part, ())) >= 2 for each in recordings)]
         if not parts:
             raise DataError(
-                "The recordings must share at least one part with two readings in each, but share none: "
-                "record the same reference part in all of them."
+                "At least one part (object of known size) must have two readings or more in every recording, but none "
+                "has: record the same part in all recordings."
             )
         for table, each in zip(tables, recordings, strict=True):
             for part in parts:

@@ -73,8 +73,10 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
     if not (name.isidentifier() and name.islower()):
         raise MisfitError(f"must have a name of small letters and underscores, but is named {name!r}")
     if effect.stage not in tuple(Stage) or (effect.stage == Stage.DRIVE) != isinstance(effect, DriveEffect):
-        kind = "PointEffect of the mechanism or camera" if isinstance(effect, PointEffect) else "DriveEffect"
-        raise MisfitError(f"must be a {kind} if it acts there, but its stage is {effect.stage!s}")
+        where = "mechanism or camera" if isinstance(effect, PointEffect) else "drive"
+        raise MisfitError(
+            f"is a {type(effect).__name__}, so that its stage must be {where}, but its stage is {effect.stage!s}"
+        )
     if not effect.parameters or not all(isinstance(p, Parameter) for p in effect.parameters):
         raise MisfitError("must have a tuple of at least one Parameter, but has none")
     for p in effect.parameters:

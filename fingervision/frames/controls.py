@@ -91,7 +91,9 @@ def check_value(controls: tuple[CameraControl, ...], name: str, value: float) ->
     control = next((each for each in controls if each.name == name), None)
     if control is None:
         there = ", ".join(each.name for each in controls) or "nothing"
-        raise UsageError(f"The camera lets {there} be changed while it runs, but {name[:40]!r} was requested.")
+        raise UsageError(
+            f"Settings of this camera that can be changed while it runs: {there}; {name[:40]!r} is none of them."
+        )
     least, greatest = control.least, control.greatest
     is_known = name in (EXPOSURE, FRAME_RATE)
     if not isfinite(value) or (is_known and value <= 0.0):
@@ -142,11 +144,11 @@ def adjust(source: object, name: str, value: float) -> tuple[CameraControl, Came
         raise DeviceError(f"The camera refused to set {name} {before.words(value)} ({said}).") from error
     after = next((each for each in controls_of(source) if each.name == name), None)
     if after is None:
-        raise DeviceError(f"The camera was asked for {name} {before.words(value)} and no longer says what it has.")
+        raise DeviceError(f"The camera was set to {name} {before.words(value)}, but no longer reports its {name}.")
     if after.value == before.value and not _same(after.value, value):
         raise DeviceError(
-            f"The camera was asked for {name} {before.words(value)} and stays at {after.words(after.value)}: it has no "
-            "such step, or another of its settings holds it."
+            f"The camera was set to {name} {before.words(value)}, but stays at {after.words(after.value)}: the camera "
+            "does not offer this value, or another of its settings prevents the change."
         )
     return before, after
 

@@ -85,7 +85,7 @@ class GenicamFrames:
         if self._format not in MONO:
             self._release()
             raise DeviceError(
-                f"The camera {name} must give grey levels ({', '.join(MONO)}), but has {self._format} alone: choose "
+                f"The camera {name} must give grey levels ({', '.join(MONO)}), but offers only {self._format}: choose "
                 "another camera."
             )
         try:

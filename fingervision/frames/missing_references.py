@@ -123,7 +123,11 @@ def _by_number(packets: list[CodedTime]) -> dict[int, str]:
 
 
 def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
-    """Check MPEG-4's rounding bit, if every P picture toggles it and it has the same value after every I picture."""
+    """Find packets after a missing picture by MPEG-4's rounding bit.
+
+    The bit is used only if the P pictures of this stream toggle it. The first P picture after an I picture is checked
+    only if the bit has the same value in nearly all such pictures.
+    """
     needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
     pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]
     inner = [(number, packet.turn != before.turn) for number, before, packet in pairs if before.turn is not None]

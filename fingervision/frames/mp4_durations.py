@@ -189,7 +189,7 @@ def _track(content: mmap.mmap, inner: dict[bytes, tuple[int, int]]) -> _Track | 
     offsets = tuple(rows(content, inner[b"ctts"], ">Ii")) if b"ctts" in inner else None
     shown_parts = list(edits(content, inner[b"elst"])) if b"elst" in inner else []
     if b"edts" in inner and b"elst" not in inner:
-        raise struct.error("an edit list without its list")
+        raise struct.error("a box edts without its list elst")
     sizes = None
     if b"stsz" in inner:
         begin, end = inner[b"stsz"]

@@ -140,8 +140,7 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
         if not (-0.5 <= x <= width_px - 0.5 and -0.5 <= y <= height_px - 0.5):
             raise DataError(
                 f"The gauge {gauge.name!r} must have its centre inside the picture of {width_px}x{height_px} "
-                "pixels, but "
-                f"x_px = {x:g}, y_px = {y:g}: move the gauge into the picture."
+                f"pixels, but it lies at x_px = {x:g}, y_px = {y:g}: move the gauge into the picture."
             )
         largest = (width_px**2 + height_px**2) ** 0.5
         for key in SIZES:

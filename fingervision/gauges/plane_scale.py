@@ -77,7 +77,10 @@ class PlaneScale:
         return sqrt(variance / length_mm**2 + of_scale)
 
     def u_edge_px(self, u_response_px: float) -> float:
-        """Standard uncertainty (px) of one edge that all frames share: half of the bias', phase, camera response."""
+        """Standard uncertainty (px) of the position of one edge from errors that are the same in all frames.
+
+        The contributions are half of the uncertainty of the edge bias, the sub-pixel phase, and the camera response.
+        """
         if not isinstance(self.scale, Calibration):
             return 0.0
         return hypot(0.5 * self.scale.u_edge_bias_px, self.u_phase_px, u_response_px)

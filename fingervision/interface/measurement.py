@@ -153,7 +153,9 @@ class Measurement:
         outcomes = [result.outcome for result in self._found.results]
         measured = [each for each in outcomes if isinstance(each, GapMeasurement)]
         if not measured:
-            raise UsageError("A budget needs a gap, but no frame has one: see counts and advice.")
+            raise UsageError(
+                "A budget needs at least one measured gap, but no frame has one: `counts` and `advice` tell why."
+            )
         return gap_budget(measured, self._found.task.scale)
 
     @property

@@ -42,7 +42,9 @@ def marked_picture(found: MeasuredInMemory, again: Opener, frame: int) -> NDArra
         seen = item if isinstance(item, Frame) else None
     outcome = None if place is None else found.results[place].outcome
     if seen is None or place is None or outcome is None or isinstance(outcome, LostFrame):
-        raise UsageError(f"frame must be one of the {len(found.rows)} that can be read, but {frame} is not.")
+        raise UsageError(
+            f"frame must be the number of a frame that can be read (of {len(found.rows)} frames), but is {frame}."
+        )
     return draw_overlay(seen, outcome, words_of_row(found.rows[place]))
 
 

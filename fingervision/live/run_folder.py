@@ -129,7 +129,7 @@ def _new_folder(out: Path) -> Path:
             ) from error
         return path
     raise OutputError(
-        f"The folder {out} has no free name for a run of this second: try again, or name another folder with --out."
+        f"The folder {out} holds too many runs that began in this second: try again, or name another folder with --out."
     )
 
 

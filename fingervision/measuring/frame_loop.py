@@ -162,7 +162,7 @@ def _outcomes(
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
-    """Attach to losslessly stored frames the compression of the pictures from which they were made."""
+    """Attach to losslessly stored frames the information on how their pictures had been compressed before."""
     for item in frames:
         if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
             yield replace(item, coding=coding)

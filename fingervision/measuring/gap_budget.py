@@ -18,7 +18,7 @@ RESPONSE = "assumed camera response"
 
 
 def gap_budget(measured: Sequence[GapMeasurement], scale: Scale) -> Budget:
-    """List every contribution to the standard uncertainty of each gap; its `u_mm` is `u_gap_mm` of gaps.csv.
+    """List every contribution to the standard uncertainty of each gap; `u_mm` of the result is `u_gap_mm` of gaps.csv.
 
     The squares of independent contributions add (JCGM 100:2008, equation 10). A bare scale (pixels per millimetre
     without calibration) has no stated uncertainty; then only the contributions of the pictures are listed, and their

@@ -83,7 +83,8 @@ class Task:
             )
         if self.frames is not None and not 0 <= self.frames[0] <= self.frames[1]:
             raise UsageError(
-                f"--frames must be FIRST:LAST, from 0 and rising, but is {self.frames[0]}:{self.frames[1]}."
+                f"--frames must be FIRST:LAST, counted from 0, with FIRST not above LAST, but is "
+                f"{self.frames[0]}:{self.frames[1]}."
             )
 
     @property

@@ -57,7 +57,7 @@ class BodyAssembly:
     by_drive: tuple[dict[int, float], ...]
 
     def field(self, moved: Array) -> tuple[Array, csr_matrix]:
-        """Displacement of every node of the bodies in the deformed shape; its derivative by the frames' motions."""
+        """Displacement of every node of the bodies in the deformed shape, and its derivative by the frames' motions."""
         plate = self.plate
         field = np.zeros(plate.unknowns)
         slopes = lil_matrix((plate.unknowns, moved.size))

@@ -150,8 +150,8 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, wanted), axis=0)]
         if edges.shape[1] == 0 or np.intersect1d(nodes, wanted).size:
             raise DataError(
-                f"contact {contact.name} of {mechanism.name} must be between two faces that share no part, "
-                "but they have one."
+                f"contact {contact.name} of {mechanism.name} must be between two separate faces, but part of the "
+                "outline belongs to both."
             )
         # The body lies on the right of an edge that runs so that the void is on its left.
         segments = np.hstack([edges[[0, 2]], edges[[2, 1]]])

@@ -1,8 +1,9 @@
-"""A condensed body in large rotation: linear elasticity in axes that rotate with the body's first frame.
+"""A condensed body in large rotation: linear elasticity in axes that rotate with its first coordinate frame.
 
 The corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures, volume 1,
-section 7.3) for an element with any number of nodes: the energy is d' K d / 2, with d the frames' motions relative to
-the first frame and K the stiffness matrix.
+section 7.3) for an element with any number of nodes: the energy is d' K d / 2, with K the stiffness matrix and d the
+motions of the coordinate frames relative to the first one. Each coordinate frame is a connection point of the body,
+with two displacements and a rotation.
 """
 
 from dataclasses import dataclass

@@ -80,7 +80,8 @@ class PaperDamping:
     The equation is an illustrative example of a theory (S. Adhikari, J. Sound Vib. 293 (2006) 156), not a material law.
     It adds powers of w that have different units, so that its result would depend on the unit of time; frequencies are
     therefore taken relative to w0. Below w0 the damping would be negative, and above a few w0 more than critical. Hence
-    w0 must not exceed the lowest mode, one factor gamma is fitted, and ratios outside (0, 0.3) are refused.
+    w0 must not exceed the lowest mode, the result is multiplied by one factor gamma, and ratios outside (0, 0.3) are
+    refused.
 
     Parameters
     ----------

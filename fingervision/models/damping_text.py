@@ -43,5 +43,5 @@ def parse_damping(text: str) -> Damping:
     if law == "loss":
         return LossFactor(numbers[0])
     if not numbers[1] < numbers[2]:
-        raise UsageError(f"--damping rayleigh must have two rising frequencies in Hz, but is {text}.")
+        raise UsageError(f"--damping rayleigh must have two frequencies in Hz, the lower one first, but is {text}.")
     return RayleighDamping(ratio, 2.0 * pi * numbers[1], 2.0 * pi * numbers[2])

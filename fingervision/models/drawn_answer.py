@@ -1,4 +1,4 @@
-"""Inputs of a physical law of a drawing: the drawing, its elastic body and its response to a changed lever."""
+"""Data for the laws of a drawing: the drawing, its elastic body and its response to a changed lever."""
 
 from dataclasses import dataclass
 

@@ -1,10 +1,10 @@
 """Stress concentration at the rounded corners of a straight neck between deep shoulders.
 
 The values come from plane finite elements (`tests/benchmarks/models_fillet_table.py`), because the usual charts
-(Pilkey, Peterson's Stress Concentration Factors, charts 3.1 and 3.7) end at shoulders of three heights. Between the
-table's nodes, the excess of the stress concentration factors over 1 is interpolated over the logarithms of radius /
-thickness and depth / radius. Beyond the table's ends the excess is extrapolated as a power of the radius, because the
-stress at a sharp corner is unbounded, and held constant over the depth.
+(Pilkey, Peterson's Stress Concentration Factors, charts 3.1 and 3.7) end where the shoulders are three times as high as
+the neck. Between the table's nodes, the excess of the stress concentration factors over 1 is interpolated over the
+logarithms of radius / thickness and depth / radius. Beyond the table's ends the excess is extrapolated as a power of
+the radius, because the stress at a sharp corner is unbounded, and held constant over the depth.
 """
 
 import numpy as np

@@ -122,7 +122,7 @@ class Flexure:
         """Degree to which the plate's width constrains the bending: 0 for plane stress, 1 for plane strain.
 
         For a leaf or a straight neck it lies between two cases, ends that rotate and ends that keep their direction: by
-        their shares of the strain energy, or their mean where these are not known.
+        their shares of the strain energy, or their mean where these are unknown.
         """
         if self.is_notch:
             return plane_strain_share(self.notch(plate_mm))
@@ -132,7 +132,7 @@ class Flexure:
         return (self.used[0] * bent + self.used[1] * swayed) / max(self.used[0] + self.used[1], 1e-300)
 
     def width_doubt(self, plate_mm: float) -> float:
-        """Half range of `width_share`, because the boundary conditions of a strip's ends are not known."""
+        """Half of the range in which `width_share` may lie, because the conditions at a strip's ends are unknown."""
         if self.is_notch or self.used is not None:
             return 0.0
         bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)

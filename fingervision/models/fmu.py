@@ -173,7 +173,7 @@ def _choose(variables: list[Any], causality: str, stated: str | None, usual: tup
         if len(found) == 1:
             return found[0]
     if not real:
-        raise ValueError(f"must have a real {causality} to be driven in time, but has none.")
+        raise ValueError(f"must have an {causality} variable of type Real or Float, but has none.")
     raise ValueError(
         f"has {len(real)} {causality}s ({_listed(real)}), and it is not stated which of them is the {word}: "
         "name it in a "

@@ -47,7 +47,7 @@ class FunctionModel:
     names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def respond(self, input_mm: Array) -> Response:
-        """Static response at each input, each held until the gap has settled; `input_mm` of shape (n,)."""
+        """Static response at each input, which is held until the gap has settled; `input_mm` of shape (n,)."""
         if np.ptp(input_mm) == 0.0:
             time_s = np.array([0.0, 0.5, 1.0]) * HOLDS_S[0]
             (held,) = self.simulate([(time_s, np.full(3, float(input_mm[0])))])

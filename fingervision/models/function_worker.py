@@ -62,7 +62,7 @@ def _python_function(path: Path) -> Function:
 
 
 def _points(answer: Answer, time_s: Array) -> dict[str, Array]:
-    """Convert a model's return value to left, right and force; refuse any that has not one finite number per time."""
+    """Convert a model's return value to left, right and force; refuse a value without one finite number per time."""
     out: dict[str, Array] = {}
     for name in ("gap_mm", "left_mm", "right_mm", "force_n"):
         if name not in answer:

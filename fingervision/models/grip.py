@@ -1,8 +1,9 @@
 """Gripping force on a part held between the fingers, for small displacements.
 
-The part is a block with flat sides, of given width and stiffness, centred between the fingers. Each finger meets a
-plane at half the part's width, which yields by the finger's force divided by twice the part's stiffness. This is
-Signorini's contact problem with the part's compliance added to that of every pair of points on the finger's face.
+The part is a block with flat sides, of given width and stiffness, centred between the fingers. Each finger meets an
+elastic plane at half the part's width. The plane is displaced by the finger's force divided by twice the part's
+stiffness. This is Signorini's contact problem with the part's compliance added to that of every pair of points on the
+finger's face.
 """
 
 from dataclasses import dataclass

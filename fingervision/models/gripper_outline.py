@@ -173,6 +173,6 @@ def check_stated_size(gripper: Gripper, origin: str) -> None:
         stated = getattr(body, name)
         if abs(stated - value) > _STATED * value:
             raise DataError(
-                f"body.{name} in {origin} must be that of the drawn links, {value:.6g} mm within "
-                f"{100.0 * _STATED:g} %, but is {stated:g}; correct one of the two."
+                f"body.{name} in {origin} must agree within {100.0 * _STATED:g} % with the dimensions of the links, "
+                f"which give {value:.6g} mm, but is {stated:g}; correct one of the two."
             )

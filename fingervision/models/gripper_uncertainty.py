@@ -83,8 +83,9 @@ def check_uncertainties(gripper: Gripper) -> None:
                 check_outline(drawn, "the drawing so changed")
             except FingervisionError as error:
                 raise ModelError(
-                    f"The uncertainty of {name} must leave a drawing that works, but at {estimate.value + by:g} (one "
-                    f"standard uncertainty away) it does not: {error}"
+                    f"The uncertainty of {name} is too large: with {name} = {estimate.value + by:g}, one standard "
+                    f"uncertainty from its stated value, the drawing is invalid ({str(error).rstrip('.')}). State a "
+                    "smaller uncertainty."
                 ) from error
 
 

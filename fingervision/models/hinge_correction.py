@@ -4,7 +4,7 @@ The compliance in each direction is multiplied by ratios that `tests/benchmarks/
 0.34. The first ratio is that of the compliance in plane stress, between rigid end planes, to that by beam theory. The
 second ratio is the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third ratio,
 for a hinge in a body, is that of the compliance between elastic blocks to that between rigid planes, because the blocks
-yield where the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam
+deform where the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam
 theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of
 the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant,
 except in torsion, where the ratio continues to fall with (t / b)^2.
@@ -138,7 +138,8 @@ that of a Timoshenko beam. Its sections are not sheared as a straight beam's are
 def sway_shear(notch: Notch) -> float:
     """Shear compliance of a notch in a body, as a multiple of the integral of 1 / (E b h) over its length.
 
-    In plane stress it does not depend on Poisson's ratio: stresses under given loads do not (Michell's theorem).
+    In plane stress it does not depend on Poisson's ratio, because the stresses under given loads do not (Michell's
+    theorem).
     """
     return SWAY_SHEAR * _sway_ratio(notch.curvature_ratio)
 

@@ -66,7 +66,9 @@ class _Tangent:
             try:
                 pressed = contact_forces_n(self.compliance, body.face_gap_mm(moved) + step[body.face])
             except np.linalg.LinAlgError as error:  # far from an equilibrium a tangent need not be positive definite
-                raise ModelError("The tangent of the deformed shape is not that of an equilibrium.") from error
+                raise ModelError(
+                    "Contact forces could not be computed: the deformed shape is not close to an equilibrium."
+                ) from error
             step[body.free] += self.by_force @ pressed
         return step, pressed
 
@@ -154,7 +156,7 @@ def _settled(tangent: _Tangent, input_mm: float, moved: Array, pressed: Array) -
             if renewed == _TANGENTS or not np.isfinite(residual):
                 raise ModelError(
                     f"The large-rotation equilibrium at an input of {input_mm:g} mm was not found in {_TANGENTS} "
-                    "steps; use a smaller drive, or leave large rotation off."
+                    "steps; use a smaller input, or leave large rotation off."
                 )
             tangent.renew(moved)
             renewed, since = renewed + 1, 0

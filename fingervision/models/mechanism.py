@@ -22,7 +22,7 @@ an error of 1e-3."""
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A face of the body: the nodes of the outline inside an upright box from x to x and from y to y (mm)."""
+    """A face of the body: the nodes of the outline inside a box with sides parallel to x and y (mm)."""
 
     name: str
     box_mm: tuple[float, float, float, float]
@@ -168,8 +168,8 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         cuts = flexure.kind == "leaf" or uncut.holds(beside).all()
         if not region.holds(inside).all() or region.holds(beside).any() or not cuts:
             raise DataError(
-                f"flexure {flexure.name} of {name} must be a neck of {t:g} mm at ({flexure.at_mm[0]:g}, "
-                f"{flexure.at_mm[1]:g}) mm, but there the material is thinner, thicker or none; "
+                f"flexure {flexure.name} of {name} must have a thickness of {t:g} mm at ({flexure.at_mm[0]:g}, "
+                f"{flexure.at_mm[1]:g}) mm, but the material there is thinner, thicker or missing; "
                 "check its place and axis."
             )
         if flexure.kind == "leaf":

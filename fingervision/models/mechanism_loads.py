@@ -1,7 +1,7 @@
 """Effects of weight, temperature and a part between two probes on a mechanism, for small displacements.
 
-All effects are computed by finite elements: frames of bars expand and hang at the points where their axes meet, unlike
-the drawing.
+All effects are computed by finite elements. A frame of bars would give wrong results, because its bars end where their
+axes meet, unlike those of the drawing.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _STILL = 1e-3
 
 
 def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
-    """Compute mechanical advantage, and the effects of weight and warmth.
+    """Compute mechanical advantage, and the effects of weight and temperature.
 
     Under weight and temperature the drive keeps its position, and so do the fixed faces and the sliding faces in their
     fixed direction.
@@ -128,8 +128,8 @@ class GrippedPair:
         """
         if not self.per_input:
             raise ModelError(
-                f"Pair {self.pair} of {self.model.mechanism.name} must close by its drive to grip a part, but its "
-                f"distance changes by less than {_STILL:g} of the input."
+                f"The drive of {self.model.mechanism.name} must change the distance of pair {self.pair} so that it "
+                f"grips a part, but the distance changes by less than {_STILL:g} of the input."
             )
         return (part.width_mm - self.rest_mm) / self.per_input
 

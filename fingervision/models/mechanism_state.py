@@ -66,7 +66,7 @@ def state_in_equilibrium(
     *,
     large: bool,
 ) -> MechanismState:
-    """State of a mechanism in an equilibrium, with what the model's kind has read from its displacements.
+    """State of a mechanism in an equilibrium, with the quantities that the kind of model derives from displacements.
 
     Parameters
     ----------

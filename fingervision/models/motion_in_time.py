@@ -115,9 +115,9 @@ def gripper_motion(
     if small.vibration_mm(GAP) > _FAST * travel:
         raise ModelError(
             f"With large rotation or contact this drive must be shorter than {_MOST_STEPS * step_s:.3g} s (a frame of "
-            f"bars, --kind lumped), or shake the gap by at most {_FAST:g} of its travel of {travel:.3g} mm, but it "
-            f"takes {sum(spans_s):.3g} s and shakes it by {small.vibration_mm(GAP):.3g} mm; shorten it, slow it down "
-            "or leave --large-rotation and --contact off."
+            f"bars, --kind lumped), or make the gap vibrate by at most {_FAST:g} of its travel of {travel:.3g} mm, but "
+            f"the drive takes {sum(spans_s):.3g} s and the gap vibrates by {small.vibration_mm(GAP):.3g} mm; shorten "
+            "the drive, slow it down or leave --large-rotation and --contact off."
         )
     onset_mm = contact_onset_mm(model.half, model.physics) if model.physics.contact else None
     apart = np.ones_like(force, dtype=bool) if onset_mm is None else drive.input_mm > onset_mm
@@ -146,9 +146,9 @@ def check_small_vibration(small: Motion, column: str, travel_mm: float) -> None:
     """
     if (shaken_mm := small.vibration_mm(column)) > _FAST * travel_mm:
         raise ModelError(
-            f"With large rotation or contact this drive must vibrate {column.removesuffix('_mm')} by at most {_FAST:g} "
-            f"of its travel of {travel_mm:.3g} mm, but vibrates it by {shaken_mm:.3g} mm; slow it down, or leave "
-            "--large-rotation and --contact off."
+            f"With large rotation or contact this drive must make {column.removesuffix('_mm')} vibrate by at most "
+            f"{_FAST:g} of its travel of {travel_mm:.3g} mm, but it vibrates by {shaken_mm:.3g} mm; slow the drive "
+            "down, or leave --large-rotation and --contact off."
         )
 
 

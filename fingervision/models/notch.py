@@ -43,8 +43,8 @@ class Notch:
     def __post_init__(self) -> None:
         if not self.web_mm > self.thickness_mm:
             raise DataError(
-                f"A notch must leave less than its bar's height of {self.web_mm:g} mm, but leaves "
-                f"{self.thickness_mm:g}."
+                f"The thickness left by a notch must be below the height of its bar, {self.web_mm:g} mm, but is "
+                f"{self.thickness_mm:g} mm."
             )
         for name in ("thickness_mm", "half_length_mm", "depth_mm", "plate_mm"):
             value = getattr(self, name)
@@ -70,8 +70,8 @@ class Notch:
     def stations_mm(self, pieces: int) -> Array:
         """Ends of pieces along the notch, more densely where it bends; shape (pieces + 1,), symmetric about the middle.
 
-        The pieces have equal amounts of the mean of two shares: of the bending compliance (the integral of 1 / h^3) and
-        of the length.
+        Each piece contributes the same amount to the mean of two fractions: that of the bending compliance (the
+        integral of 1 / h^3) and that of the length.
         """
         # x = a tan-like spacing near the neck: the bending part is sqrt(t R) long, and must be sampled finely.
         fine = np.sinh(np.linspace(0.0, np.arcsinh(20.0 * self.reach_mm / self._bending_mm), _FINE))

@@ -85,7 +85,7 @@ class PhysicalGripper:
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may vary each within it."""
+        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may change them within it."""
         return {
             name: Estimate(attrgetter(name)(self.gripper), u)
             for name, u in self.gripper.uncertainties.items()
@@ -93,7 +93,10 @@ class PhysicalGripper:
         }
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalGripper":
-        """Return the gripper with changed dimensions, its response scaled by that of the frame; laws are unchanged."""
+        """Return the gripper with changed dimensions; its response is scaled by a ratio from the bar model.
+
+        The laws are unchanged.
+        """
         if not changes:
             return self._with(self._drawn)
         new, old, drawn = small_answer(self._changed(changes), self.theory), self._frame, self._drawn

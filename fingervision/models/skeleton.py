@@ -176,8 +176,8 @@ def skeleton_of(
     pillar_width = links.pillar_and_root_mm[1] - links.pillar_and_root_mm[0]
     if not lower1[1] > links.pillar_and_root_mm[2] or not cross_y > max(upper1[1], upper2[1]):
         raise DataError(
-            f"Bars and hinges can stand for the body only where both hinges lie between the clamp and the cross bar, "
-            f"whose axis is at y = {cross_y:g} mm, but they reach from y = {lower1[1]:g} to "
+            f"A model of bars and hinges needs both hinges between the clamp and the cross bar, whose axis is at "
+            f"y = {cross_y:g} mm, but the hinges reach from y = {lower1[1]:g} to "
             f"{max(upper1[1], upper2[1]):g} mm; take --kind finite_element."
         )
     # A notch may reach into the cross bar: the root then begins where it ends.

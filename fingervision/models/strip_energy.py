@@ -2,7 +2,7 @@
 
 The plate's width restrains these three deformations differently (`strip_width`). The strain energies of a bar whose
 ends move by rotations, a chord's rotation and an elongation are E I / 2 L times the squares below (Timoshenko, Strength
-of Materials); only their shares are needed, which hardly change when the bar is restrained.
+of Materials). Only the fractions of these energies are needed, which hardly change when the bar is restrained.
 """
 
 from dataclasses import replace
@@ -23,9 +23,10 @@ _LEAST = 1e-3
 
 
 def used_in_plate(flexure: Flexure, plate: PlaneStressPlate, moved: Array, whole_n_mm: float) -> Flexure:
-    """Give a strip the shares of its strain energy from the displacements of a meshed plate.
+    """Set the fractions of a strip's strain energy (three deformations) from the displacements of a meshed plate.
 
-    A strip with a negligible part of the whole energy is left unchanged, because its shares would be those of rounding.
+    A strip with a negligible part of the whole energy is left unchanged, because its fractions would be determined by
+    rounding errors.
     """
     length, t = flexure.bent_mm, flexure.thickness_mm
     along, across = (np.subtract(flexure.point_mm(*way), flexure.at_mm) for way in ((1.0, 0.0), (0.0, 1.0)))
@@ -49,7 +50,7 @@ def used_in_plate(flexure: Flexure, plate: PlaneStressPlate, moved: Array, whole
 
 
 def used_in_frame(span: FlexureSpan, end_loads: Array, plate: PlaneStressPlate, whole_n_mm: float) -> Flexure:
-    """Give a strip the shares of its strain energy from the loads at the ends of its segments; see `used_in_plate`."""
+    """Set the fractions of a strip's strain energy from the loads at the ends of its segments; see `used_in_plate`."""
     tension, first, last = float(end_loads[:, 0].mean()), -float(end_loads[0, 1]), float(end_loads[-1, 2])
     t = span.flexure.thickness_mm
     parts = np.array([(0.5 * (first + last)) ** 2, (0.5 * (first - last)) ** 2 / 3.0, (tension * t) ** 2 / 12.0])

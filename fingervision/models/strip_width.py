@@ -25,7 +25,7 @@ _DIGITS = 3
 
 
 def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]:
-    """Share of plane strain in a strip's bending, 0 if narrow and 1 if wide: E' = E / (1 - share nu^2).
+    """Weight w of plane strain in a strip's bending, 0 if narrow and 1 if wide: E' = E / (1 - w nu^2).
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]
     Returns
     -------
     (float, float)
-        Share for a strip whose ends rotate against each other, and for a strip whose ends stay parallel, as in a
+        Weight for a strip whose ends rotate against each other, and for a strip whose ends stay parallel, as in a
         parallel-spring stage: there the moments are largest at the ends, where the width is restrained.
     """
     if poisson <= 0.0:
@@ -48,10 +48,10 @@ def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]
 
 
 def stretched_share(width_over_length: float, poisson: float) -> float:
-    """Share of plane strain of a strip that is stretched, and that cannot become narrower where it joins its bodies.
+    """Weight of plane strain, from 0 to 1, in a stretched strip whose ends cannot become narrower.
 
-    The share is computed by Ritz's method for the strip in plane stress across its thickness; parameters as in
-    `strip_share`.
+    The bodies at the ends restrain the strip. The weight is computed by Ritz's method, with zero stress in the
+    direction of the strip's thickness; parameters as in `strip_share`.
     """
     if poisson <= 0.0:
         return 0.0
@@ -93,7 +93,7 @@ def _stretched(log_width: float, poisson: float) -> float:
 
 @lru_cache(maxsize=512)
 def _shares(log_width: float, poisson: float) -> tuple[float, float]:
-    """Compute the two shares of `strip_share` for a strip of unit length that is not narrow."""
+    """Compute the two weights of `strip_share` for a strip of unit length that is not narrow."""
     width = float(np.exp(log_width))
     x, x_weights = (0.5 * (part + 1.0) if i == 0 else 0.5 * part for i, part in enumerate(legendre.leggauss(24)))
     y, y_weights = legendre.leggauss(24)

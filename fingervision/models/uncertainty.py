@@ -130,8 +130,8 @@ def _moved(evaluate: Evaluate, name: str, value: float, by: float) -> Mapping[st
         return evaluate({name: by})
     except FingervisionError as error:
         raise ModelError(
-            f"The uncertainty of {name} must leave a drawing that works, but at {value + by:g} (one standard "
-            f"uncertainty away) it does not: {error}"
+            f"The uncertainty of {name} is too large: with {name} = {value + by:g}, one standard uncertainty from its "
+            f"stated value, the drawing cannot be computed ({str(error).rstrip('.')}). State a smaller uncertainty."
         ) from error
 
 
@@ -163,7 +163,7 @@ def _samples(
                 rows[figure].append(value)
     if refused > _MOST_REFUSED * count:
         raise ModelError(
-            f"The stated uncertainties must leave a drawing that works, but {refused} of {count} drawings within them "
-            f"do not; state smaller uncertainties. The last failure: {last}"
+            f"The stated uncertainties are too large: of {count} drawings with random dimensions according to these "
+            f"uncertainties, {refused} cannot be computed. State smaller uncertainties. The last failure: {last}"
         )
     return {figure: np.array(values) for figure, values in rows.items()}

@@ -2,8 +2,8 @@
 
 A bar in bending becomes narrower on its stretched side and wider on the compressed side. A flexure that is short
 compared with its width cannot deform in this way, because of the thick material at its ends: it is stiffer than in
-plane stress, by a factor of up to 1 / (1 - nu^2) in plane strain. The share w of plane strain (0 to 1) comes from brick
-elements (`hinge_correction`).
+plane stress, by a factor of up to 1 / (1 - nu^2) in plane strain. The weight w of plane strain (0 to 1) comes from
+brick elements (`hinge_correction`).
 """
 
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ def gripper_zones(gripper: Gripper) -> tuple[ConstrainedZone, ...]:
 
 
 def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
-    """Share of plane strain at given points, shape (2, n); 0 outside the zones."""
+    """Weight w of plane strain at given points, shape (2, n); 0 outside the zones."""
     share = np.zeros(points.shape[1])
     for zone in zones:
         share = np.where(zone.holds(points), np.maximum(share, zone.share), share)
@@ -76,7 +76,7 @@ def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
 
 
 def held_moduli(material: Material, share: Array) -> tuple[Array, Array]:
-    """Young's modulus and Poisson's ratio of the in-plane material law for a share w of plane strain.
+    """Young's modulus and Poisson's ratio of the in-plane material law for a weight w of plane strain.
 
     With sigma_z = w nu (sigma_x + sigma_y), Hooke's law in the plane is that of plane stress with E' = E / (1 - w nu^2)
     and nu' = nu (1 + w nu) / (1 - w nu^2); the shear modulus is unchanged.

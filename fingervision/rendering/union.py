@@ -46,7 +46,10 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
 
 
 def _shared(part: Piece, other: Outline) -> float | None:
-    """Whether a part lies on an edge of another outline: positive for the same direction, negative for the opposite."""
+    """Direction of a piece relative to the edge of another outline on which it lies; None if it lies on no edge.
+
+    Positive: same direction; negative: opposite direction.
+    """
     x, y = part.points(np.array(0.5)).tolist()
     for edge in other.pieces:
         if not _may_cross(part, edge) or not _same_track(part, edge):

@@ -76,4 +76,4 @@ def _evaluated(node: ast.expr, names: Mapping[str, float]) -> float:
         case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in _FUNCTIONS:
             return _FUNCTIONS[name](_evaluated(argument, names))
         case _:
-            raise ValueError("only numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg are known")
+            raise ValueError("only numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg are allowed")

@@ -70,7 +70,9 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
     at = header.index("frame")
     seen = {frame.frame: frame.poses for frame in poses}
     if missing := [row[at] for row in body if int(row[at]) not in seen]:
-        raise DataError(f"{gaps} must be of the same recording, but its frame {missing[0]} was not followed.")
+        raise DataError(
+            f"{gaps} must belong to the same recording as the poses, but for its frame {missing[0]} there are no poses."
+        )
     first = next(iter(seen.values()), {})
     wanted = [(name, part) for name in names for part in PARTS if name in first and _has(seen.values(), name, part)]
     prefixes = ("", "u_", "u_random_")

@@ -85,7 +85,8 @@ def changed_tables(
     for name, by in changes.items():
         if name not in places:
             raise DataError(
-                f"{origin} has no number {name}; it has {', '.join(sorted(places)[:8])} and others like them."
+                f"There is no number called {name} in {origin}. Names of numbers in it are, for example, "
+                f"{', '.join(sorted(places)[:8])}."
             )
         path, raw = places[name]
         if absolute:

@@ -200,6 +200,6 @@ def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force
     except OSError as error:
         part.unlink(missing_ok=True)
         raise OutputError(
-            f"{path} could not be written again with the drive's inputs ({error.strerror}); the gaps are in it: make "
-            "room and measure again."
+            f"The drive's inputs could not be added to {path} ({error.strerror}); the file holds the gaps only: free "
+            "disk space and measure again."
         ) from error

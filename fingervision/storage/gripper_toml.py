@@ -201,8 +201,8 @@ def _check(gripper: Gripper, origin: str) -> None:
     widest_mm = max(links.pillar_and_root_mm[1] - links.pillar_and_root_mm[0], links.shuttle_width_mm)
     if hinge.web_mm > _STATED * widest_mm:
         raise DataError(
-            f"hinge.web_mm in {origin} must be no more than the links that the notches cut, {widest_mm:g} mm, but is "
-            f"{hinge.web_mm:g}; correct one of the two."
+            f"hinge.web_mm in {origin} must not exceed the width of the links that the notches cut, {widest_mm:g} mm, "
+            f"but is {hinge.web_mm:g}; correct one of the two."
         )
     if body.plate_mm > body.height_mm:
         raise DataError(
@@ -257,8 +257,8 @@ def _check_links(gripper: Gripper, origin: str) -> None:
         x0, x1, y0, y1 = getattr(links, name)
         if not (x1 > x0 and y1 > y0):
             raise DataError(
-                f"links.{name} in {origin} must be x from, x to, y from, y to, both growing, "
-                f"but is [{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
+                f"links.{name} in {origin} must be x from, x to, y from, y to, each range from the smaller to the "
+                f"larger number, but is [{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
             )
     shuttle = (*links.shuttle_from_mm, *links.shuttle_to_mm)
     for name, (x0, y0, x1, y1) in (("shuttle_to_mm", shuttle), ("finger_mm", links.finger_mm)):

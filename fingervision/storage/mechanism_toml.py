@@ -172,7 +172,7 @@ class _Reader(DrawingReader):
         given = [key for key in (*_SHAPES, "polygon_mm") if key in table]
         if len(given) != 1:
             raise DataError(
-                f"{what} in {self.origin} must be one of {', '.join((*_SHAPES, 'polygon_mm'))}, but has "
+                f"{what} in {self.origin} must have exactly one of {', '.join((*_SHAPES, 'polygon_mm'))}, but has "
                 f"{' and '.join(given) or 'none'}."
             )
         if not isinstance(table.get("cut", False), bool):
@@ -273,7 +273,7 @@ class _Reader(DrawingReader):
                 )
         if not any(drive.per_input for drive in found):
             raise DataError(
-                f"One drive at least of {self.origin} must move with the input, but per_input of all of them is 0."
+                f"At least one drive of {self.origin} must move with the input, but per_input is 0 for all of them."
             )
         return found
 

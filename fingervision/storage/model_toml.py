@@ -76,7 +76,9 @@ def read_model(
         )
     place = path.resolve()
     if place in inside:
-        raise DataError(f"The base of {path} must be another model, but leads back to itself: correct `base`.")
+        raise DataError(
+            f"The base of {path} must be another model, but is the file itself or a model based on it: correct `base`."
+        )
     kind = str(document.get("kind", kind))
     named = document["base"]
     if not (isinstance(named, str) and named.strip() and "\0" not in named):
@@ -152,8 +154,8 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -
             )
         if estimate.u is not None and not 0.0 <= estimate.u < float("inf"):
             raise DataError(
-                f"The u of {parameter.name} of the effect {name} in {path} must be a number from 0, but is "
-                f"{estimate.u:g}: correct it, or leave it out."
+                f"The standard uncertainty u of {parameter.name} of the effect {name} in {path} must be a finite "
+                f"number that is not negative, but is {estimate.u:g}: correct it, or leave it out."
             )
 
 

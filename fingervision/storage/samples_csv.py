@@ -127,7 +127,7 @@ def read_samples(path: Path) -> list[SampleRow]:
         return []
     except (OSError, ValueError, IndexError) as error:
         raise DataError(
-            f"{path} must be the table of samples by which the run is continued, but is not ({error}): name "
+            f"{path} must be the table of samples of the interrupted run, but cannot be read as one ({error}): name "
             "another folder with --out."
         ) from error
     if columns != COLUMNS:

@@ -78,8 +78,8 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
         names = names_in(lines[at], dialect) if at < len(lines) else None
         if names is None:
             raise DataError(
-                f"header_line must name the line with {dialect.wide} names of columns, but line {at + 1} is "
-                f"'{lines[at][:80] if at < len(lines) else 'not there'}': correct it."
+                f"header_line must be the number of the line with the {dialect.wide} column names, but line {at + 1} "
+                f"is '{lines[at][:80] if at < len(lines) else 'not there'}': correct it."
             )
         units = names_in(lines[at + 1], dialect) if at + 1 < first else None
         return Header(names, units if units is not None and _all_units(units) else (), at)

@@ -40,7 +40,10 @@ _find_runs = loop("channels_runs")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """The space between two fingers: a straight line on either side, across = c + m along, through their last pixels.
+    """Background between two fingers, bounded on either side by a straight line: column = c + m row.
+
+    The left line runs through the last pixels of the left finger, the right line through the first pixels of the right
+    finger.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ A printed or cut finger ends in an inner flank, a top and an outer flank, each s
 (from sharp to fully round) between them. This shape is fitted to all edge points of a finger, not only to those in a
 window, and gives the tip and the inner edge with their joint covariance.
 
-Blur moves the half-level of a curved edge towards the inside of the curve by sigma^2 kappa / 2 (kappa the curvature),
+Blur moves the half-level of a curved edge towards the centre of curvature by sigma^2 kappa / 2 (kappa the curvature),
 and by less near the end of a fillet. The points are compared with the model's outline displaced in this way, so that
 the fitted outline is that before blurring.
 """

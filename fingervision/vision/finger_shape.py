@@ -1,4 +1,4 @@
-"""Shape of a finger's end (three straight sides, two round corners): distances of points from it, and its read-offs."""
+"""Shape of a finger's end: three straight sides and two round corners, distances of points, tip and inner edge."""
 
 import numpy as np
 from numpy.typing import NDArray

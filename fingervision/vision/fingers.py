@@ -197,7 +197,7 @@ def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
 
 
 def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether a second pair of objects, of another width and from the border too, looks as much like two fingers."""
+    """Whether a second pair of objects at the border, of another width, looks as much like two fingers."""
     lower = min(top.prominence_px for top in two)
     others = [
         top

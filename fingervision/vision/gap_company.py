@@ -1,8 +1,8 @@
 """Recognise a space between two strokes of a letter, which looks like the gap between two fingers.
 
-Seen in the tone of the paper, the spaces inside and between letters are bars that come in from the picture's border.
-What lies between two such bars is a part of a letter, and there are others of its size; what lies between two fingers
-is the ground, and there is one ground.
+If the paper of a printed text is taken for the objects, and the letters for the background, the spaces inside and
+between letters look like bars that extend from the picture's border. Between two such bars lies a part of a letter, and
+the picture contains other parts of the same size. Between two fingers lies the background, which is a single region.
 """
 
 import cv2

@@ -102,11 +102,11 @@ def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tupl
 
 
 def lie_level(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build]) -> bool:
-    """Whether two objects that lie wholly in view end at one height, in the camera's angle that they show themselves.
+    """Whether two objects that lie wholly in view end at the same height, if the camera is turned by their mean tilt.
 
-    Fingers that come in from the picture's border show by this that they belong together, whatever the camera's angle.
-    Nothing of the kind is known of two bars that lie in view: the step between their ends must be that of a camera
-    turned as both of them lean on average.
+    Two objects that extend from the picture's border are likely to be fingers of one gripper, however the camera is
+    turned. For two bars that lie wholly in view there is no such evidence; therefore the difference in height between
+    their ends must agree with a camera that is turned by the mean tilt of both.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ class MeanProfile:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A straight line with the interface of NumPy's polynomials, whose evaluation takes longer than the whole profile.
+    """A straight line with the interface of NumPy's polynomials, but much faster to evaluate.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def without_part(
 
 
 def looks_parted(fingers: CoarseFingers, below_tip_px: float, reach_px: float) -> bool:
-    """Whether the outlines of the inner sides suggest a part: a floor between the fingers, or a step in one side.
+    """Whether the inner sides suggest a part: an edge across the space between the fingers, or a step in one side.
 
     Parameters
     ----------

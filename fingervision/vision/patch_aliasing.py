@@ -1,11 +1,12 @@
-"""Displacement that a patch seems to have by texture that is too fine for the pixels (aliasing).
+"""Apparent displacement of a patch that is caused by texture too fine for the pixels (aliasing).
 
-Texture beyond half the pixels' frequency is folded down to `1 - f` and seems to move the other way: against the rest of
-the patch its phase turns by 2 pi for every pixel of displacement. After a displacement d its residual is
-`2 sin(pi d)` times as large as the folded texture itself, and what of it the gradients take for a displacement is a
-bias that depends on the sub-pixel phase. How much lies beyond is predicted from what lies below: the power of the patch
-near half the pixels' frequency, and how it falls towards there. The same power is taken as folded for every frequency
-along the other axis, so that an edge along the pixels, which has one phase all along, counts as one.
+Texture of a frequency f above the Nyquist frequency (half a cycle per pixel) appears at the frequency `1 - f` and seems
+to move in the opposite direction: relative to the rest of the patch its phase changes by 2 pi for every pixel of
+displacement. After a displacement d its residual is `2 sin(pi d)` times as large as the aliased texture itself. The
+part of this residual that looks like a displacement is a bias, which depends on the sub-pixel phase. The power above
+the Nyquist frequency is extrapolated from the power of the patch below it. The aliased power is assumed to be the same
+for every frequency along the other axis, so that an edge parallel to the pixels, whose phase is the same along its
+whole length, counts as a single edge.
 """
 
 import cv2
@@ -25,7 +26,7 @@ NEARBY_PX = 5
 
 
 def aliasing_covariance(part: Floats, margin_px: int, jacobian: Doubles, smoothing: Doubles) -> Doubles:
-    """Variances by texture that is too fine for the columns and for the rows, at `aliasing_at` of 1.
+    """Variances due to texture that is too fine for the columns and for the rows, for a factor 1 in `aliasing_at`.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def aliasing_at(
 ) -> Doubles:
     """Variances of x, y and rotation of k patches at their displacements, shape (k, 3).
 
-    Folded texture counts `4 sin^2(pi d) = 2 (1 - cos(2 pi d))` times, on average over the patch where it has turned.
+    The power of aliased texture counts `4 sin^2(pi d) = 2 (1 - cos(2 pi d))` times, averaged over a rotated patch.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def aliasing_at(
 
 
 def _folded_power(light: Doubles, axis: int) -> Doubles:
-    """Power spectrum of what is folded along an axis, by its frequency after folding; shape of `light`."""
+    """Power spectrum of the texture that is aliased along an axis, by its apparent frequency; shape of `light`."""
     n = light.shape[axis]
     of = np.moveaxis(light, axis, 1)
     down, across = np.mgrid[: of.shape[0], :n]

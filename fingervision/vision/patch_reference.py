@@ -1,4 +1,4 @@
-"""A patch of a reference picture, prepared for registration: smoothed levels, gradients and what they can tell."""
+"""A patch of a reference picture, prepared for registration: smoothed levels, gradients, and expected precision."""
 
 from dataclasses import dataclass
 from functools import cache

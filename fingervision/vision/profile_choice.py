@@ -317,7 +317,7 @@ def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints
 
 
 def _unsure_of_width(edges: EdgePoints, displaced_px: Displacement) -> EdgePoints:
-    """State how far a wall may have moved the edges where nothing but their width says that there is one."""
+    """State how far a side wall may have moved the edges, where only the blur of the edges indicates a wall."""
     limits = wall_limits_px(edges, displaced_px)
     return edges if limits is None else _unsure(edges, limits, "wall")
 

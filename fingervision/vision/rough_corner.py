@@ -1,4 +1,4 @@
-"""Corner of a rough finger: a fillet or a straight cut, which roughness may hide from each other.
+"""Corner of a rough finger: a fillet or a straight cut, which roughness may make indistinguishable.
 
 A fillet of radius R and a straight cut whose legs are 0.655 R remove the same area from a corner, and nowhere differ by
 more than 0.06 R. If roughness hides this difference, the measuring point is the mean over both shapes, each weighted by

@@ -1,4 +1,4 @@
-"""Displacement of an edge that a side wall may have caused, by the width of the flanks alone.
+"""Displacement of an edge that a side wall may have caused, estimated only from the blur of the flanks.
 
 A wall of breadth w whose light is a share s of the step's adds s (1 - s) w^2 to the variance of the flank's spread, and
 puts a single fitted step (1 - s) w beyond the finger's own edge. If the wall is narrower than the blur, or the flank

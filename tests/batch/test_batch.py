@@ -211,7 +211,7 @@ def test_an_output_folder_of_something_else_is_left_alone(run: Run, copy: Path) 
     code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "mine/thesis.txt")
     assert (code, "is a file: name another" in err) == (1, True)
     code, _, err = run("batch", "measure", "rec/**/*.mkv", *ALONE, "--out", "rec")
-    assert (code, "--out must be a folder without inputs" in err) == (2, True)
+    assert (code, "--out must not be a folder that contains the inputs" in err) == (2, True)
 
 
 def test_a_batch_of_another_command_is_left_alone(run: Run, copy: Path) -> None:
@@ -220,7 +220,7 @@ def test_a_batch_of_another_command_is_left_alone(run: Run, copy: Path) -> None:
     mark.write_text('{"schema": 1, "command": "diagnose"}', encoding="utf-8")
     code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "told")
     assert code == 1
-    assert "--out must be a folder of batch measure, but told is one of batch diagnose" in err
+    assert "--out must be a folder of `batch measure`, but told was written by `batch diagnose`" in err
     assert [path.name for path in Path("told").iterdir()] == [mark.name]
 
 

@@ -71,7 +71,7 @@ def test_an_fmu_that_nothing_drives_is_refused(tmp_path):
                 content = content.replace(b'causality="input"', b'causality="local"')
                 content = content.replace(b'<Real unit="m" start="0"/>', b'<Real unit="m"/>')
             new.writestr(name, content)
-    with pytest.raises(ModelError, match="must have a real input to be driven in time"):
+    with pytest.raises(ModelError, match="must have an input variable of type Real"):
         FunctionModel(changed).simulate([(TIME_S, INPUT_MM)])
 
 

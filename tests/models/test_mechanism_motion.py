@@ -151,5 +151,5 @@ def test_a_drive_that_shakes_a_bent_mechanism_too_much_is_refused(tmp_path: Path
     drive.write_text("time_s,input_mm\n0,0\n0.0005,0.5\n0.05,0.5\n")
     arguments = [str(DRAWN / "four_bar_gripper.toml"), "--kind", "lumped", "--drive", str(drive), "--rate-hz", "20000",
                  "--large-rotation", "--out", str(tmp_path / "o")]  # fmt: skip
-    with pytest.raises(FingervisionError, match=r"must vibrate .* by at most 0.05 of its travel of"):
+    with pytest.raises(FingervisionError, match=r"must make .* vibrate by at most 0.05 of its travel of"):
         CliRunner().invoke(command, arguments, catch_exceptions=False)

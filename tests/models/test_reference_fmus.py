@@ -67,5 +67,5 @@ def test_feedthrough_takes_the_discrete_pair_where_it_is_named(tmp_path):
 def test_a_reference_fmu_without_an_input_is_refused_with_the_reason(tmp_path, name):
     option, variables = NOTHING_DRIVES[name]
     path = pack_fmu2(tmp_path, name, variables, "cs", option)
-    with pytest.raises(ModelError, match=r"must have a real input to be driven in time, but has none"):
+    with pytest.raises(ModelError, match=r"must have an input variable of type Real or Float, but has none"):
         FunctionModel(path).simulate([(TIME_S, INPUT_MM)])

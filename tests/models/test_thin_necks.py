@@ -95,5 +95,5 @@ def test_between_plane_stress_and_plane_strain() -> None:
 
 
 def test_a_notch_thicker_than_its_web_is_refused() -> None:
-    with pytest.raises(DataError, match="must leave less than its bar's height of 2 mm, but leaves 3"):
+    with pytest.raises(DataError, match="must be below the height of its bar, 2 mm, but is 3 mm"):
         Notch(3.0, 4.0, 4.0, 3.0, web_mm=2.0)

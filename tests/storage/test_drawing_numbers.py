@@ -37,7 +37,7 @@ def test_uncertain_numbers_are_taken_apart_and_changed() -> None:
         "thickness_mm": 0.3,
     }
     assert bare["lengths"]["t"] == "plate / 2"
-    with pytest.raises(DataError, match=r"m.toml has no number lengths.x; it has flexure"):
+    with pytest.raises(DataError, match=r"no number called lengths.x in m.toml. .* flexure"):
         changed_tables(bare, {"lengths.x": 1.0}, "m.toml")
 
 
@@ -73,5 +73,5 @@ def test_other_keys_beside_value_and_u_are_refused(tmp_path: Path) -> None:
 
 def test_an_uncertainty_that_leaves_no_mechanism_is_refused(tmp_path: Path) -> None:
     drawing = read_drawing(drawn(tmp_path, t="{ value = 0.8, u = 0.9 }"))
-    with pytest.raises(ModelError, match=r"The uncertainty of lengths.t must leave a drawing that works"):
+    with pytest.raises(ModelError, match=r"The uncertainty of lengths.t is too large"):
         mechanism_uncertainty(drawing.mechanism, drawing.estimates)

@@ -54,7 +54,10 @@ def test_an_uncertainty_may_stand_beside_a_number() -> None:
             {"links__shuttle_to_mm": [0.0, 10.57]},
             "must end beside and above the bar's beginning at (0, 10.57), but ends",
         ),
-        ({"links__drive_block_mm": [7.0, 0.0, 2.57, 18.57]}, "both growing, but is [7, 0, 2.57, 18.57]."),
+        (
+            {"links__drive_block_mm": [7.0, 0.0, 2.57, 18.57]},
+            "each range from the smaller to the larger number, but is [7, 0, 2.57, 18.57].",
+        ),
         ({"links__tip_polygon_mm": [[2.0, 100.0]] * 3}, "must be different points, but one of them occurs twice"),
         ({"links__tip_polygon_mm": [[2.0, 100.0], [6.0, 80.0], [9.0, 100.0]]}, "must have a vertical inner face"),
         ({"hinge__radius_mm": {"value": 4.0}}, "must be a number or {value = ..., u = ...}, but has the keys value."),

@@ -126,9 +126,9 @@ def test_a_sine_needs_an_actuator_that_goes_anywhere(tmp_path: Path) -> None:
     with pytest.raises(LimitError) as raised:
         run_recipe(read_recipe(recipe), bed, tmp_path / "run")
     assert str(raised.value) == (
-        f"kind in line 4 of {recipe} cannot be executed: A sine must be driven in short moves to anywhere on its way, "
-        "but this actuator goes only where its step data lead. Use a triangle or a staircase between two of its steps. "
-        "Nothing was moved."
+        f"kind in line 4 of {recipe} cannot be executed: a sine consists of many short moves to intermediate positions"
+        ", but this actuator can only move to the target positions of its step data. Use a triangle or a staircase "
+        "between two of these positions. Nothing was moved."
     )
     assert not (tmp_path / "run").exists()
 

@@ -135,10 +135,11 @@ def test_a_move_that_no_step_makes_is_refused_before_anything_moves(bed: Bed, co
     bed.actuator.home()
     stands(bed)
     for move, said in (
-        ((1.23, 50.0), "A step must lead to 1.23 mm, but none does: the controller goes to 0, 5, 9 mm, and by its "
-         "relative steps from there. Store a step to 1.23 mm in the controller, or change the move."),
-        ((5.0, 10.0), "The move to 5 mm must not be faster than 10 mm/s, but the slowest step that leads there goes at "
-         "20 mm/s: allow that, or give the controller a slower step."),
+        ((1.23, 50.0), "A stored step must end at 1.23 mm, but none does: the absolute steps in the controller end "
+         "at 0, 5, 9 mm, and no relative step leads to 1.23 mm. Store a step to 1.23 mm in the controller, or change "
+         "the move."),
+        ((5.0, 10.0), "The move to 5 mm must not be faster than 10 mm/s, but the slowest step that leads there has "
+         "20 mm/s: allow this speed, or store a slower step in the controller."),
         ((11.0, 10.0), "The target must lie between 0 and 10 mm, but is 11 mm: nothing was moved."),
         ((5.0, 500.0), "The speed must be at most 400 mm/s, but is 500 mm/s: nothing was moved."),
     ):  # fmt: skip
@@ -313,7 +314,7 @@ def test_a_recipe_that_the_steps_cannot_do_is_refused_before_anything_moves(
     recipe.write_text('schema = 1\nbelow_force_n = 2.0\n[[step]]\nkind = "move"\nto_mm = 0.7\nspeed_mm_s = 50.0\n')
     done = CliRunner().invoke(cli, ["bed", "run", str(recipe), "--bed", str(bed_toml), "--out", str(tmp_path / "run")])
     assert str(done.exception).startswith(
-        f"to_mm in line 5 of {recipe} cannot be executed: A step must lead to 0.7 mm, but "
+        f"to_mm in line 5 of {recipe} cannot be executed: A stored step must end at 0.7 mm, but "
     )
     assert controller.codes == []
     assert not (tmp_path / "run").exists()

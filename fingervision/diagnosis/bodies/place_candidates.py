@@ -195,7 +195,7 @@ def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Can
 
 
 def _by_length(prediction: BodyPrediction, one: Candidate, other: Candidate, sign: float) -> float:
-    """Change of the motion ratio, or of the right finger's share, per relative change of the lengths of both links."""
+    """Change of the motion ratio, or of the asymmetry, per relative change of the lengths of both links."""
     answers = prediction.answers
     if GAP not in answers.mechanism.pairs:
         return 0.0

@@ -42,7 +42,7 @@ class Fitted:
 
     @property
     def u_stated(self) -> float:
-        """Standard uncertainty of the size, including that of the explanation's form."""
+        """Standard uncertainty of the size, including the inexactness of the effect's formula."""
         return hypot(self.u, FORM_ERROR * self.size)
 
 

@@ -88,7 +88,7 @@ class PlaceSearch:
         return Fitted(candidate, size, norm**-0.5, max(gain, 0.0), signature)
 
     def _fit_play(self, candidate: Candidate) -> Fitted:
-        """Fit the size of a play by a scan, because the width of the play decides at which inputs it is crossed."""
+        """Fit the size of a play by a scan, because the inputs at which the play is taken up depend on its size."""
         left, found = self._left, []
         for play_mm in PLAYS_MM:
             unit = self.signature(candidate, float(play_mm)) / play_mm

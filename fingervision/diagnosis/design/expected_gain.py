@@ -131,8 +131,8 @@ def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generato
     """Draw the standard deviation of the runs' offsets for each channel; from its prior if there is only one run.
 
     The prior is zero in half of the draws, because the stage need not be re-zeroed before the run, and otherwise the
-    half-Cauchy prior with which a diagnosis of both runs judges the offsets (`RunOffsets.spread`). With several runs,
-    the spread is drawn from its posterior.
+    half-Cauchy prior that a diagnosis of both runs uses for the offsets (`RunOffsets.spread`). With several runs, the
+    spread is drawn from its posterior.
     """
     if problem.offsets.runs > 1:
         return problem.offsets.drawn_spread(problem.measured - problem.whitened(explanation.values), rng)

@@ -50,7 +50,7 @@ ALIKE = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSet:
-    """Explanations that the data cannot distinguish, with what is needed to compare them on a proposed run.
+    """Explanations that the data cannot distinguish, with the quantities needed to compare them on a proposed run.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class RunPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunChoice:
-    """Proposes runs that separate the explanations which a table leaves open."""
+    """Proposes runs that separate the explanations which the measured table cannot distinguish."""
 
     data: Observations
     problem: Problem
@@ -141,7 +141,7 @@ class RunChoice:
         return RunPlan(name, steps, times, inputs, gains, minutes)
 
     def settled(self, gains: Array, needed: float = NEEDED) -> float:
-        """Share of the pairs of explanations that given gains decide, weighted by each truth's probability."""
+        """Fraction of the pairs of explanations that given gains separate, weighted by each truth's probability."""
         part = np.where(np.isfinite(gains), np.minimum(gains / needed, 1.0), 0.0)
         odds = self.open.odds[: self.open.truths]
         return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))

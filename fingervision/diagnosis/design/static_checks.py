@@ -75,7 +75,7 @@ def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explana
 def _still(
     name: str, steps: list[Step], size: float, spread: float, pair: tuple[Explanation, Explanation]
 ) -> NextRun | None:
-    """Proposal of a check that gives one number with uncertainty `spread`, which the rival cannot reproduce."""
+    """Propose a check whose result differs by `size` between the two explanations and has the uncertainty `spread`."""
     gain = (size / spread) ** 2
     if gain <= WORTH:
         return None

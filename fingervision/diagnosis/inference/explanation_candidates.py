@@ -216,7 +216,7 @@ def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
 
 
 def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose one effect; prefer a simpler formula if the richer one gains no more than formulas are inexact.
+    """Choose one effect; prefer a simpler formula if a richer one gains no more than inexact formulas usually do.
 
     For example, a small gain is no reason to prefer a resonance to a delay by a fraction of a sample.
     """

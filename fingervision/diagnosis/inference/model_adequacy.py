@@ -197,7 +197,7 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
-    """Largest gain of a probe that errors of the recorded input at jumps alone can cause."""
+    """Largest gain that a probe can have merely because the recorded input is wrong at jumps."""
     most, basis = [], _Basis.of(problem, columns)
     for _ in range(FEWEST):
         shaken, target = noise_alone(problem, best, rng)

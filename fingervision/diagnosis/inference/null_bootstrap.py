@@ -61,11 +61,12 @@ def linear_thresholds(
     rng: np.random.Generator,
     among: Flags | None = None,
 ) -> dict[str, float]:
-    """Significance thresholds: gains that the best column of a family of shapes seldom exceeds in noise alone.
+    """Significance threshold of each effect: the gain that its best signature seldom exceeds in noise alone.
 
-    A family of many shapes gains more from noise than a single shape does; a threshold for all families together would
-    be that of the largest family. Therefore each family is compared with its own upper quantile, and the probability of
-    an excess in any family is limited: the families have equal shares of the false positives (Beran 1988).
+    The signatures of one effect, one for each starting value of its parameters, form a family. The best of many
+    signatures gains more from noise than a single signature does; a common threshold for all families would be that of
+    the largest family. Therefore each family is compared with its own upper quantile, and the probability of an excess
+    in any family is limited: all families contribute equally to the false positives (Beran 1988).
 
     Parameters
     ----------
@@ -188,12 +189,13 @@ def exceeds_noise(
     suspects: list[dict[str, Mapping[str, float]]],
     rng: np.random.Generator,
 ) -> bool:
-    """Whether a gain above the thresholds is also larger than the gain of one more effect in noise alone.
+    """Whether a gain above the thresholds is also larger than the largest gain that one more effect has in noise alone.
 
-    Linear signatures on a grid of shapes gain less from noise than refitted effects do, because a fit also finds the
-    best period between two grid values, or the best position of an end stop. Each draw is therefore fitted like the
-    measurement: with `base`, extended by the likeliest effects, and refitted. `suspects` are effects with parameters
-    that the measurement favours; they are tried on every draw.
+    The thresholds are computed with nonlinear parameters (such as a period, or the position of an end stop) on a grid.
+    A fit also finds values between the grid points, and therefore reduces chi-square further, even in noise. Each
+    simulated table is therefore fitted like the measurement: first with `base`, then with `base` and each of the most
+    promising effects. `suspects` are the effects, with parameters, that fit the measurement best; they are tried on
+    every simulated table.
     """
     owner = np.array(atoms.names)
     asking = np.array([thresholds.get(name, np.inf) for name in atoms.names])

@@ -33,7 +33,7 @@ JUMPS = 0.01
 
 @dataclass(frozen=True, slots=True)
 class _Coordinates:
-    """Coordinates of the sampler: reciprocals of corner radii and periods, logarithms of times, other parameters as is.
+    """Coordinates of the sampler: reciprocals of radii and periods, logarithms of times, other parameters unchanged.
 
     In these coordinates, a log likelihood with long, curved contours in the parameters is nearly parabolic.
     """

@@ -118,10 +118,11 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
 
 
 def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:
-    """Pairs that change the prediction by more than the recorded input's error.
+    """Keep pairs of effects that change the prediction by more than the recorded input's error.
 
-    If the best pair does not, it follows the roundings of an encoder; another pair must then gain beside it, because
-    it may follow the same roundings in a larger form.
+    If the best pair is not among them, its effects only follow the rounding errors of an encoder. Another pair may
+    follow the same rounding errors with a larger amplitude, and is kept only if its effects gain significantly when
+    they are added to the best pair.
     """
     shown = beyond_the_input(state.problem, state.singles[0], pairs)
     if not shown or shown[0] is pairs[0]:
@@ -218,8 +219,8 @@ def _findings(state: SearchState, forced: frozenset[str]) -> Findings:
 def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     """Choose the best explanation that contains every effect that the user requires.
 
-    The required effects are also added to the best explanation that was found without them: one that is hardly there
-    beside two others is in none of the explanations with two effects that fit.
+    The required effects are also added to the best explanation that was found without them, because an effect that is
+    small beside two others is in none of the pairs that fit.
     """
     problem = state.problem
     able = forced & set(problem.effects)

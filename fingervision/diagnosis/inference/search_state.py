@@ -30,7 +30,8 @@ SHORT = 100
 class Findings:
     """Result of a search; explanations in descending order of their score.
 
-    `nearest` is the likeliest of one or two effects, whether or not its second effect is large enough to be named.
+    `nearest` is the most probable explanation with one or two effects, whether or not its second effect is large enough
+    to be named.
     """
 
     best: Explanation
@@ -49,9 +50,10 @@ def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -
     """Whether the larger explanation removes nearly all of the smaller one's residual, as a true one does.
 
     The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
-    added fits part of that inexactness, however large the residual is. Other effects in its place depend less on it;
-    where these leave noise alone, only what formulas are typically off by speaks for the smaller one: a creep that
-    left 70 times the noise, 3.6 % of what it explained, had stood for a ratio and an offset that leave none.
+    added to the smaller explanation fits part of that inexactness, however large the residual is. If the larger
+    explanation has other effects instead, and leaves only noise, no more than the typical inexactness of formulas is
+    allowed for the smaller one. For example, a creep whose residual was 70 times the noise (3.6 % of what it explained)
+    imitated a ratio and an offset, which together leave only noise.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows

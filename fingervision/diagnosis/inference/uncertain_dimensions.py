@@ -26,7 +26,7 @@ BENT = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawingRefit:
-    """Change of the prediction by the drawing's uncertain dimensions.
+    """How the prediction changes if the drawing's uncertain dimensions change, in linear approximation.
 
     Parameters
     ----------

@@ -33,8 +33,8 @@ def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[Correct
         return model, None
     if table.time_s is None:
         raise DataError(
-            f"{model.base_path} is driven in time, but the measured table has no time_s: add it, or give a table of "
-            "static gaps as the model."
+            f"{model.base_path} computes the gap from the input over time, but the measured table has no column "
+            "time_s: add it, or give a table of static gaps as the model."
         )
     inputs = table.input_mm if table.path is None else table.path.input_mm
     static = model.base.at_rest(float(inputs.min()), float(inputs.max()))

@@ -32,7 +32,11 @@ def drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
 
 
 def without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Subtract a polynomial in time common to all groups from the repeats' residuals, and one for each of `shares`."""
+    """Subtract a polynomial in time, common to all groups, from the residuals of repeated readings.
+
+    For each array of `shares` (one factor for each row), a further polynomial multiplied by this factor is subtracted,
+    so that the trend may differ between positions or directions.
+    """
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     own_rows = np.concatenate(groups)

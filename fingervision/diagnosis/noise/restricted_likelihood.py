@@ -78,7 +78,7 @@ def noise_of_short_runs(
     The method is for runs with too few samples for a spectrum. If the noise of short runs were treated as white, every
     slow effect would seem significant. All channels come from the same pictures, so that they share one correlation:
     its posterior mean under a flat prior is used. Before an effect is found, the channel with the smallest correlation
-    determines it, because effects can only increase a correlation.
+    determines the common correlation, because effects can only increase a correlation.
 
     Parameters
     ----------

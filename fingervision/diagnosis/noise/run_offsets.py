@@ -50,9 +50,9 @@ class RunOffsets:
     _by_spread: list[tuple[Array, Array, Array]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Tabulate for each channel, over the spreads, what no residual changes.
+        """Tabulate, for each channel and each spread, the quantities that do not depend on the residual.
 
-        The runs' weights, how much of the squared mean of each run an offset takes, and the penalty.
+        These are the runs' weights, the part of each run's squared mean that an offset absorbs, and the penalty.
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)

@@ -49,7 +49,7 @@ class Whitener:
     _filter: tuple[Array, Array, float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Compute the filter's gains, which no column changes: every prediction of a search is whitened by them."""
+        """Compute the filter's gains once, because they are the same for every prediction of a search."""
         history = self.history
         n, clock = history.input_mm.size, history.time_s
         step = 1.0 if clock is None else max(history.sample_time_s, 1e-9)
@@ -69,7 +69,7 @@ class Whitener:
         object.__setattr__(self, "_filter", (gains, np.asarray(shares, dtype=np.float64), total))
 
     def _shares(self, channel: int) -> Array:
-        """Contribution (mm) of a lasting error of the input to each sample of a channel; shape (n,)."""
+        """Contribution (mm) of a constant error of the input to each sample of a channel; shape (n,)."""
         return np.asarray(self.input_mm if channel == 0 else np.zeros(self.input_mm.size), dtype=np.float64)
 
     def columns(self, columns: Array) -> tuple[Array, float]:

@@ -1,4 +1,4 @@
-"""Words on a stage that rests away from its command: the dead band of a servo."""
+"""Describe a stage that rests away from its commanded position: the dead band of a servo."""
 
 from itertools import pairwise
 

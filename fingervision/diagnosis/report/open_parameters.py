@@ -13,7 +13,7 @@ TAIL = 0.05
 
 
 def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Parameter]]:
-    """Find time constants and widths that the data do not bound above within their search range.
+    """Find time constants and widths for which the data give no upper limit within their search range.
 
     Beyond the upper end of the range the effect does not change: an exponential at its beginning is a straight line, of
     which only the slope is known. The posterior within the range would state time constant and amplitude with too small

@@ -48,7 +48,7 @@ def seen_of(view: View) -> Seen:
         No picture has arrived yet.
     """
     if view.seen is None:
-        raise StateError("There is no picture yet: wait for the source.")
+        raise StateError("No picture has arrived yet: wait until the source sends one.")
     return view.seen
 
 

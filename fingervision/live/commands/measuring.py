@@ -33,7 +33,7 @@ def _region(view: View, request: Request) -> Answer:
 def _tips(view: View, request: Request) -> Answer:
     tips = request.get("tips")
     if tips not in TIPS:
-        raise UsageError(f"The tips must be one of {', '.join(TIPS)}, but are {shown(tips)}.")
+        raise UsageError(f"The direction of the tips must be one of {', '.join(TIPS)}, but is {shown(tips)}.")
     view.choose(direction=None if tips == "auto" else Direction(tips))
     return Answer()
 
@@ -41,7 +41,9 @@ def _tips(view: View, request: Request) -> Answer:
 def _fingers(view: View, request: Request) -> Answer:
     fingers = request.get("fingers")
     if fingers not in POLARITIES:
-        raise UsageError(f"The fingers must be one of {', '.join(POLARITIES)}, but are {shown(fingers)}.")
+        raise UsageError(
+            f"The brightness of the fingers must be one of {', '.join(POLARITIES)}, but is {shown(fingers)}."
+        )
     view.choose(fingers_are_dark={"auto": None, "dark": True, "light": False}[str(fingers)])
     return Answer()
 

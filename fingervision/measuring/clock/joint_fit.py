@@ -117,8 +117,8 @@ def allowance_for_creep(motion: Motion, found: Fit) -> tuple[Array, Array]:
     """Change of offset, rate and play if creep is added to the model, and by how much their variances grow; shape (3,).
 
     Both are zero if creep is already included. In slow motion, creep too small to be detected acts as a delay equal to
-    (creep fraction x time constant), and can also be mistaken for play. The change is what the data say of it, the
-    growth is what they leave open within the creep's prior.
+    (creep fraction x time constant), and can also be mistaken for play. The change is that of the most probable creep;
+    the growth covers the creep that remains possible within its prior.
     """
     if motion.creeps:
         return np.zeros(3), np.zeros(3)

@@ -20,8 +20,8 @@ def inflation(motion: Motion, at: Alignment) -> Array:
     The fit's weights treat the log's errors as independent from frame to frame. Their true effect on the fit is
     computed here: another path that the log allows (`log_errors`) changes the prediction, and the fit passes a share of
     this change on to its parameters (sandwich estimator: White 1980, doi:10.2307/1912934). If the contributions of
-    stretches of the recording to the parameters scatter by more than this, their scatter is used, because something
-    else moves the gap as well.
+    stretches of the recording to the parameters scatter by more than this, their scatter is used, because the gap then
+    has causes of motion that the model lacks.
     """
     solved = solve(motion, at)
     free_play = at.play_mm > 10.0 * PLAY_STEP

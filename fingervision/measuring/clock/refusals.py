@@ -98,7 +98,7 @@ def explained(motion: Motion, found: Fit) -> float:
 
 
 def ambiguous(offsets_s: list[float]) -> NoClockOffset:
-    """Refuse a periodic motion, and list the offsets between which it does not decide."""
+    """Refuse a periodic motion, and list the offsets that fit equally well."""
     nearest = np.unique(np.round(offsets_s, 4))
     said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
     apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""

@@ -1,4 +1,4 @@
-"""Find other offsets that explain the frames which both offsets cover as well as the best offset does."""
+"""Find other clock offsets that fit as well as the best one, judged by the frames that both offsets cover."""
 
 from dataclasses import dataclass, replace
 
@@ -85,9 +85,9 @@ class RunnerUp:
 def unrefuted(
     motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float
 ) -> tuple[list[float], RunnerUp | None]:
-    """Offsets that explain the frames shared with the best offset as well as it does; the best of the others.
+    """Find offsets that fit the frames shared with the best offset as well as that one, and the best rejected offset.
 
-    An offset is only named as the next best if it explains enough of the gap to be taken, were it the only one.
+    A rejected offset is reported only if it would have been accepted in the absence of all others.
     """
     found: list[float] = []
     rejected: list[tuple[float, RunnerUp]] = []

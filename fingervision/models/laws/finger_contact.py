@@ -21,7 +21,7 @@ back."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Stop the fingers as the drawn body does, and add the corresponding force at the drive.
+    """Stop the fingers as computed for the body in the drawing, and add the corresponding force at the drive.
 
     The measuring point lies beside the contact point, so that even between rigid faces it continues to move by a
     fraction of the closing (`remaining_slope`). If the faces are soft, it moves further, and proportionally less force

@@ -11,7 +11,7 @@ EFFECT = "lever_ratio_error"
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change the link so that the ratio of the opening to the drawn one is the effect's parameter."""
+    """Multiply the opening by 1 + `ratio`, and the force by the factor for the same change of the lever length l2."""
     curves = drawn.lever
     if curves is None:
         return None

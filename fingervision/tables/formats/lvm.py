@@ -32,8 +32,8 @@ def read(path: Path, given: Entry) -> RawTable:
     ends = [at for at, line in enumerate(lines) if line.strip().startswith(END)]
     if len(ends) < 2:
         raise DataError(
-            f"{path} must have {END} below the file's header and below each segment's, but has it {len(ends)} times: "
-            "save it again."
+            f"{path} must have the line {END} after the file's header and after the header of each segment, but has "
+            f"this line {len(ends)} times: save it again."
         )
     separator = "," if any(line.startswith("Separator,") or line == "Separator\tComma" for line in lines[: ends[0]]) \
         else "\t"  # fmt: skip

@@ -44,9 +44,7 @@ def read(path: Path, given: Entry) -> RawTable:
     kept = tuple(column for column in columns if column is not None)
     passed = [table.schema.field(k).name for k, column in enumerate(columns) if column is None]
     if not kept or not len(kept[0]):
-        raise DataError(
-            f"{path} must have a numeric column with at least one row, but has no numeric column with at least one row."
-        )
+        raise DataError(f"{path} must have a numeric column with at least one row, but has none.")
     notes = (f"Passed over, being no columns of numbers or texts: {', '.join(passed)}.",) if passed else ()
     return RawTable(path, "Parquet", kept, notes=notes)
 

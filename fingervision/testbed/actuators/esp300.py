@@ -51,7 +51,7 @@ class Esp300Stage(LibraryAxis):
         units = self._asked(lambda: axis.units)
         if units != MILLIMETRE:
             raise DeviceError(
-                f"{self.name} must count in {MILLIMETRE}s, but counts in {units}: set it (1SN2) and home it."
+                f"The unit of {self.name} must be {MILLIMETRE}, but is {units}: set it (1SN2) and home the stage."
             )
         self._do(axis.enable)
 

@@ -256,6 +256,6 @@ def _wait_for_clock(board: Board, link: BoardLink, clock: Clock) -> None:
     while link.joined is None:
         if clock.now_s() > until_s:
             raise DeviceError(
-                f"{board.name} must send readable replies, but most of them are damaged: correct its cable."
+                f"{board.name} must send readable replies, but most of them are damaged: check its cable."
             )
         board.wait(ASK_EVERY_S)

@@ -59,14 +59,15 @@ def route(
         slowest = min(speed for _, speed, _ in found)
         raise LimitError(
             f"The move to {to_mm:g} mm must not be faster than {speed_mm_s:g} mm/s, but the slowest step that leads "
-            f"there goes at {slowest:.4g} mm/s: allow that, or give the controller a slower step."
+            f"there has {slowest:.4g} mm/s: allow this speed, or store a slower step in the controller."
         )
     targets = ", ".join(
         f"{each.target_mm:g}" for each in _moving(steps).values() if each.coordinates is Coordinates.ABSOLUTE
     )
     raise LimitError(
-        f"A step must lead to {to_mm:g} mm, but none does: the controller goes to {targets or 'no position'} mm, and "
-        f"by its relative steps from there. Store a step to {to_mm:g} mm in the controller, or change the move."
+        f"A stored step must end at {to_mm:g} mm, but none does: the absolute steps in the controller end at "
+        f"{targets or 'no position'} mm, and no relative step leads to {to_mm:g} mm. Store a step to "
+        f"{to_mm:g} mm in the controller, or change the move."
     )
 
 

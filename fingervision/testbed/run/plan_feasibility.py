@@ -25,9 +25,9 @@ def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: floa
             case Swing(mean, amplitude, frequency_hz):
                 if actuator.has_steps:
                     raise LimitError(
-                        f"kind in {leg.section.at('kind')} cannot be executed: A sine must be driven in short moves to "
-                        "anywhere on its way, but this actuator goes only where its step data lead. Use a triangle or "
-                        "a staircase between two of its steps. Nothing was moved."
+                        f"kind in {leg.section.at('kind')} cannot be executed: a sine consists of many short moves to "
+                        "intermediate positions, but this actuator can only move to the target positions of its step "
+                        "data. Use a triangle or a staircase between two of these positions. Nothing was moved."
                     )
                 to_mm, speed_mm_s = mean + amplitude, tau * frequency_hz * abs(amplitude)
             case Close(speed):

@@ -26,7 +26,7 @@ class OwnClock:
 
     @staticmethod
     def drawn(rng: np.random.Generator) -> "OwnClock":
-        """Choose an instrument's clock with random offset and rate."""
+        """Return a clock with random offset and rate."""
         began_s = rng.uniform(-BEGAN_WITHIN_S, 0.0)
         return OwnClock(float(began_s), float(1.0 + rng.uniform(-LARGEST_RATE_ERROR, LARGEST_RATE_ERROR)))
 

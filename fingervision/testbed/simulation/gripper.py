@@ -123,7 +123,7 @@ class SimulatedGripper:
         return Response(edges.left_mm[1:], edges.right_mm[1:])
 
     def _grid_s(self, time_s: float, since_s: float) -> Array:
-        """Times (s) at which to compute the stage's position for a requested time; none before the first motion."""
+        """Times (s) of a regular grid around `time_s`, at which the response is computed once and then interpolated."""
         until_s = time_s
         if since_s > time_s:
             since_s = time_s
