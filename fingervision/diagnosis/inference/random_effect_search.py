@@ -17,6 +17,7 @@ from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, li
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
+from fingervision.diagnosis.input.input_uncertainty import below_the_input
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
@@ -112,6 +113,9 @@ def beside_map(state: Searched, look: Look) -> Searched:
         beside = look.again(replace(beside.data, position_map=second), beside.found.best)
     if asked:
         return beside
+    if below_the_input(plain, float(np.sqrt(np.mean(second.fitted_mm**2)))):
+        # A stage that stops at its places again is rounded alike there by its encoder.
+        return state
     # Beside effects that explain the data, a map that takes none of their places is what their forms leave over.
     stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
     worse = found.unknown is None and beside.found.unknown is not None
