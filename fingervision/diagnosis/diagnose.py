@@ -128,7 +128,7 @@ def _explained(
     data, found = refitted.data, refitted.found
     if mistake is None and (found.unknown is not None or not found.best.names):
         mistake = swapped_directions(data, found.problem)
-    if mistake is None and found.unknown is None and found.best.names:
+    if mistake is None and found.unknown is None:
         mistake = mixed_rows(data, found.best, found.problem)
     if mistake is not None and mistake.blocks:
         data, found = without_names(data, found, mistake.words.rstrip("."))

@@ -3,9 +3,14 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
+from fingervision.diagnosis.inference.explanation_candidates import within_a_step
+from fingervision.diagnosis.inference.hypothesis import Explanation
+from fingervision.diagnosis.inference.searched import problem_of
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.report import Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
@@ -25,3 +30,27 @@ def test_an_offset_within_half_a_step_is_told_beside_the_play(tmp_path: Path) ->
     assert hidden == {"input_offset", "backlash"}
     assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
     assert hidden in [set(names) for names in report.alternatives]
+
+
+@pytest.mark.parametrize(("short_mm", "hidden"), [(0.02, True), (0.2, False)])
+def test_a_stop_within_a_step_of_the_end_is_rounding_beside_friction_too(
+    tmp_path: Path, short_mm: float, hidden: bool
+) -> None:
+    # The stage holds at its upper end; a friction goes on after the stop, far from the end of the range.
+    step_mm, width_mm = 0.03, 1.5
+    stroke = np.concatenate([np.linspace(0.0, width_mm, 60), np.full(20, width_mm)])
+    u = np.concatenate([stroke, stroke[::-1], stroke, stroke[::-1]])
+    recorded = step_mm * np.round((u - 0.011) / step_mm)
+    rows = "\n".join(f"{0.1 * k},{x:.6f},{4.0 + 3.0 * y:.6f}" for k, (x, y) in enumerate(zip(recorded, u, strict=True)))
+    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + rows + "\n")
+    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-1,1\n2.5,11.5\n")
+    data = prepare(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv"))
+    assert data.recorded.step_mm == pytest.approx(step_mm)
+    low, high = data.recorded.smooth_mm.min(), data.recorded.smooth_mm.max()
+    values = {
+        "end_stop": {"upper_mm": high - short_mm, "lower_mm": low - 1.0},
+        "friction_hysteresis": {"fraction": 0.9, "reach_mm": 0.05},
+    }
+    problem = problem_of(data, None)
+    found = Explanation(tuple(values), values, 0.0, problem.measured, np.zeros((4, 4)), 4, (0.0,))
+    assert within_a_step(problem, found) is hidden

@@ -25,6 +25,9 @@ sqrt(4) + SPARE."""
 OUT_OF_REACH = (400.0, 200.0)
 """Squared distance from the best explanation, and chi-square above it, from which no refit is tried: 20 standard
 deviations away, and farther behind than any refit has gained (`INDISTINGUISHABLE` and `ADMISSIBLE` times ten)."""
+STRONG = 6.0
+"""Difference in chi-square below which the odds of two explanations with equally many effects are less than 20 to 1,
+which is no strong evidence (2 ln 20; Kass & Raftery 1995, doi:10.1080/01621459.1995.10476572)."""
 IDLE_SHARE = 0.3
 """Share of the best explanation's gain below which another explanation counts as explaining nothing."""
 PLAIN = 50.0
@@ -60,7 +63,8 @@ def ambiguity_set(
         worse = other.score - best.score
         # If the best is true, it leads by this distance; where it leads by far less, its form is not the truth's
         # either, and what explains the data nearly as well with no more effects is no worse an answer.
-        contested = worse < min(admissible, -_least_refuted(distance)) and len(other.names) <= len(best.names)
+        most = max(STRONG, min(admissible, -_least_refuted(distance)))
+        contested = worse < most and len(other.names) <= len(best.names)
         if distance >= INDISTINGUISHABLE and worse < admissible:
             distance = min(distance, _imitation(problem, other, best, best.sigma_mm).score)
         distances[other.names] = distance

@@ -176,7 +176,10 @@ def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> 
 
 
 def within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether one of the effects acts like rounding: by less than an encoder step, on few rows or at stroke ends."""
+    """Whether one of the effects acts like rounding: by less than an encoder step, on few rows or at stroke ends.
+
+    Each effect is judged alone: what an effect with memory makes of a few rows beside another goes on after them.
+    """
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
@@ -185,10 +188,9 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
     step_mm = STEPS_HIDDEN * float(np.max(np.abs(high - low)))
     from_end = np.minimum(history.input_mm - history.input_mm.min(), history.input_mm.max() - history.input_mm)
     at_ends = np.tile(from_end < STEPS_HIDDEN * history.input_step_mm, low.size // from_end.size)
-    whole = problem.chain.stacked(explanation.values)
+    bare = problem.chain.stacked({})
     for name in explanation.names:
-        others = {other: values for other, values in explanation.values.items() if other != name}
-        change = np.abs(whole - problem.chain.stacked(others))
+        change = np.abs(problem.chain.stacked({name: explanation.values[name]}) - bare)
         largest = float(np.max(change))
         acts = change > 0.1 * largest
         if largest < step_mm and (float(np.mean(acts)) < FEW_ROWS or not np.any(acts & ~at_ends)):

@@ -145,9 +145,14 @@ def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation
     bent = _beside(problem.offsets.design, metric, whitened)
     size = np.linalg.pinv(whitened.T @ bent) @ (bent.T @ base.residual)
     differs = problem.chain.stacked(base.values) + moves @ size - problem.chain.stacked(found.values)
-    gap = differs[: history.input_mm.size]
-    apart = np.concatenate([gap[run] - gap[run].mean() for run in history.runs])
-    return below_the_input(problem, float(np.sqrt(np.mean(apart**2))))
+    return below_the_input(problem, _size_in_runs(problem, differs[: history.input_mm.size]))
+
+
+def _size_in_runs(problem: Problem, change: Array) -> float:
+    """RMS of a change of the stacked channels, shape (m,), about its mean in every run (mm): a mean is an offset."""
+    channels = np.split(change, change.size // problem.chain.history.input_mm.size)
+    apart = [part[run] - part[run].mean() for part in channels for run in problem.chain.history.runs]
+    return float(np.sqrt(np.mean(np.concatenate(apart) ** 2)))
 
 
 def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
@@ -222,8 +227,8 @@ def remaining_structure(
     if gain[top] <= threshold:
         return None, own.words if own.gain > threshold else None
     words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
-    size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
-    if below_the_input(problem, size_mm):
+    coefficient = float(dot[top]) / float(norm[top])
+    if below_the_input(problem, _size_in_runs(problem, coefficient * shapes.before_whitening(top))):
         return None, words
     # A small part of what is explained: the form of an effect, or of a map between its nodes, is no truer than that.
     if gain[top] < problem.form_share**2 * (_explained(problem, best) + problem.mapped):

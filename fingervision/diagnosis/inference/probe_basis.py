@@ -21,8 +21,6 @@ class Probes:
         Descriptions.
     columns : ndarray of float, shape (m, k)
         Whitened shapes.
-    rms : ndarray of float, shape (k,)
-        RMS of each shape before whitening.
     bare : ndarray of float, shape (n, b)
         The different shapes before whitening; column i of `columns` has shape i modulo b.
     shares : ndarray of float, shape (k / b, channels)
@@ -31,7 +29,6 @@ class Probes:
 
     words: tuple[str, ...]
     columns: Array
-    rms: Array
     bare: Array
     shares: Array
 
@@ -135,5 +132,4 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         rows = columns[channel * n : (channel + 1) * n]
         for k, share in enumerate(shares[:, channel]):
             np.multiply(whitened, share, out=rows[:, k * count : (k + 1) * count])
-    power = np.outer(np.sum(shares**2, axis=1) / shares.shape[1], np.mean(bare**2, axis=0))
-    return Probes(words, columns, np.sqrt(power.ravel()), bare, shares)
+    return Probes(words, columns, bare, shares)

@@ -17,6 +17,7 @@ from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, li
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
+from fingervision.diagnosis.input.input_uncertainty import below_the_input
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
@@ -112,10 +113,22 @@ def beside_map(state: Searched, look: Look) -> Searched:
         beside = look.again(replace(beside.data, position_map=second), beside.found.best)
     if asked:
         return beside
+    if below_the_input(plain, float(np.sqrt(np.mean(second.fitted_mm**2)))):
+        # A stage that returns to its places is rounded alike there by its encoder, which is no effect.
+        said = _words_on_roundings(second, plain)
+        return look.again(replace(state.data, roundings=second, notes=(*state.data.notes, said)), beside.found.best)
     # Beside effects that explain the data, a map that takes none of their places is what their forms leave over.
     stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
     worse = found.unknown is None and beside.found.unknown is not None
     return beside if not (stays or worse) and _gained(state, beside, second) > LEAST_GAIN else state
+
+
+def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
+    rms_um, sigma_um = 1e3 * repeated.rms_mm.value, 1e3 * problem.chain.history.input_sigma_mm
+    return (
+        f"the recorded input errs alike by {rms_um:.2g} um RMS whenever it comes to the same places: as this is less "
+        f"than its own standard uncertainty, {sigma_um:.2g} um, it is no {NAME}."
+    )
 
 
 def _likelier(

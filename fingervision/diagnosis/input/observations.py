@@ -70,6 +70,8 @@ class Observations:
         Change of the prediction by the uncertain offset between the clocks of input and pictures.
     function : FunctionModel or None
         Dynamic model, of which `model` is the static response.
+    roundings : PositionMap or None
+        Errors of the recorded input that repeat at its places because an encoder rounds them alike.
     """
 
     table: MeasuredTable
@@ -85,6 +87,7 @@ class Observations:
     repeats: NDArray[np.intp] | None = None
     position_map: PositionMap | None = None
     run_gains: RunGains | None = None
+    roundings: PositionMap | None = None
     runs_scatter_mm: float = np.inf
     clock: Array | None = None
     function: FunctionModel | None = None
@@ -103,7 +106,7 @@ class Observations:
     @property
     def random_effects_mm(self) -> tuple[tuple[object, Array], ...]:
         """Random effects added to every explanation, each with its columns, in the order used by a problem."""
-        own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains) if one is not None]
+        own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains, self.roundings) if one]
         clock = [] if self.clock is None or not self.clock.shape[1] else [("clock", self.clock)]
         drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
         return (*own, *clock, *drawing)
@@ -122,9 +125,8 @@ class Observations:
     def problem(self, residual_mm: Array, degrees: int, *, explained: bool) -> Problem:
         """Estimate outliers and noise from a residual, and whiten the measurement with them."""
         history = self.chain.history
-        for nuisance in (self.position_map, self.run_gains):
-            if nuisance is not None:
-                residual_mm = residual_mm - nuisance.fitted_mm
+        for nuisance in (self.position_map, self.run_gains, self.roundings):
+            residual_mm = residual_mm if nuisance is None else residual_mm - nuisance.fitted_mm
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
         # A reading is known to its last digit at best: rounding has the standard deviation of a step over root 12.
@@ -225,9 +227,7 @@ class Observations:
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
         """Whether a prediction linearised at other dimensions agrees with this prediction within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
-        bent -= drawn.refit.columns @ (
-            np.array(list(self.refit.moved.values())) - np.array(list(drawn.refit.moved.values()))
-        )
+        bent -= drawn.refit.columns @ np.subtract([*self.refit.moved.values()], [*drawn.refit.moved.values()])
         missed = problem.whitener.one(bent)
         return float(missed @ missed) < BENT
 

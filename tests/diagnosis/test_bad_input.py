@@ -1,0 +1,108 @@
+"""Tables that a careful metrologist would not trust: no confident name that is not the truth, and a sentence if due."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.diagnose import diagnose
+from fingervision.domain.errors import DataError
+from fingervision.domain.report import DiagnosisReport, Verdict
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+
+PLAY_MM, NOISE_MM, GAP_MM = 0.04, 0.002, 3.0
+TARGETS = np.linspace(0.0, 2.0, 9)
+Columns = dict[str, np.ndarray]
+EVERY_S = 20.0
+CONSTANTS = {"rest_gap_error", "input_offset", "edge_bias"}
+
+
+def stage(directions: str, cycles: int, play_mm: float = PLAY_MM, offset_mm: float = 0.0) -> Columns:
+    """Readings at rest of a stage with play: the gap is 3 mm plus the place; `+` and `-` are its directions."""
+    rng = np.random.default_rng(11)
+    strokes = [(TARGETS if way == "+" else TARGETS[::-1], 1.0 if way == "+" else -1.0) for way in directions] * cycles
+    u = np.concatenate([targets for targets, _ in strokes])
+    place = np.concatenate([targets - 0.5 * way * play_mm for targets, way in strokes])
+    gap = GAP_MM + offset_mm + place + NOISE_MM * rng.standard_normal(u.size)
+    return {"time_s": EVERY_S * np.arange(u.size), "input_mm": u, "gap_mm": gap}
+
+
+def asked(folder: Path, table: Columns, slope: float = 1.0, scale: float = 1.0) -> DiagnosisReport:
+    """Diagnose a table against the model 3 mm plus the input, mirrored by a slope of -1, or in another unit."""
+    rows = "\n".join(",".join(f"{value:.6f}" for value in row) for row in zip(*table.values(), strict=True))
+    (folder / "measured.csv").write_text(",".join(table) + "\n" + rows + "\n")
+    ends = "\n".join(f"{u},{scale * (GAP_MM + slope * u)}" for u in (-0.5, 2.5))
+    (folder / "sim.csv").write_text("input_mm,gap_mm\n" + ends + "\n")
+    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv")).report
+
+
+def singles(report: DiagnosisReport) -> set[str]:
+    """The names in a set of single effects."""
+    assert all(len(names) == 1 for names in report.alternatives)
+    return {name for names in report.alternatives for name in names}
+
+
+@pytest.mark.parametrize("cycles", [5, 1], ids=["one direction", "one visit"])
+def test_play_seen_from_one_side_is_one_of_several_constants(tmp_path: Path, cycles: int) -> None:
+    report = asked(tmp_path, stage("+", cycles))
+    assert report.verdict is Verdict.AMBIGUOUS
+    assert singles(report) >= CONSTANTS
+    if cycles == 1:
+        assert "backlash" in singles(report)
+    shift = next(e for e in report.effects if e.name in CONSTANTS).parameters["offset_mm"]
+    assert shift.value == pytest.approx(-PLAY_MM / 2, abs=4 * NOISE_MM / np.sqrt(cycles * TARGETS.size))
+    assert any("cannot be distinguished from an offset" in note for note in report.notes)
+
+
+def test_nothing_hidden_and_one_visit_of_each_place_agrees(tmp_path: Path) -> None:
+    report = asked(tmp_path, stage("+", 1, play_mm=0.0))
+    assert report.verdict is Verdict.AGREES
+    assert report.pure_error_mm is None
+
+
+def test_times_in_whole_seconds_that_repeat_are_refused_and_others_are_used(tmp_path: Path) -> None:
+    table = stage("+-", 3)
+    step = table["time_s"] / EVERY_S
+    with pytest.raises(DataError, match="write the times with more digits"):
+        asked(tmp_path, table | {"time_s": np.floor(0.4 * step)})
+    report = asked(tmp_path, table | {"time_s": np.floor(1.3 * step)})
+    assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    assert "backlash" in singles(report)
+
+
+def test_times_that_are_all_equal_are_refused(tmp_path: Path) -> None:
+    table = stage("+-", 3)
+    with pytest.raises(DataError, match="time_s must be unique within a run, but 7 s stands in every row"):
+        asked(tmp_path, table | {"time_s": np.full(table["time_s"].size, 7.0)})
+
+
+def test_a_model_of_reversed_sign_is_said_and_nothing_is_named(tmp_path: Path) -> None:
+    report = asked(tmp_path, stage("+-", 2), slope=-1.0)
+    assert report.verdict is Verdict.UNKNOWN
+    assert report.effects == ()
+    assert "is mirrored" in (report.unknown or "")
+
+
+@pytest.mark.parametrize("scale", [1e3, 1e-3])
+def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, scale: float) -> None:
+    report = asked(tmp_path, stage("+-", 2, play_mm=0.0), scale=scale)
+    assert report.verdict is Verdict.UNKNOWN
+    assert report.effects == ()
+    said = re.search(r"moves (\S+) times as far as the model says: check the units", report.unknown or "")
+    assert said is not None
+    assert float(said.group(1)) == pytest.approx(1.0 / scale, rel=0.01)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+@pytest.mark.parametrize("offset_mm", [0.0, 0.5])
+def test_two_thirds_of_wrong_rows_are_no_noise(tmp_path: Path, offset_mm: float, timed: bool) -> None:
+    rng = np.random.default_rng(3)
+    table = stage("+-", 4, play_mm=0.0, offset_mm=offset_mm)
+    wrong = rng.random(table["gap_mm"].size) < 2.0 / 3.0
+    table["gap_mm"] = table["gap_mm"] + np.where(wrong, 0.3 * rng.standard_normal(wrong.size), 0.0)
+    report = asked(tmp_path, table if timed else {name: table[name] for name in ("input_mm", "gap_mm")})
+    assert report.verdict is Verdict.UNKNOWN
+    assert report.effects == ()
+    assert "the rows are no one measurement with one noise" in (report.unknown or "")
