@@ -24,9 +24,9 @@ from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE
 Floats = NDArray[np.float64]
 
 # Standard deviations (pixels, in steps of a fifth: as well as some thirty waves tell it) and lengths (pixels along the
-# edge) that are tried. Blur of 1 px makes whatever lies along an edge alike over 2 sqrt(pi) px, which is the integral of
-# the correlation for a length of 1.5: shorter ones look like white noise where points lie far apart, and would give that
-# too much weight. Longer waves than the longest are the finger's shape.
+# edge) that are tried. Blur of 1 px makes whatever lies along an edge alike over 2 sqrt(pi) px, which is the integral
+# of the correlation for a length of 1.5: shorter ones look like white noise where points lie far apart, and would give
+# that too much weight. Longer waves than the longest are the finger's shape.
 DEVIATIONS_PX = np.geomspace(0.03, 0.9, 18)
 LENGTHS_PX = np.array([1.5, 2.3, 3.5, 5.3, 8.0, 12.0])
 # Each flank has its own level, slope and curvature. It needs so many points, and of more than so many every second one

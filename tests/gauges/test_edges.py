@@ -20,7 +20,6 @@ def _edge(direction_deg: float, **more: object) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 @pytest.mark.parametrize("blur_px", [0.5, 0.9, 2.5])
 def test_edges_are_unbiased_and_as_sure_as_they_say(tmp_path: Path, blur_px: float) -> None:
     rng = np.random.default_rng(5)
@@ -64,7 +63,6 @@ def test_line_angles_reach_their_bound(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 @pytest.mark.parametrize(("width_px", "level"), [(30.0, 160.0), (9.0, 160.0), (5.0, 20.0)])
 def test_pairs_near_and_far(tmp_path: Path, width_px: float, level: float) -> None:
     rng = np.random.default_rng(7)

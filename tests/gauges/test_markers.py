@@ -23,7 +23,6 @@ def _thing(shape: str, x: float, y: float, turn: float) -> object:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 @pytest.mark.parametrize("shape", ["dot", "cross", "corner"])
 def test_the_middle_is_true_and_as_sure_as_it_says(tmp_path: Path, shape: str) -> None:
     rng = np.random.default_rng(41)

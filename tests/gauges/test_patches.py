@@ -21,7 +21,6 @@ def _numbers(reading: object) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_shift_and_rotation_are_true_and_as_sure_as_they_say(tmp_path: Path) -> None:
     rng = np.random.default_rng(21)
     errors, u = [], []
