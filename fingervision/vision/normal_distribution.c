@@ -14,6 +14,15 @@ PREPARE(normal_table) {
     }
 }
 
+/* Integral and density at a distance h from the table's entry at a, where they are `whole` and `own`. */
+static inline void series(double a, double h, double own, double whole, double *integral, double *density) {
+    /* Derivatives of the density over the density: Hermite's polynomials, each from the two before it. */
+    double d1 = -a, d2 = -a * d1 - 1.0, d3 = -a * d2 - 2.0 * d1, d4 = -a * d3 - 3.0 * d2, d5 = -a * d4 - 4.0 * d3;
+    double d6 = -a * d5 - 5.0 * d4;
+    *density = own * (1.0 + h * (d1 + h / 2.0 * (d2 + h / 3.0 * (d3 + h / 4.0 * (d4 + h / 5.0 * (d5 + h / 6.0 * d6))))));
+    *integral = whole + own * h * (1.0 + h / 2.0 * (d1 + h / 3.0 * (d2 + h / 4.0 * (d3 + h / 5.0 * (d4 + h / 6.0 * d5)))));
+}
+
 /* Integral up to z, and density there. Beyond nine sigma both are what they are to 1e-18: zero, or one. */
 static inline double normal(double z, double *density) {
     if (!(fabs(z) < TABLE_SIGMAS - 0.5)) {
@@ -21,12 +30,31 @@ static inline double normal(double z, double *density) {
         return z > 0.0 ? 1.0 : 0.0;
     }
     int k = (int)(z * STEPS_IN_SIGMA + (TABLE_SIGMAS * STEPS_IN_SIGMA + 0.5));
-    double a = (double)k / STEPS_IN_SIGMA - TABLE_SIGMAS, h = z - a, own = DENSITY[k];
-    /* Derivatives of the density over the density: Hermite's polynomials, each from the two before it. */
-    double d1 = -a, d2 = -a * d1 - 1.0, d3 = -a * d2 - 2.0 * d1, d4 = -a * d3 - 3.0 * d2, d5 = -a * d4 - 4.0 * d3;
-    double d6 = -a * d5 - 5.0 * d4;
-    *density = own * (1.0 + h * (d1 + h / 2.0 * (d2 + h / 3.0 * (d3 + h / 4.0 * (d4 + h / 5.0 * (d5 + h / 6.0 * d6))))));
-    return INTEGRAL[k] + own * h * (1.0 + h / 2.0 * (d1 + h / 3.0 * (d2 + h / 4.0 * (d3 + h / 5.0 * (d4 + h / 6.0 * d5)))));
+    double a = (double)k / STEPS_IN_SIGMA - TABLE_SIGMAS, integral;
+    series(a, z - a, DENSITY[k], INTEGRAL[k], &integral, density);
+    return integral;
+}
+
+/* The same at many places at once, which may be those where the results go: the same digits, but the series of several
+   places are summed side by side. */
+static void normal_at_all(const double *z, int64_t n, double *integral, double *density) {
+    enum { AT_ONCE = 64 };
+    double a[AT_ONCE], h[AT_ONCE], own[AT_ONCE], whole[AT_ONCE], sum[AT_ONCE], slope[AT_ONCE];
+    for (int64_t first = 0; first < n; first += AT_ONCE) {
+        int64_t count = smaller_int(n - first, AT_ONCE);
+        for (int64_t j = 0; j < count; j++) {
+            double at = z[first + j];
+            int is_far = !(fabs(at) < TABLE_SIGMAS - 0.5);
+            int k = is_far ? 0 : (int)(at * STEPS_IN_SIGMA + (TABLE_SIGMAS * STEPS_IN_SIGMA + 0.5));
+            a[j] = (double)k / STEPS_IN_SIGMA - TABLE_SIGMAS;
+            h[j] = is_far ? 0.0 : at - a[j];
+            own[j] = is_far ? 0.0 : DENSITY[k];
+            whole[j] = is_far ? at > 0.0 : INTEGRAL[k];
+        }
+        for (int64_t j = 0; j < count; j++) series(a[j], h[j], own[j], whole[j], &sum[j], &slope[j]);
+        memcpy(integral + first, sum, (size_t)count * sizeof(double));
+        memcpy(density + first, slope, (size_t)count * sizeof(double));
+    }
 }
 
 LOOP(normal_distribution_normal, "d", "dd") { out[0].d = normal(in[0].d, &out[1].d); }

@@ -1,28 +1,28 @@
 /* after linear_solve */
 /* after normal_distribution */
-/* The part beside the step, blurred, at a distance from the edge outwards; the step there, and its density. */
-static double beside(int64_t kind, double t, double blur, double breadth, double step, double density) {
-    double far_density, far;
-    if (kind == WALL) /* what lies between the first step and the second */
-        return step - normal((t - breadth) / blur, &far_density);
-    if (kind == SHADOW) { /* falls from one at the edge to nothing at its breadth */
-        far = normal((t - breadth) / blur, &far_density);
+/* Where the second edge of the part beside the step is felt (in blurs), at a distance from the edge outwards. */
+static inline double second_place(int64_t kind, double t, double blur, double breadth) {
+    if (kind == GLARE) return (t + breadth) / blur;
+    return kind == FADING ? t / blur - blur / breadth : (t - breadth) / blur;
+}
+
+/* The part beside the step, blurred: the step and its density there, and the same of the second edge. */
+static inline double beside(
+    int64_t kind, double t, double blur, double breadth, double step, double density, double far, double far_density
+) {
+    if (kind == WALL) return step - far; /* what lies between the first step and the second */
+    if (kind == SHADOW) /* falls from one at the edge to nothing at its breadth */
         return (1.0 - t / breadth) * (step - far) + blur / breadth * (far_density - density);
-    }
-    if (kind == GLARE) {
-        normal((t + breadth) / blur, &far_density);
-        return far_density;
-    }
-    if (kind == FADING) { /* falls from one at the edge as exp(-t / breadth) */
-        double ratio = blur / breadth;
-        return exp(0.5 * square(ratio) - t / breadth) * normal(t / blur - ratio, &far_density);
-    }
+    if (kind == GLARE) return far_density;
+    /* falls from one at the edge as exp(-t / breadth) */
+    if (kind == FADING) return exp(0.5 * square(blur / breadth) - t / breadth) * far;
     return 0.0;
 }
 
 static double addition(int64_t kind, double t, double blur, double breadth) {
-    double density, step = normal(t / blur, &density);
-    return beside(kind, t, blur, breadth, step, density);
+    double density, far_density, step = normal(t / blur, &density);
+    double far = normal(second_place(kind, t, blur, breadth), &far_density);
+    return beside(kind, t, blur, breadth, step, density, far, far_density);
 }
 
 typedef struct {
@@ -30,32 +30,40 @@ typedef struct {
     const double *t, *value, *weight;
 } Seen;
 
-/* The model's parts at every place, and the sums of their products that do not know the breadth. */
+/* The model's parts at every place (`unused`: room for densities that no part has), and the sums of their products that do not know the breadth. */
 typedef struct {
-    double *step, *density, *tail, *addition, *model;
+    double *step, *density, *tail, *addition, *model, *unused;
     double gram[LINEAR * LINEAR], right[LINEAR];
 } Parts;
 
 /* Room for the parts of `n` places: PARTS times as many numbers. */
-enum { PARTS = 5 };
+enum { PARTS = 6 };
 static Parts parts_in(double *room, int64_t n) {
-    Parts parts = {room, room + n, room + 2 * n, room + 3 * n, room + 4 * n, {0.0}, {0.0}};
+    Parts parts = {room, room + n, room + 2 * n, room + 3 * n, room + 4 * n, room + 5 * n, {0.0}, {0.0}};
     return parts;
 }
 
 /* The step, its density, and the tail: they do not know the breadth of what stands beside them. */
 static void put_steps(const Seen *s, const double *p, Parts *to) {
-    double blur = p[BLUR], other;
+    double blur = p[BLUR];
     for (int64_t i = 0; i < s->n; i++) {
-        double away = s->t[i] - p[POSITION], step = normal(away / blur, &to->density[i]);
-        to->step[i] = step;
-        to->tail[i] = normal(away / (TAIL_BLURS * blur), &other) - step;
+        double away = s->t[i] - p[POSITION];
+        to->step[i] = away / blur;
+        to->tail[i] = away / (TAIL_BLURS * blur);
     }
+    normal_at_all(to->step, s->n, to->step, to->density);
+    normal_at_all(to->tail, s->n, to->tail, to->unused);
+    for (int64_t i = 0; i < s->n; i++) to->tail[i] -= to->step[i];
 }
 
 static inline void put_additions_of(int64_t kind, const Seen *s, const double *p, const Parts *steps, double *addition) {
+    double *far_density = steps->unused;
+    for (int64_t i = 0; i < s->n; i++) addition[i] = second_place(kind, s->t[i] - p[POSITION], p[BLUR], p[BREADTH]);
+    normal_at_all(addition, s->n, addition, far_density);
     for (int64_t i = 0; i < s->n; i++)
-        addition[i] = beside(kind, s->t[i] - p[POSITION], p[BLUR], p[BREADTH], steps->step[i], steps->density[i]);
+        addition[i] = beside(
+            kind, s->t[i] - p[POSITION], p[BLUR], p[BREADTH], steps->step[i], steps->density[i], addition[i], far_density[i]
+        );
 }
 
 /* The addition, with a loop for every kind that the compiler need not ask in. */

@@ -3,19 +3,20 @@
    slope, sigma; mean (pixels). Gives the rows that count, their mean square residual, mean offset and mean contrast. */
 LOOP(shared_profile_mean, "FFFFFdf", "iddd") {
     int64_t rows = in[0].shape[0], pixels = in[0].shape[1], used = 0;
-    double sigma = in[5].d, total = 0.0, offsets = 0.0, contrasts = 0.0, *mean = FLOATS(6), *own = floats(pixels);
+    double sigma = in[5].d, total = 0.0, offsets = 0.0, contrasts = 0.0, *mean = FLOATS(6);
+    double *own = floats(4 * pixels + 3), *border = own + pixels, *share = border + pixels + 1, *density = share + pixels + 1;
     memset(mean, 0, (size_t)pixels * sizeof(double));
     for (int64_t i = 0; i < rows; i++) {
         if (!(FLOATS(3)[i] > 0.0) || fabs(FLOATS(4)[i]) > STEEPEST) continue;
         const double *level = FLOATS(0) + i * pixels;
-        double density, border = -0.5 * (double)pixels - FLOATS(1)[i], share = normal(border / sigma, &density);
-        double before = border * share + sigma * density, of_levels = 0.0, of_steps = 0.0;
+        double of_levels = 0.0, of_steps = 0.0;
+        border[0] = -0.5 * (double)pixels - FLOATS(1)[i];
+        for (int64_t j = 0; j < pixels; j++) border[j + 1] = border[j] + 1.0;
+        for (int64_t j = 0; j <= pixels; j++) share[j] = border[j] / sigma;
+        normal_at_all(share, pixels + 1, share, density);
+        for (int64_t j = 0; j <= pixels; j++) share[j] = border[j] * share[j] + sigma * density[j]; /* the integral there */
         for (int64_t j = 0; j < pixels; j++) {
-            border += 1.0;
-            share = normal(border / sigma, &density);
-            double after = border * share + sigma * density;
-            own[j] = after - before;
-            before = after;
+            own[j] = share[j + 1] - share[j];
             of_steps += own[j];
             of_levels += level[j];
         }

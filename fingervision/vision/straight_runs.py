@@ -5,10 +5,10 @@ with total least squares as the cost of a run, computed from the chain's cumulat
 all runs at the cost of a penalty.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
+
+from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -23,17 +23,8 @@ PRICE_OF_POINT = 6.0
 MEDIAN_OF_CHI_SQUARE = 0.79
 
 
-class _Moments(NamedTuple):
-    """Cumulative sums of weights, positions and their products, shape (n + 1, 6), and the origin of the positions."""
-
-    sums: Floats
-
-    def squares(self, first: Ints, last: Ints) -> Floats:
-        """Smallest sum of squared distances from a straight line, for the points `first` to `last` (exclusive)."""
-        w, x, y, xx, xy, yy = (self.sums[last] - self.sums[first]).T
-        weight = np.maximum(w, 1e-300)
-        xx, xy, yy = xx - x * x / weight, xy - x * y / weight, yy - y * y / weight
-        return np.asarray(np.maximum(0.5 * (xx + yy - np.hypot(xx - yy, 2.0 * xy)), 0.0))
+_squares, _windows = loop("straight_runs_squares"), loop("straight_runs_windows")
+_cheapest = loop("straight_runs_cheapest")
 
 
 def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
@@ -56,21 +47,14 @@ def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
         return []
     w, x0, y0 = u**-2.0, x - x.mean(), y - y.mean()
     terms = np.column_stack((w, w * x0, w * y0, w * x0 * x0, w * x0 * y0, w * y0 * y0))
-    moments = _Moments(np.vstack((np.zeros(6), np.cumsum(terms, axis=0))))
-    starts = np.arange(n - FEWEST_POINTS + 1)
-    chi_square = moments.squares(starts, starts + FEWEST_POINTS) / (FEWEST_POINTS - 2)
+    sums = np.vstack((np.zeros(6), np.cumsum(terms, axis=0)))
+    squares = np.empty(n - FEWEST_POINTS + 1)
+    _windows(sums, squares)
+    chi_square = squares / (FEWEST_POINTS - 2)
     noise = max(float(np.median(chi_square)) / MEDIAN_OF_CHI_SQUARE, 1e-12)
-    # The cheapest way to explain the first k points: all told, and what its last run is (None: a point left out).
-    cost, last_run = np.zeros(n + 1), [-1] * (n + 1)
-    for k in range(1, n + 1):
-        cost[k] = cost[k - 1] + PRICE_OF_POINT
-        if k < FEWEST_POINTS:
-            continue
-        first = np.arange(k - FEWEST_POINTS + 1)
-        by_run = cost[first] + moments.squares(first, np.full(first.size, k)) / noise + PRICE_OF_RUN
-        best = int(by_run.argmin())
-        if by_run[best] < cost[k]:
-            cost[k], last_run[k] = by_run[best], best
+    starts = np.empty(n + 1, dtype=np.int64)
+    _cheapest(sums, noise, starts)
+    last_run = starts.tolist()
     runs, k = [], n
     while k > 0:
         if last_run[k] < 0:
@@ -87,14 +71,9 @@ def _joined(runs: list[Ints], terms: Floats, noise: float) -> list[Ints]:
     for run in runs:
         if joined:
             both = np.concatenate((joined[-1], run))
-            apart = _squares(terms[joined[-1]]) + _squares(terms[run])
-            if _squares(terms[both]) - apart < PRICE_OF_RUN * noise:
+            whole, first, second = (_squares(terms[points].sum(axis=0)) for points in (both, joined[-1], run))
+            if whole - (first + second) < PRICE_OF_RUN * noise:
                 joined[-1] = both
                 continue
         joined.append(run)
     return joined
-
-
-def _squares(terms: Floats) -> float:
-    moments = _Moments(np.vstack((np.zeros(6), terms.sum(axis=0))))
-    return float(moments.squares(np.array([0]), np.array([1]))[0])

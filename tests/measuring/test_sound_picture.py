@@ -69,6 +69,23 @@ def test_a_wrong_wave_in_a_square_has_its_corners_and_a_moved_edge_none() -> Non
     assert foreign_corners(before, wave, 13.0) == 0  # the square is gone: this picture is the sound one
 
 
+@pytest.mark.parametrize("is_turned", [False, True])
+@pytest.mark.parametrize("levels", [np.uint8, np.uint16])
+def test_stored_levels_have_the_corners_of_the_same_levels_as_floats(levels: type, is_turned: bool) -> None:
+    rng = np.random.default_rng(7)
+    before = picture(50.0).astype(levels)
+    now = picture(50.0, 1).astype(levels)
+    for _ in range(12):
+        row, column, size = 8 * rng.integers(0, 28), 8 * rng.integers(0, 38), 8 * rng.integers(1, 3)
+        now[row : row + size, column : column + size] += levels(rng.integers(3, 30))
+    if is_turned:
+        before, now = before.T, now.T
+    found = [foreign_corners(now, before, least, levels_only=True) for least in (2.0, 6.0, 12.0)]
+    assert found[0] > found[-1] > 0
+    floats = now.astype(np.float32), before.astype(np.float32)
+    assert found == [foreign_corners(*floats, least, levels_only=True) for least in (2.0, 6.0, 12.0)]
+
+
 @BOTH
 @pytest.mark.parametrize("step_px", [-24.0, 0.2, 8.0, 64.0])
 def test_steps_and_vibrations_are_motion(coding: Coding, step_px: float) -> None:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingervision.vision.binarise import binarise, binarise_local
+from fingervision.vision.binarise import LARGE_PX, binarise, binarise_local
 from fingervision.vision.denoise import denoise
 from fingervision.vision.grey import full_scale, to_grey
 
@@ -30,6 +30,16 @@ def test_pure_noise_is_as_far_apart_as_the_halves_of_a_gaussian() -> None:
 @pytest.mark.parametrize("level", [0, 1, 127, 255])
 def test_a_uniform_picture_has_no_contrast(level: int) -> None:
     assert binarise(np.full((30, 30), level, dtype=np.uint8)).contrast == 0.0
+
+
+def test_a_large_picture_is_counted_to_the_last_pixel() -> None:
+    large = np.random.default_rng(73).integers(0, 256, (1001, 2014), dtype=np.uint8)
+    for part in (large[:, :1003], large[:, 5:], large[::-1]):  # rows that are no multiple of eight, views
+        assert part.size > LARGE_PX
+        dark = binarise(part)
+        assert dark.full_scale_share == np.count_nonzero(part == 255) / part.size
+        means = [part[dark.dark == side].mean() for side in (0, 255)]
+        assert dark.contrast == pytest.approx(means[0] - means[1], rel=1e-12)
 
 
 def test_sixteen_bits_split_like_eight() -> None:
