@@ -16,6 +16,8 @@ from click.testing import CliRunner, Result
 from fingervision.cli import cli
 from fingervision.diagnosis.report.effect_figure import effect_figure
 from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
+from fingervision.diagnosis.report.gap_curves import GapCurves
+from fingervision.diagnosis.report.gap_figures import gap_against_input
 from fingervision.diagnosis.report.html_parts import bullets, named
 from fingervision.domain.errors import UsageError
 from fingervision.effects import catalogue
@@ -128,6 +130,18 @@ def test_figures_are_vectors_and_the_same_each_time(rig: Path, answer: Path) -> 
         pdf = (answer / f"{name}.pdf").read_bytes()
         assert pdf.startswith(b"%PDF")
         assert b"/Subtype /Image" not in pdf
+
+
+def test_dashes_stay_dashes_where_the_input_goes_forth_and_back() -> None:
+    input_mm = np.concatenate([np.linspace(0.0, 0.5, 60), np.linspace(0.5, 0.0, 60), np.linspace(0.0, 0.5, 60)])
+    opens = np.repeat([True, False, True], 60)
+    predictions = {"static": 1.0 + 7.0 * input_mm, "loop": 1.0 + 7.0 * input_mm + 0.4 * ~opens}
+    zero = np.zeros(180)
+    curves = GapCurves(input_mm, predictions["loop"], zero, opens, None, (slice(0, 180),), predictions)
+    lines = {line.get_label(): line for line in gap_against_input(curves, "").axes[0].get_lines()}
+    assert np.all(np.diff(lines["static"].get_xdata()) >= 0.0)
+    # A loop has two branches: both are drawn.
+    np.testing.assert_array_equal(lines["loop"].get_xdata(), input_mm)
 
 
 def test_several_models_stand_in_one_table(rig: Path, answer: Path) -> None:

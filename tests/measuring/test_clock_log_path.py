@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from fingervision.domain.drive import DriveHistory
+from fingervision.measuring.clock.corner_rounding import rounded
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.noise_of_motion import _even_variance
 from fingervision.stage_record.encoder import input_sigma
+from tests.benchmarks import drawn_recordings
 
 STEP_MM = 0.002
 
@@ -64,3 +66,24 @@ def test_the_frames_own_variance_is_found_beside_uncertain_and_wrong_ones(wrong,
     residual = rng.normal(size=2000) * np.sqrt(1.0 + input_mm2)
     residual[rng.random(2000) < wrong] += 40.0
     assert _even_variance(residual**2, input_mm2) == pytest.approx(1.0, rel=0.25)
+
+
+def test_a_rounded_turn_between_two_rows_is_drawn_finely_enough_for_the_play():
+    corner_s, speed = 0.25 * 0.06, 1.5
+    time_s = np.arange(0.0, 12.0, 0.06)
+    corners = np.arange(-0.99, 14.0, 2.04)  # half-way between two rows
+    tops = np.where(np.arange(corners.size) % 2, speed, 0.0)
+    path = LogPath.of(DriveHistory(time_s, np.interp(time_s, corners, tops)))
+    turned = rounded(path, corner_s)
+    slope = np.diff(tops)[0] / np.diff(corners)[0]
+    for at_s, top in zip(corners[1:-2], tops[1:-2], strict=True):
+        near = np.linspace(-0.7, 0.7, 57) * corner_s
+        # Two tangents and a parabola: the turn is cut by an eighth of the duration times the change of speed.
+        true = slope * np.where(np.abs(near) < 0.5 * corner_s, near**2 / corner_s + 0.25 * corner_s, np.abs(near))
+        found = np.interp(at_s + near, turned.drive.time_s, turned.drive.input_mm)
+        assert np.max(np.abs(np.abs(found - top) - true)) < 0.05 * 0.25 * slope * corner_s
+
+
+def test_a_record_that_ends_within_an_encoders_line_is_read():
+    one = drawn_recordings.draw(232003, creep=0.02)
+    assert LogPath.of(DriveHistory(one.log_s, one.input_mm)).step_mm > 0.0

@@ -192,3 +192,31 @@ def test_a_play_of_several_steps_of_a_staircase_gives_no_other_step():
         assert abs(clock.offset_s - one.kind.offset_s) < SIGMAS * clock.u_offset_s
     else:
         assert "do not follow the drive" in clock.words
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        pytest.param(88151011, "fits at 2 offsets", id="a play of a step behind rows slower than the moves"),
+        pytest.param(
+            88151032,
+            "set-points",
+            id="set-points in equal steps with noise, once taken for an encoder",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_what_leaves_two_answers_open_is_refused(number, words):
+    one = drawn_recordings.draw(number)
+    found = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.log_s, one.input_mm))
+    assert isinstance(found, NoClockOffset)
+    assert words in found.words
+
+
+@pytest.mark.slow
+def test_a_creep_that_looks_like_slow_turns_is_said_and_carried():
+    one = drawn_recordings.draw(232005, creep=0.02)
+    found = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.log_s, one.input_mm))
+    assert isinstance(found, ClockOffset)
+    assert any("creep" in note for note in found.notes)
+    assert abs(found.offset_s - one.kind.offset_s) < 2.0 * found.u_offset_s
