@@ -165,7 +165,7 @@ def _stiff(part: Part) -> str:
 
 
 def _closing_limit_mm(gripper: Gripper, model: Any, touch_mm: float | None) -> float:
-    """Closing limit of the input (mm): past the touch of the part by half the stroke that closes the empty fingers."""
+    """Input (mm) at which closing ends: past the touch of the part by half the stroke that closes the empty fingers."""
     touch = model.half.first_touch_mm() if hasattr(model, "half") else model.first_touch_mm()
     reach = abs(touch) if touch is not None else 0.01 * gripper.body.height_mm
     return (touch_mm or 0.0) - 0.5 * reach

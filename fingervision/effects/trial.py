@@ -75,7 +75,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
     if effect.stage not in tuple(Stage) or (effect.stage == Stage.DRIVE) != isinstance(effect, DriveEffect):
         where = "mechanism or camera" if isinstance(effect, PointEffect) else "drive"
         raise MisfitError(
-            f"is a {type(effect).__name__}, so that its stage must be {where}, but its stage is {effect.stage!s}"
+            f"must have the stage {where}, because it is a {type(effect).__name__}, but its stage is {effect.stage!s}"
         )
     if not effect.parameters or not all(isinstance(p, Parameter) for p in effect.parameters):
         raise MisfitError("must have a tuple of at least one Parameter, but has none")

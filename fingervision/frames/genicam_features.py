@@ -24,7 +24,7 @@ CONTROLS = {
 
 
 def control_list(nodes: Any) -> tuple[CameraControl, ...]:
-    """What a camera's features let be changed; a feature that is locked now states no value or no limit.
+    """Settings that a camera's features allow to be changed; a feature that is locked now states no value or no limit.
 
     Parameters
     ----------

@@ -11,10 +11,11 @@ are read before decoding:
   bit; if the bit fits although a time is missing, an odd number of pictures was never coded.
 * In MPEG-4 part 2 a B picture lies between two others in time. A B picture that is presented after all pictures
   received so far depends on a missing picture.
-* Times. In a file with equidistant times (coded at a rate, instead of as a camera delivered the frames), a hole of
-  whole steps is a missing picture. If times are irregular, or holes are frequent, the camera or the coder omitted
-  pictures, and a hole means nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay undetected. If every
-  n-th picture is a key frame and n packets lie between two key frames, no picture is missing: the camera paused.
+* Times. In a file with equidistant times (coded at a constant rate), a gap in the times of a whole number of steps
+  means that pictures are missing. If times are irregular, or such gaps are frequent, the camera or the encoder skipped
+  pictures, and a gap proves nothing: a missing VP8 or VP9 picture, or two missing pictures of MPEG-4, are then not
+  detected. If every n-th picture is a key frame and n packets lie between two key frames, no picture is missing: the
+  camera paused.
 
 AVI is not judged by times, because it counts frames and marks omitted ones by an empty chunk.
 """

@@ -101,7 +101,7 @@ def states_another_duration(path: Path) -> bool:
 
 
 def _is_unread(path: Path) -> bool:
-    """Whether FFmpeg gives up within the table of contents, and goes on with the half of it."""
+    """Whether FFmpeg stops reading within the table of contents, and continues with an incomplete one."""
     with listening("") as heard, suppress(av.FFmpegError, IndexError), open_container(path):
         return any(GIVES_UP in words for _, _, words in heard.log)
     return False
@@ -167,7 +167,10 @@ def _neighbours(number: int) -> Iterator[int]:
 
 
 def _coarse_neighbours(number: int) -> Iterator[int]:
-    """As `_neighbours`, but with one wrong bit in the last byte: a cut of less than 2 % always has such a neighbour."""
+    """As `_neighbours`, but with no more than one wrong bit in the last byte.
+
+    If the whole last byte could be wrong, a cut of less than 2 % would always be mistaken for damage.
+    """
     yield from (other for other in _neighbours(number) if other & 0xFF == number & 0xFF)
     yield from (number ^ (1 << bit) for bit in range(8))
 

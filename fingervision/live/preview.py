@@ -136,7 +136,7 @@ def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
 
 
 def _picture(seen: Seen) -> bytes:
-    """The picture with the measured points; the page itself says frame and value, in letters of its own size."""
+    """The picture with the measured points; the page itself shows frame number and value as text."""
     drawn = draw_overlay(seen.frame, _NOTHING if seen.outcome is None else seen.outcome, "")
     # OpenCV would want blue first: to turn a whole picture's colours round takes twice as long as to code it.
     return bytes(simplejpeg.encode_jpeg(drawn, JPEG_QUALITY, "RGB", "420"))

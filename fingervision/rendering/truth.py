@@ -135,7 +135,7 @@ def _along(point: tuple[float, float], direction: Direction) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Tip:
-    """Smallest coordinate of a finger towards its root; the range across the finger over which a flat tip has it."""
+    """Smallest coordinate of a finger along its axis, and the range across the finger in which a flat tip has it."""
 
     along_px: float
     first_px: float

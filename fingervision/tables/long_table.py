@@ -1,4 +1,4 @@
-"""Tables of this program with several rows per frame, which no comparison can take: what they are, what to give."""
+"""Refuse this program's own tables with several rows per frame as measured tables, and say which table to give."""
 
 from fingervision.domain.errors import DataError
 from fingervision.tables.raw_table import RawTable
@@ -11,7 +11,7 @@ LONG_TABLES = {
 
 
 def refuse_long_table(raw: RawTable) -> None:
-    """Refuse bodies.csv and gauges.csv, whose rows are no instants.
+    """Refuse bodies.csv and gauges.csv, in which several rows have the same time.
 
     Raises
     ------

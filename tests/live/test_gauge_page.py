@@ -204,7 +204,7 @@ def test_a_file_that_somebody_else_changed_is_not_overwritten(opened_on: Opened,
     obey(view, {"do": "gauge_add", "table": EDGE})
     path.write_text("# theirs\nschema = 1\n")
     for _ in range(2):
-        with pytest.raises(ChangedMeanwhileError, match="somebody else"):
+        with pytest.raises(ChangedMeanwhileError, match="another program"):
             obey(view, {"do": "gauges_save"})
         assert path.read_text() == "# theirs\nschema = 1\n"
     assert section(view)["gauges"]["changed_meanwhile"]
@@ -215,7 +215,7 @@ def test_a_file_that_somebody_else_changed_is_not_overwritten(opened_on: Opened,
     assert tomllib.loads(path.read_text())["gauge"] == [EDGE]
     assert not section(view)["gauges"]["changed_meanwhile"]
     path.unlink()
-    with pytest.raises(ChangedMeanwhileError, match="somebody else"):
+    with pytest.raises(ChangedMeanwhileError, match="another program"):
         obey(view, {"do": "gauges_save"})
 
 
@@ -363,7 +363,7 @@ def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
     page.click("#gauge_remove")
     shown(page, "document.querySelector('#gauge_saved').textContent === 'not saved'")
     page.click("#gauge_save")
-    page.locator("#gauge_words", has_text="somebody else").wait_for()
+    page.locator("#gauge_words", has_text="another program").wait_for()
     assert path.read_text() == theirs
     page.click("#gauge_over")
     says(page, "1 gauges saved")

@@ -175,7 +175,7 @@ def test_a_drawing_in_metres_or_micrometres_is_asked_about(scale: float) -> None
 
 
 def test_drives_that_all_stand_still_are_refused() -> None:
-    with pytest.raises(FingervisionError, match="must move with the input, but per_input of all of them is 0"):
+    with pytest.raises(FingervisionError, match="must move with the input, but per_input is 0 for all of them"):
         drawn(
             ARMS.replace("per_input = -0.5", "per_input = 0").replace(
                 'across = "free"\n', 'across = "free"\nper_input = 0\n', 1

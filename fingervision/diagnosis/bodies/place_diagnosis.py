@@ -116,7 +116,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
 
 
 def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: PlaceAnswers) -> MeasuredTable:
-    """Correct the gap for the difference (about 0.1 %) between condensed bodies and bars that are joined at points."""
+    """Correct the gap for the difference (about 0.1 %) between a model of condensed bodies and a model of bars."""
     u = np.array([0.0, 1.0])
     bare = model.base.respond(u)
     drawn = answers.answer().by_input

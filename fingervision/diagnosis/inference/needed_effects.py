@@ -19,7 +19,7 @@ power, because a richer formula also fits part of that structure."""
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
     """Drop effects that explain less than the remaining residual, because they may only imitate a part of it.
 
-    If structure remains in addition to several effects, each effect is fitted to part of that structure as well.
+    If structure remains in addition to several effects, the fit of each effect also absorbs part of that structure.
     """
     rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
     while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):

@@ -20,7 +20,8 @@ USUAL_INPUTS_MM, USUAL_STEP_MM = (-0.45, 1.45), 0.002
 def hidden_from(words: tuple[str, ...]) -> Hidden:
     """Read injected effects, each given as `EFFECT[:PARAMETER=VALUE,...]` or by a sealed file.
 
-    A sealed file has the form of a model.toml: `[[effect]]` with `name` and `[effect.parameters]` of plain numbers.
+    A sealed file, which hides the effects from the person who diagnoses the run, has the form of a model.toml:
+    `[[effect]]` with `name` and `[effect.parameters]` of plain numbers.
 
     Raises
     ------
