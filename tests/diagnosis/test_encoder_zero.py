@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.diagnosis.inference.explanation_candidates import within_a_step
-from fingervision.diagnosis.inference.hypothesis import Explanation
+from fingervision.diagnosis.inference.explanation_candidates import within_a_step, without_roundings
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.searched import problem_of
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.report import Verdict
@@ -32,25 +33,43 @@ def test_an_offset_within_half_a_step_is_told_beside_the_play(tmp_path: Path) ->
     assert hidden in [set(names) for names in report.alternatives]
 
 
+STEP_MM, WIDTH_MM = 0.03, 1.5
+
+
+def encoder_problem(folder: Path, play_mm: float, offset_mm: float = 0.0) -> Problem:
+    """Strokes with holds of a stage with play, behind an encoder whose zero lies within a step."""
+    stroke = np.concatenate([np.linspace(0.0, WIDTH_MM, 60), np.full(20, WIDTH_MM)])
+    u = np.concatenate([stroke, stroke[::-1], stroke, stroke[::-1]])
+    recorded, place = STEP_MM * np.round((u - 0.011) / STEP_MM), [float(u[0])]
+    for x in u[1:].tolist():
+        place.append(min(max(place[-1], x - play_mm / 2.0), x + play_mm / 2.0))
+    gap = 4.0 + 3.0 * (np.array(place) + offset_mm)
+    rows = "\n".join(f"{0.1 * k},{x:.6f},{g:.6f}" for k, (x, g) in enumerate(zip(recorded, gap, strict=True)))
+    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + rows + "\n")
+    (folder / "sim.csv").write_text("input_mm,gap_mm\n-1,1\n2.5,11.5\n")
+    data = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    assert data.recorded.step_mm == pytest.approx(STEP_MM)
+    return problem_of(data, None)
+
+
 @pytest.mark.parametrize(("short_mm", "hidden"), [(0.02, True), (0.2, False)])
 def test_a_stop_within_a_step_of_the_end_is_rounding_beside_friction_too(
     tmp_path: Path, short_mm: float, hidden: bool
 ) -> None:
     # The stage holds at its upper end; a friction goes on after the stop, far from the end of the range.
-    step_mm, width_mm = 0.03, 1.5
-    stroke = np.concatenate([np.linspace(0.0, width_mm, 60), np.full(20, width_mm)])
-    u = np.concatenate([stroke, stroke[::-1], stroke, stroke[::-1]])
-    recorded = step_mm * np.round((u - 0.011) / step_mm)
-    rows = "\n".join(f"{0.1 * k},{x:.6f},{4.0 + 3.0 * y:.6f}" for k, (x, y) in enumerate(zip(recorded, u, strict=True)))
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + rows + "\n")
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-1,1\n2.5,11.5\n")
-    data = prepare(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv"))
-    assert data.recorded.step_mm == pytest.approx(step_mm)
-    low, high = data.recorded.smooth_mm.min(), data.recorded.smooth_mm.max()
+    problem = encoder_problem(tmp_path, 0.0)
+    smooth_mm = problem.chain.history.input_mm
     values = {
-        "end_stop": {"upper_mm": high - short_mm, "lower_mm": low - 1.0},
+        "end_stop": {"upper_mm": smooth_mm.max() - short_mm, "lower_mm": smooth_mm.min() - 1.0},
         "friction_hysteresis": {"fraction": 0.9, "reach_mm": 0.05},
     }
-    problem = problem_of(data, None)
     found = Explanation(tuple(values), values, 0.0, problem.measured, np.zeros((4, 4)), 4, (0.0,))
     assert within_a_step(problem, found) is hidden
+
+
+@pytest.mark.parametrize(("offset_mm", "left"), [(-0.011, ("backlash",)), (0.1, ("input_offset", "backlash"))])
+def test_what_only_follows_roundings_is_dropped(tmp_path: Path, offset_mm: float, left: tuple[str, ...]) -> None:
+    # The zero of the encoder is off by 11 um, which an offset of the stage adds to or takes away.
+    problem = encoder_problem(tmp_path, 0.1, offset_mm)
+    begin = {"drive_lag": {"delay_s": 0.02}, "input_offset": {"offset_mm": 0.01}, "backlash": {"play_mm": 0.08}}
+    assert without_roundings(problem, fit(problem, tuple(begin), begin)).names == left

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit, scan
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit, scan
 from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.diagnosis.input.input_uncertainty import below_the_input
@@ -210,6 +210,22 @@ def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explan
     if beyond[:1] == larger[:1]:
         return beyond
     return [explanation for explanation in beyond if set(smaller.names) <= set(explanation.names)]
+
+
+def without_roundings(problem: Problem, explanation: Explanation) -> Explanation:
+    """Drop effects without which the others, refitted, predict the same but for the error of the recorded input.
+
+    For example, a delay of a small part of an encoder step beside a play and an offset follows the roundings, whichever
+    of the three was found first.
+    """
+    while problem.chain.history.input_sigma_mm > 0.0 and len(explanation.names) > 1:
+        kept = [{n: v for n, v in explanation.values.items() if n != name} for name in explanation.names]
+        fewer = [fit(problem, tuple(values), values, iterations=MANY_STEPS) for values in kept]
+        alike = [one for one in fewer if added_share(problem, one, explanation) == 0.0]
+        if not alike:
+            break
+        explanation = min(alike, key=lambda one: one.score)
+    return explanation
 
 
 def likeliest(candidates: list[Explanation], samples: int) -> Explanation:

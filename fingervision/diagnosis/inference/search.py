@@ -19,6 +19,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     single_effects,
     swapped,
     within_a_step,
+    without_roundings,
 )
 from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
@@ -73,7 +74,7 @@ def search(
     progress(0.3)
     state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
     state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
-    state = _insisted(state, forced) if forced else _without_imitations(state)
+    state = _insisted(state, forced) if forced else _without_imitations(_beyond_roundings(state))
     progress(0.82)
     state = _gated(state, rng)
     progress(0.9)
@@ -163,6 +164,15 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     again = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
     triples = beyond_the_input(problem, state.best, again) or triples
     return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST], state.values), peers=triples)
+
+
+def _beyond_roundings(state: SearchState) -> SearchState:
+    """Drop effects that only follow the errors of the recorded input; explanations of the rest are the peers then."""
+    best = without_roundings(state.problem, state.best)
+    if best is state.best:
+        return state
+    pairs = beyond_the_input(state.problem, state.singles[0], state.pairs)
+    return replace(state, best=best, peers=[best, *(pairs if len(best.names) > 1 else state.singles)])
 
 
 def _without_imitations(state: SearchState) -> SearchState:
