@@ -106,6 +106,17 @@ def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_
         again = start.copy()
         again[[INNER_R, OUTER_R]] = radius
         other = fit_finger_end(points, again, origin, u_prior)
-        if other.misfit <= MORE_MISFIT * best.misfit and other.robust.sum() > best.robust.sum() + LEAST_GAIN:
+        if not _has_settled(other):
+            continue
+        is_better = other.misfit <= MORE_MISFIT * best.misfit and other.robust.sum() > best.robust.sum() + LEAST_GAIN
+        if is_better or not _has_settled(best):
             best = other
     return best
+
+
+def _has_settled(end: FingerEnd) -> bool:
+    """Whether the points that counted in the last step still lie where they count after it.
+
+    The weights are those from before the last step. A step that leads to another shape leaves these points far off it.
+    """
+    return float(end.robust @ end.residual**2) < (BIWEIGHT_REACH * end.misfit) ** 2 * float(end.robust.sum())

@@ -147,7 +147,8 @@ def measure_gap(
     if not measured:
         for p, end, found, does_hold, beyond in zip(points, (left, right), fitted, holds, aside, strict=True):
             own = None if all(holds) else local_measuring_point(p, below_tip_px, noise_shared)
-            if own is None and does_hold:
+            # Without another outline, what errors shared by neighbouring points can leave does not speak against the shape.
+            if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, noise_shared)):
                 if found.apex < p.x.min() - 1.0:
                     return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
                 covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)

@@ -13,8 +13,11 @@ ISOLATED_SHARE = 0.9
 """Share of jumps that are isolated between equal values; ramps and strokes have neighbouring steps."""
 FEWEST_LINES = 8.0
 """Least number of encoder lines over the range; an encoder with fewer would be useless."""
-LEAST_HOLD = 6
+LEAST_HOLD = 4
 """Least number of samples in a hold for which the second half shows whether the gap moves or is constant."""
+DWELL = 3.0
+"""Ratio of a hold to the median hold between moves in the same direction, beyond which the stage waits there. The gap is
+then constant for an encoder too."""
 FOLLOWS = 0.5
 """Slope of the gap within holds, relative to that of a steady motion: 1 for an encoder, 0 for a command; this is the
 limit between them."""
@@ -46,12 +49,15 @@ def is_commanded(input_mm: Array, runs: tuple[slice, ...], gap_of_input: Array, 
     if float(np.ptp(input_mm)) < FEWEST_LINES * float(np.min(np.abs(moves[moves != 0.0]))):
         return True
     along, power = 0.0, 0.0
+    holds = []
     for run, jump in zip(runs, inner, strict=True):
         at = run.start + 1 + np.flatnonzero(jump)
         for before, after in pairwise(at):
-            passing = (input_mm[before] - input_mm[before - 1]) * (input_mm[after] - input_mm[before]) > 0.0
-            if after - before < LEAST_HOLD or not passing:
-                continue
+            if (input_mm[before] - input_mm[before - 1]) * (input_mm[after] - input_mm[before]) > 0.0:
+                holds.append((before, after))
+    longest = DWELL * float(np.median([after - before for before, after in holds])) if holds else 0.0
+    for before, after in holds:
+        if LEAST_HOLD <= after - before <= longest:
             second = np.arange(before + (after - before) // 2, after)
             way = 0.5 * (gap_of_input[after] - gap_of_input[before - 1])
             drift = way * (second - second.mean()) / (after - before)
