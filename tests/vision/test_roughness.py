@@ -105,7 +105,7 @@ def test_a_rough_fillet_is_as_sure_as_it_says() -> None:
 
 def test_a_row_sees_more_of_roughness_on_a_slant() -> None:
     """On a fillet at 45 degrees a row moves by sqrt(2) of what the edge moves along its normal."""
-    errors, radius = Roughness(np.full(65, 0.3**2)), 25.0
+    errors, radius = Roughness(0.3**2 * np.exp(-0.5 * (np.arange(65.0) / 4.0) ** 2)), 25.0
     points = rounded(np.random.default_rng(1), errors, radius)[1]
     at_45 = np.argmin(np.abs(points.y[points.side == 0] - (1.0 - np.sqrt(0.5)) * radius))
     assert points.u[at_45] == pytest.approx(np.hypot(U_POINT, 0.3 * np.sqrt(2.0)), rel=0.1)
@@ -122,6 +122,31 @@ def test_longer_flanks_count_where_they_agree() -> None:
     assert is_surer(surer, near)
     assert not is_surer(near, surer)
     assert not is_surer(replace(surer, right=replace(near.right, x_px=near.right.x_px + 1.0)), near)
+
+
+def test_longer_flanks_count_where_the_near_ones_are_too_short_to_tell() -> None:
+    near = replace(measured_plain(), roughness_px=np.nan)
+    rough = replace(near, u_gap_px=10.0 * near.u_gap_px, roughness_px=0.3)
+    assert is_surer(rough, near)
+    assert not is_surer(replace(near, roughness_px=0.0), near)
+
+
+def test_flanks_too_short_to_tell_are_not_taken_for_smooth() -> None:
+    """Sixteen points of a rough flank are explained by its parabola about as well: that is no evidence of none."""
+    rng, untold = np.random.default_rng(8), 0
+    for _ in range(10):
+        (left, left_end), (right, right_end) = (finger(rng, 0.25, 4.0) for _ in range(2))
+        short = []
+        for points in (left, right):
+            near = points.is_row & (points.y < 20.0) | ~points.is_row
+            short.append(OutlinePoints(*(a[near] for a in (points.x, points.y, points.u, points.side, points.blur))))
+        ends = [fit_finger_end(p, *first_guess(p, 10.0)) for p in short]
+        told = roughness((short[0], short[1]), (ends[0], ends[1]))
+        untold += told is not None and not told.is_told
+        told = roughness((left, right), (left_end, right_end))
+        assert told is not None
+        assert told.is_told
+    assert untold >= 1
 
 
 def measured_plain() -> GapMeasurement:
