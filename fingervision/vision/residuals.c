@@ -55,7 +55,7 @@ LOOP(residuals_rejected, "FFFddd", "d") {
 }
 
 /* How far points stray that the fit takes for dust, just above or just below the measuring point, where they are half
-   of what is there or more: x, y, u, residuals, weights, edge, height. */
+   of what is there or more (a single one of two is a stray point): x, y, u, residuals, weights, edge, height. */
 LOOP(residuals_set_aside, "FFFFFdd", "d") {
     out[0].d = 0.0;
     for (int side = 0; side < 2; side++) {
@@ -70,7 +70,7 @@ LOOP(residuals_set_aside, "FFFFFdd", "d") {
             beside++;
             rejected += is_rejected;
         }
-        if (rejected && 2 * rejected >= beside) out[0].d = larger(out[0].d, worst);
+        if (2 * rejected > beside || (rejected > 1 && 2 * rejected == beside)) out[0].d = larger(out[0].d, worst);
     }
 }
 
