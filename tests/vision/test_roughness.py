@@ -11,6 +11,7 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.finger_end import FingerEnd, fit_finger_end
 from fingervision.vision.first_guess import first_guess
+from fingervision.vision.gap import TOO_ROUGH
 from fingervision.vision.longer_flanks import is_surer
 from fingervision.vision.measuring_point import measuring_point, squared
 from fingervision.vision.outline_points import OutlinePoints
@@ -160,16 +161,19 @@ def measured_plain() -> GapMeasurement:
 @pytest.mark.slow
 @pytest.mark.parametrize(("rough_px", "rms_px"), [(0.0, 0.25), (0.3, 0.6)])
 def test_a_printed_finger_is_as_sure_as_it_says(rough_px: float, rms_px: float) -> None:
-    """Twelve pictures of the third renderer: errors in units of what is stated."""
+    """Twelve pictures of the third renderer: errors in units of what is stated, and no more than a tenth refused."""
     rng = np.random.default_rng([9, int(10 * rough_px)])
     draw = partial(texture, rough_px=rough_px)
     errors, ratios = [], []
     for _ in range(12):
         shot = draw(rng)
         outcome = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, Direction.UP, other_response=None))
+        if outcome == TOO_ROUGH:
+            continue
         assert isinstance(outcome, GapMeasurement), outcome
         errors.append(outcome.gap_px - shot.gap_px)
         ratios.append(errors[-1] / outcome.u_gap_px)
+    assert len(errors) >= 11
     assert np.sqrt(np.mean(np.square(errors))) < rms_px
     # Twelve ratios of unit variance: chi-square of 12 lies below 28 in 99.5 of 100 cases.
     assert np.sum(np.square(ratios)) < 28.3
