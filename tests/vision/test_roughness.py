@@ -140,7 +140,8 @@ def test_flanks_too_short_to_tell_are_not_taken_for_smooth() -> None:
         short = []
         for points in (left, right):
             near = points.is_row & (points.y < 20.0) | ~points.is_row
-            short.append(OutlinePoints(*(a[near] for a in (points.x, points.y, points.u, points.side, points.blur))))
+            x, y, u, blur = (values[near] for values in (points.x, points.y, points.u, points.blur))
+            short.append(OutlinePoints(x, y, u, points.side[near], blur))
         ends = [fit_finger_end(p, *first_guess(p, 10.0)) for p in short]
         told = roughness((short[0], short[1]), (ends[0], ends[1]))
         untold += told is not None and not told.is_told
