@@ -1,7 +1,7 @@
 """Step 8, the gap: the distance between the two measuring points, with its uncertainty."""
 
 from dataclasses import replace
-from math import atan, degrees, hypot, sqrt
+from math import atan, degrees, hypot, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +91,8 @@ def measure_gap(
     Returns
     -------
     GapMeasurement or NoGap
-        The measured gap, or the reason why there is none.
+        The measured gap, or the reason why there is none. Its `roughness_px` is NaN where the flanks are too short to
+        tell whether they are rough.
     """
     refusal = _refuse(edges, full_scale, light_gap)
     if refusal is not None:
@@ -104,6 +105,8 @@ def measure_gap(
     fits = [fit_from_any_radius(p, *guess) for p, guess in zip(points, guesses, strict=True)]
     noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
     rough = roughness(points, (fits[0], fits[1]))
+    is_untold = rough is not None and not rough.is_told
+    rough = None if is_untold else rough
     chains: list[MeasuringPoint] = []
     if rough is not None:
         # Corners that the three-sided shape does not know leave as much as roughness does.
@@ -143,7 +146,7 @@ def measure_gap(
     if chains and all(holds):  # what knows its points better
         variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]
         chains = chains if sum(own.covariance[1, 1] for own in chains) < sum(variances) else []
-    measured = chains
+    measured = list(chains)
     if not measured:
         for p, end, found, does_hold, beyond in zip(points, (left, right), fitted, holds, aside, strict=True):
             own = None if all(holds) else local_measuring_point(p, below_tip_px, noise_shared)
@@ -160,7 +163,8 @@ def measure_gap(
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
     largest_variance = least_px**2 * SHARED_POINTS[coding]
-    roughness_px = 0.0 if rough is None else rough.deviation_px
+    roughness_px = nan if is_untold and not chains else 0.0  # straight sides that fit need no roughness
+    roughness_px = roughness_px if rough is None else rough.deviation_px
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
     if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
         words = f"{SMEARED}, by about {way_px:.0f} px: expose shorter, or move slower while frames are taken."

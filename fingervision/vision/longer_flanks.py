@@ -7,7 +7,7 @@ variances).
 """
 
 from dataclasses import replace
-from math import sqrt
+from math import isnan, sqrt
 
 import numpy as np
 
@@ -31,7 +31,13 @@ def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFin
 
 
 def is_surer(longer: GapMeasurement | NoGap, near: GapMeasurement) -> bool:
-    """Whether the result from longer flanks agrees with that from the near part and has a smaller uncertainty."""
+    """Whether the result from longer flanks agrees with that from the near part and has a smaller uncertainty.
+
+    Where the near part is too short to tell whether it is rough, its uncertainty lacks the roughness: longer flanks
+    that tell replace it.
+    """
+    if isinstance(longer, GapMeasurement) and isnan(near.roughness_px):
+        return longer.roughness_px > 0.0
     if not isinstance(longer, GapMeasurement) or longer.u_gap_px >= near.u_gap_px:
         return False
     return abs(longer.gap_px - near.gap_px) <= AGREES * sqrt(near.u_gap_px**2 - longer.u_gap_px**2)

@@ -6,7 +6,7 @@ Only this module knows the order of the steps.
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import hypot, sqrt
+from math import hypot, isnan, sqrt
 
 import cv2
 import numpy as np
@@ -218,6 +218,8 @@ def _measured(
     if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
         longer = _edges_and_gap(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
         edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
+        if isinstance(outcome, GapMeasurement) and isnan(outcome.roughness_px):
+            outcome = replace(outcome, roughness_px=0.0)
         if isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_PX * sqrt(SHARED_POINTS[coded.coding]):
             outcome = replace(TOO_ROUGH, held=outcome.held)
     if settings.other_response is not None and isinstance(outcome, GapMeasurement):

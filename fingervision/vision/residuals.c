@@ -55,9 +55,9 @@ LOOP(residuals_rejected, "FFFddd", "d") {
 }
 
 /* How far points stray that the fit takes for dust, just above or just below the measuring point, where they are the most
-   of what is there: x, y, u, residuals, weights, edge, height. */
+   of what is there, or half of it on both sides: x, y, u, residuals, weights, edge, height. */
 LOOP(residuals_set_aside, "FFFFFdd", "d") {
-    out[0].d = 0.0;
+    double most = 0.0, half[2] = {0.0, 0.0};
     for (int side = 0; side < 2; side++) {
         int64_t beside = 0, rejected = 0;
         double worst = 0.0;
@@ -70,8 +70,10 @@ LOOP(residuals_set_aside, "FFFFFdd", "d") {
             beside++;
             rejected += is_rejected;
         }
-        if (2 * rejected > beside) out[0].d = larger(out[0].d, worst);
+        if (2 * rejected > beside) most = larger(most, worst);
+        if (rejected && 2 * rejected >= beside) half[side] = worst;
     }
+    out[0].d = half[0] > 0.0 && half[1] > 0.0 ? larger(most, larger(half[0], half[1])) : most;
 }
 
 /* Mean residual near the measuring point or near the tip, the larger, in units of its own uncertainty. */

@@ -31,8 +31,8 @@ SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # Dust covers less than this share of the outline near the measuring point: what is more is the finger's own shape. A
 # point counts that has at least this weight.
 MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
-# Where most of the points within so many pixels above or below the measuring point are rejected, they may be the
-# finger's own edge (a corner that is cut off, a bend) and not dust.
+# Where most of the points within so many pixels above or below the measuring point are rejected, or half of them on
+# both sides, they may be the finger's own edge (a corner that is cut off, a bend) and not dust.
 BESIDE_PX = 4.0
 # Blur draws a sharp corner back from its vertex by 0.77 sigma, and 1.1 sigma at a turn of 120 degrees: a tip that lies
 # higher above every point than that and half a pixel is none.

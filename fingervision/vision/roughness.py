@@ -33,8 +33,9 @@ LENGTHS_PX = np.array([1.5, 2.3, 3.5, 5.3, 8.0, 12.0])
 # is looked at, or every third.
 OWN, FEWEST_POINTS, MOST_POINTS = 3, 12, 40
 # Points whose residuals about a shape spread by more than this (in units of their own uncertainty) are looked at, and
-# roughness that is not this much likelier than none (logarithm; about four standard uncertainties) is none.
-SUSPECT, SIGNIFICANT = 1.5, 8.0
+# roughness that is not this much likelier than none (logarithm; about four standard uncertainties) is none. It may yet
+# be, where it is likelier by more than its two parameters explain by chance (Akaike, doi:10.1109/TAC.1974.1100705).
+SUSPECT, SIGNIFICANT, POSSIBLE = 1.5, 8.0, 2.0
 # The covariance is tabulated for whole pixels of distance up to so many.
 FARTHEST_PX = 64
 
@@ -54,9 +55,12 @@ class Roughness:
     covariance : ndarray of float, shape (FARTHEST_PX + 1,)
         Covariance of the normal deviations of two points of the edge, by their distance in whole pixels (pixels
         squared).
+    is_told : bool
+        Whether the flanks tell that there is any; False where they are too short to tell.
     """
 
     covariance: Floats
+    is_told: bool = True
 
     @property
     def deviation_px(self) -> float:
@@ -70,7 +74,7 @@ class Roughness:
 
 
 def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd]) -> Roughness | None:
-    """Estimate the roughness from the flanks of both fingers; None if the flanks show no roughness.
+    """Estimate the roughness from the flanks of both fingers; None if the flanks show none.
 
     Parameters
     ----------
@@ -99,15 +103,16 @@ def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd
                 raise np.linalg.LinAlgError(msg)
             nothing += none
             likelihood += own
-    if not seen or likelihood.max() < nothing + SIGNIFICANT:
+    if seen and likelihood.max() < nothing + POSSIBLE:
         return None
+    is_told = bool(likelihood.max() > nothing + SIGNIFICANT)
     weight = np.exp(likelihood - likelihood.max())
     weight /= weight.sum()
     distance = np.arange(FARTHEST_PX + 1.0)
     covariance = np.zeros(distance.size)
     for j, length in enumerate(LENGTHS_PX):
         covariance += float(weight[:, j] @ DEVIATIONS_PX**2) * _correlation(distance, length)
-    return Roughness(covariance)
+    return Roughness(covariance, is_told)
 
 
 def with_roughness(points: OutlinePoints, found: Roughness, end: FingerEnd) -> OutlinePoints:
