@@ -150,7 +150,7 @@ def measure_gap(
     if not measured:
         for p, end, found, does_hold, beyond in zip(points, (left, right), fitted, holds, aside, strict=True):
             own = None if all(holds) else local_measuring_point(p, below_tip_px, noise_shared)
-            # Without another outline, what errors shared by neighbouring points can leave does not speak against the shape.
+            # Where there is no other outline, what errors that neighbours share can leave does not reject the shape.
             if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, noise_shared)):
                 if found.apex < p.x.min() - 1.0:
                     return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")

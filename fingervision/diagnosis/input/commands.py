@@ -16,8 +16,8 @@ FEWEST_LINES = 8.0
 LEAST_HOLD = 4
 """Least number of samples in a hold for which the second half shows whether the gap moves or is constant."""
 DWELL = 3.0
-"""Ratio of a hold to the median hold between moves in the same direction, beyond which the stage waits there. The gap is
-then constant for an encoder too."""
+"""Ratio of a hold to the median hold between moves in the same direction, beyond which the stage waits there; the gap
+is then constant for an encoder too."""
 FOLLOWS = 0.5
 """Slope of the gap within holds, relative to that of a steady motion: 1 for an encoder, 0 for a command; this is the
 limit between them."""
