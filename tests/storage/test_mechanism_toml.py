@@ -177,7 +177,7 @@ WRONG_TEMPLATES = [
     ("= 0.9", "= -0.9", "must be positive, but is -0.9"),
     ("= 0.9", "= nan", "must be a number"),
     ("= 0.9", '= "thin"', "arithmetic expression with names"),
-    ("= 0.9", "= 9.0", "neck"),
+    ("= 0.9", "= 9.0", "thickness of 9 mm"),
     ("l2_mm = 18.0", "l3_mm = 18.0", "the same in both halves"),
     ("[gripper.left]", "[gripper.middle]", "unknown key, middle"),
 ]
