@@ -12,6 +12,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Material
 from fingervision.models.flexure import Flexure
 from fingervision.models.hinge_compliance import beam_compliance
@@ -33,6 +34,11 @@ _ROUNDS, _BETWEEN = 5, 65
 rounds to 1e-11 of the half length."""
 _BESIDE = 1e-4
 """Distance from a flexure's surface at which material and void are tested, as a share of the thickness."""
+_BENDS = 2.0
+"""Ratio of a section's height to the neck's up to which it bends noticeably: a section twice as high is an eighth as
+compliant."""
+_AS_THIN = 1.1
+"""Thickness that must be left there, as a multiple of the neck's: the same moment causes at most as much stress."""
 _SAINT_VENANT = 1.5
 """Distance of a cut from the root in thicknesses: a self-balanced load of a strip decays at least as exp(-2.1 x / (t /
 2)) (Timoshenko and Goodier, article 26), to 0.2 % there."""
@@ -144,7 +150,14 @@ def _segment(
 
 
 def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
-    """Find the length over which a flexure is free of the bodies that it joins, and where to cut it from them."""
+    """Find the length over which a flexure is free of the bodies that it joins, and where to cut it from them.
+
+    Raises
+    ------
+    DataError
+        If another cut makes a notch thinner than its neck.
+    """
+    _check_neck(flexure, region)
     stations = np.linspace(0.0, flexure.half_length_mm * (1.0 - 1e-9), _SAMPLES)
     free, cuts, heights = [], [], []
     for side in (-1.0, 1.0):
@@ -161,6 +174,30 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
         cuts.append(side * cut)
         heights.append(height)
     return FlexureSpan(flexure, (free[0], free[1]), (cuts[0], cuts[1]), (heights[0], heights[1]))
+
+
+def _check_neck(flexure: Flexure, region: PlanarRegion) -> None:
+    """Refuse a notch that another cut makes thinner than its neck; the largest stress would not be that of the neck.
+
+    Raises
+    ------
+    DataError
+        If material is missing in a strip of the neck's thickness along the axis, where the notch bends.
+    """
+    if not flexure.is_notch:
+        return
+    stations = np.linspace(0.0, flexure.half_length_mm, _SAMPLES)
+    heights = flexure.height_mm(stations)
+    stations = stations[(heights > _AS_THIN * flexure.thickness_mm) & (heights < _BENDS * flexure.thickness_mm)]
+    stations = np.concatenate([stations, -stations])
+    half = 0.5 * _AS_THIN * flexure.thickness_mm
+    there = [region.holds(np.stack(flexure.point_mm(stations, np.full(stations.size, y)))) for y in (-half, half)]
+    missing = np.abs(stations[~(there[0] & there[1])])
+    if missing.size:
+        raise DataError(
+            f"flexure {flexure.name} must be thinnest at its centre, but another cut makes it thinner "
+            f"{missing.min():.3g} mm from there; move the cuts apart, or take --kind finite_element."
+        )
 
 
 def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from fingervision.models.hinge_compliance import beam_compliance
 from fingervision.models.hinge_correction import HingeTheory, corrected_compliance
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.notch import Notch, circular_notch
+from fingervision.models.redrawn import redrawn
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.width_effect import force_uncertainty, held_moduli
 from tests.benchmarks.hinge_solid import solid_compliance
@@ -97,3 +98,11 @@ def test_between_plane_stress_and_plane_strain() -> None:
 def test_a_notch_thicker_than_its_web_is_refused() -> None:
     with pytest.raises(DataError, match="must be below the height of its bar, 2 mm, but is 3 mm"):
         Notch(3.0, 4.0, 4.0, 3.0, web_mm=2.0)
+
+
+def test_a_neck_that_another_cut_makes_thinner_is_refused(gripper: Gripper) -> None:
+    """Cuts of nearly 8 mm meet between the hinges: the largest stress is 40 % above that of the neck as drawn."""
+    hinge = replace(gripper.hinge, thickness_mm=0.667, radius_mm=7.95)
+    overlapping = redrawn(redrawn(replace(gripper, hinge=hinge), "lever.l2_mm", -0.74), "lever.l3_mm", 1.13)
+    with pytest.raises(DataError, match=r"hinge 2 must be thinnest at its centre, but .* thinner 0\.\d+ mm"):
+        LumpedGripper(overlapping)
