@@ -10,8 +10,8 @@ ROLES = {
     "date": "date datum fecha data datetime",
     "input": "input inputs eingang eingabe entree entrees entrada ingresso uin xin x position positions pos stage "
     "displacement displacements disp displ encoder drive travel stroke weg stellweg wege hub verschiebung verfahrweg "
-    "antrieb vorschub lage istposition istweg deplacement deplacements course actionneur codeur posicion desplazamiento "
-    "desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator "
+    "antrieb vorschub lage istposition istweg deplacement deplacements course actionneur codeur posicion "
+    "desplazamiento desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator "
     "positie posities verplaatsing slag aandrijving posicao posicoes deslocamento deslocamentos",
     "gap": "gap gaps opening openings abstand abstande oeffnung offnung offnungsweite oeffnungsweite spalt spaltweite "
     "greiferoffnung greiferoeffnung greifweite fingerabstand backenabstand aperture clearance separation ouverture "
