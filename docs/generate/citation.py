@@ -41,8 +41,8 @@ def _words(about: dict[str, Any], url: str) -> str:
 
 def _article_words(one: dict[str, Any]) -> str:
     return (
-        f"{_names(one['authors'])} ({one['year']}). {one['title']}. *{one['journal']}*, {one['volume']}({one['issue']}), "
-        f"{one['start']}\u2013{one['end']}. <{one['url']}>"
+        f"{_names(one['authors'])} ({one['year']}). {one['title']}. *{one['journal']}*, {one['volume']}"
+        f"({one['issue']}), {one['start']}\u2013{one['end']}. <{one['url']}>"
     )
 
 
