@@ -5,6 +5,7 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
+from generate.citation import citation_page
 from generate.commands import commands_page
 from generate.effects import effects_page
 from generate.package_notes import NOTES, note
@@ -16,6 +17,7 @@ def write_pages(app: Sphinx) -> None:
     """Write every generated page."""
     folder = Path(app.srcdir) / "_generated"
     folder.mkdir(exist_ok=True)
+    (folder / "citation.md").write_text(citation_page(), encoding="utf-8")
     (folder / "commands.md").write_text(commands_page(), encoding="utf-8")
     (folder / "python.md").write_text(python_page(), encoding="utf-8")
     (folder / "recipe_kinds.md").write_text(recipe_kinds_page(), encoding="utf-8")

@@ -8,7 +8,11 @@ import calib
 import fingervision
 
 FOR_AUTHORS = {
-    "fingervision.testbed.actuator": ("Actuator", "StageLimits", "Alarm"),
+    "fingervision.testbed.actuator": ("Actuator", "MoveCheck", "StageLimits", "Alarm"),
+    "fingervision.storage.toml_section": ("Section",),
+    "fingervision.testbed.build_context": ("BuildContext",),
+    "fingervision.testbed.clocks.clock": ("Clock",),
+    "fingervision.testbed.motion.soft_limits": ("SoftLimits",),
     "fingervision.testbed.reading": ("Reading",),
     "fingervision.testbed.motion.move_limits": ("check_move", "check_speed"),
     "fingervision.testbed.camera": ("BedCamera", "Shot", "Latency"),
@@ -43,7 +47,9 @@ def _entry(module: ModuleType, name: str) -> str:
     path = f"{module.__name__}.{name}"
     if inspect.isclass(thing):
         kind = "autoexception" if issubclass(thing, Exception) else "autoclass"
-        return f".. {kind}:: {path}\n   :members:"
+        # What a protocol takes over from another one is asked of a device as well.
+        taken_over = "\n   :inherited-members: Protocol" if getattr(thing, "_is_protocol", False) else ""
+        return f".. {kind}:: {path}\n   :members:{taken_over}"
     if inspect.isfunction(thing):
         return f".. autofunction:: {path}"
     # What is no class and no function has the docstring of its type.

@@ -13,8 +13,9 @@ Examples:
   fingervision bed check next_run.toml --bed lab.toml
   fingervision bed check recipe.toml --json
 
-No device is opened and nothing moves. Exit code 0: the recipe fits the test bed; 1: it does not, with a message for
-each step that does not fit.
+No device is opened and nothing moves. It is not tested whether a stage keeps its contract (moves at the commanded
+speed, stops, refuses): for a device that is a plug-in, the command line that tests this is printed. Exit code 0: the
+recipe fits the test bed; 1: it does not, with a message for each step that does not fit.
 """
 
 
@@ -72,4 +73,22 @@ def command(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
     if done.refusals:
         raise LimitError("\n".join(done.refusals))
     if not as_json:
+        for part in done.bed.plugged:
+            click.echo(
+                f"not tested: whether the {part.replace('_', ' ')} keeps its contract; this line tests it"
+                f"{', and moves it' if part == 'actuator' else ''}:\n  {_contract_line(part, bed_name)}"
+            )
         click.echo("The test bed can execute the recipe.")
+
+
+def _contract_line(part: str, bed_name: str) -> str:
+    """Command line that runs the contract tests of a device of a test bed."""
+    import json
+    from shlex import quote
+
+    contract = "".join(word.title() for word in part.split("_")) + "Contract"
+    program = (
+        f"from fingervision.testing import {contract}, bed_at, run; "
+        f'print(run({contract}, open_bed=lambda: bed_at({json.dumps(bed_name)})) or "keeps the contract")'
+    )
+    return f"python -c {quote(program)}"

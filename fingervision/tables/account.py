@@ -59,6 +59,8 @@ class Account:
         Entry of columns.toml that describes this interpretation.
     channels : BodyChannels
         User-named channels.
+    also : str
+        Other kind of table as which this interpretation holds just as well; empty if there is none.
     """
 
     path: Path
@@ -75,6 +77,7 @@ class Account:
     question: FingervisionError | None
     entry: Entry
     channels: BodyChannels = field(default_factory=BodyChannels)
+    also: str = ""
 
     def curve(self) -> tuple[str, NDArray[np.float64], str, NDArray[np.float64]] | None:
         """Return the curve to plot: gap over input, or input over time; None if there are too few data."""
@@ -98,6 +101,7 @@ class Account:
             "schema": 1,
             "file": str(self.path),
             "kind": self.kind,
+            "also": self.also,
             "format": self.what,
             "own_format": self.own,
             "rows": self.rows,
@@ -157,7 +161,18 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
         return found
     understood = {each: understand(raws[each], each, given[each]) for each in kinds}
     best = min(kinds, key=lambda each: (_open_columns(understood[each]), KINDS.index(each)))
-    return _account(understood[best], given[best], raws[best])
+    also = "simulation" if kind is None and best == "measured" and _same_as_simulation(understood) else ""
+    return _account(understood[best], given[best], raws[best], also)
+
+
+def _same_as_simulation(understood: Mapping[str, Understood]) -> bool:
+    """Whether a table has nothing that tells a measurement from a simulation: the gap over the input, without times."""
+    measured, simulation = understood["measured"], understood["simulation"]
+    return (
+        measured.runs is None
+        and set(measured.taken) == set(simulation.taken)
+        and [each.key for each in measured.questions] == [each.key for each in simulation.questions]
+    )
 
 
 def _open_columns(table: Understood) -> int:
@@ -169,10 +184,11 @@ def _open_columns(table: Understood) -> int:
     return missing + sum(source not in (None, table.kind) for source in sources)
 
 
-def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
+def _account(table: Understood, given: Entry, raw: RawTable, also: str) -> Account:
     question: FingervisionError | None = None
     try:
-        table.decided()
+        # What a table of either kind leaves open is answered once, for both.
+        (replace(table, kind="table") if also else table).decided()
         if table.kind == "drive":
             drive_of(table, given)
     except FingervisionError as error:
@@ -193,6 +209,7 @@ def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
         question=question,
         entry=_entry(table.taken, given, raw),
         channels=table.channels,
+        also=also,
     )
 
 

@@ -9,9 +9,9 @@ ROLES = {
     "clock tijd tijdstip hora heure ora orario zeitpunkt instant",
     "date": "date datum fecha data datetime",
     "input": "input inputs eingang eingabe entree entrees entrada ingresso uin xin x position positions pos stage "
-    "displacement displacements encoder drive travel stroke weg stellweg wege hub verschiebung verfahrweg antrieb "
-    "vorschub lage istposition istweg deplacement deplacements course actionneur codeur posicion desplazamiento "
-    "desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator "
+    "displacement displacements disp displ encoder drive travel stroke weg stellweg wege hub verschiebung verfahrweg "
+    "antrieb vorschub lage istposition istweg deplacement deplacements course actionneur codeur posicion "
+    "desplazamiento desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator "
     "positie posities verplaatsing slag aandrijving posicao posicoes deslocamento deslocamentos",
     "gap": "gap gaps opening openings abstand abstande oeffnung offnung offnungsweite oeffnungsweite spalt spaltweite "
     "greiferoffnung greiferoeffnung greifweite fingerabstand backenabstand aperture clearance separation ouverture "
@@ -35,7 +35,8 @@ BESIDE = (
     "no nr num finger fingers fingern zwischen tip tips tisch table linear motor piezo mean mittel mittelwert moyenne "
     "media laser edge kante edges total relative relativ raw roh stepper gripper greifer pince pinza doigt doigts dedo "
     "dedos dita dito entre tra fra machine between jaw jaws backen messung data daten donnees datos dati x y z 0 1 "
-    "2 3 4"
+    "2 3 4 prescribed imposed applied vorgegebene vorgegebener vorgegebenes aufgebrachte imposee impose impuesto "
+    "impuesta imposto imposta imposti"
 )
 FILLERS = frozenset(BESIDE.split())
 """Filler words, which do not change the role of the other words in a name."""
@@ -83,6 +84,8 @@ def role_of(name: str) -> str | None:
     --------
     >>> role_of("Abstand der Finger"), role_of("Position Achse 1"), role_of("left finger position")
     ('gap', 'input', 'left')
+    >>> role_of("disp"), role_of("Prescribed displacement"), role_of("Vorgegebene Verschiebung")
+    ('input', 'input', 'input')
     >>> role_of("room temperature"), role_of("gap error")
     (None, None)
 

@@ -15,7 +15,7 @@ from fingervision.testbed.bed_factory import (
     stated_limits,
     stated_scale,
 )
-from fingervision.testbed.device_kinds import kind_of
+from fingervision.testbed.device_kinds import PluggedKind, kind_of
 from fingervision.testbed.motion.soft_limits import SoftLimits
 
 CAMERA_PX, CAMERA_HZ = (640, 480), 25.0
@@ -42,6 +42,8 @@ class PlannedBed:
         Width and height of the pictures.
     px_per_mm : float or None
         Scale of the camera; None if the configuration states none.
+    plugged : tuple of str
+        Devices (`actuator`, `force_sensor`, `camera`) whose kind is a file or comes from another distribution.
     """
 
     name: str
@@ -51,6 +53,7 @@ class PlannedBed:
     rate_hz: float
     size_px: tuple[int, int]
     px_per_mm: float | None
+    plugged: tuple[str, ...] = ()
 
     @property
     def view_mm(self) -> float:
@@ -76,10 +79,11 @@ def planned_bed(name: str) -> PlannedBed:
     if "actuator" not in sections:
         top.refuse(None, "must have an [actuator], but has none: add it with its kind.")
     kinds = {part: kind_of(part, section) for part, section in sections.items()}
+    plugged = tuple(part for part, kind in kinds.items() if isinstance(kind, PluggedKind))
     if all(kind.SIMULATED for kind in kinds.values()):
         bed = open_bed(name)
         try:
-            return _of(bed, top)
+            return _of(bed, top, plugged)
         finally:
             bed.close()
     folder, kind = top.path.parent, kinds["actuator"]
@@ -104,10 +108,11 @@ def planned_bed(name: str) -> PlannedBed:
             camera.whole("height_px", CAMERA_PX[1], low=16, high=16384),
         ),
         px_per_mm=None if scale is None else scale.px_per_mm,
+        plugged=plugged,
     )
 
 
-def _of(bed: Bed, top: Section) -> PlannedBed:
+def _of(bed: Bed, top: Section, plugged: tuple[str, ...]) -> PlannedBed:
     if bed.camera is None:
         top.refuse(None, "must have a [camera], but has none: add it with its kind.")
     described = bed.camera.description
@@ -119,4 +124,5 @@ def _of(bed: Bed, top: Section) -> PlannedBed:
         rate_hz=described.rate_hz or CAMERA_HZ,
         size_px=(described.width_px, described.height_px),
         px_per_mm=None if bed.scale is None else bed.scale.px_per_mm,
+        plugged=plugged,
     )

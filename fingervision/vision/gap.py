@@ -57,7 +57,13 @@ LEAST_SURE_PX = 0.5
 LEAST_SURE_AT_FIRST_PX = 5.0
 # What may have moved both edges is stated up to here (pixels): more is a strip as broad as the window that was fitted.
 LEAST_SURE_SHIFT_PX = 5.0
-BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
+BROKEN = "The outline near the measuring height is neither smooth nor straight"
+# A lossy codec leaves steps of its blocks on an outline, which look like dirt.
+BROKEN_BY = {
+    Coding.LOSSLESS: f"{BROKEN}: clean the fingers, or change the light.",
+    Coding.INTRAFRAME: f"{BROKEN}: clean the fingers, change the light, or record losslessly.",
+}
+BROKEN_BY[Coding.INTERFRAME] = BROKEN_BY[Coding.INTRAFRAME]
 TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
 SMEARED = "The fingers moved while the shutter was open"
 # Motion by so many pixels (a box as broad has the variance of its square over 12) smears a rounded tip beyond use.
@@ -158,7 +164,7 @@ def measure_gap(
                 covariance[1, 1] += beyond
                 own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
             if own is None:
-                return NoGap(Status.NO_FINGERS, BROKEN)
+                return NoGap(Status.NO_FINGERS, BROKEN_BY[coding])
             measured.append(own)
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX

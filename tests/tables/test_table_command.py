@@ -79,6 +79,26 @@ def test_a_key_that_is_said_once_is_used_by_the_next_call_and_nothing_is_written
         read_measured_table(table)
 
 
+def test_a_gap_over_the_input_without_times_is_said_once_for_a_measurement_and_for_a_simulation(tmp_path: Path) -> None:
+    table = tmp_path / "curve.txt"
+    rows = "".join(f"{0.1 * k:.1f} {4.2 + 0.77 * k:.2f}\n" for k in range(8))
+    table.write_text("% Eingriff (mm)   Gap (mm)\n" + rows, encoding="utf-8")
+    with pytest.raises(OpenQuestionError) as caught:
+        call("table", table)
+    assert "--as" not in str(caught.value)
+    printed = call("table", table, "--set", caught.value.questions[0].key)
+    assert "measured or simulation table" in printed
+    assert json.loads(call("table", table, "--json"))["also"] == "simulation"
+    np.testing.assert_allclose(read_measured_table(table).gap_mm, 4.2 + 0.77 * np.arange(8))
+    np.testing.assert_allclose(read_model(table).base.respond(np.array([0.35])).gap_mm, 6.895)
+
+
+def test_times_make_a_measured_table_of_it(tmp_path: Path) -> None:
+    table = copied("inches.csv", tmp_path)
+    assert json.loads(call("table", table, "--json"))["also"] == ""
+    assert 'as = "measured"' in (tmp_path / "columns.toml").read_text(encoding="utf-8")
+
+
 def test_two_open_questions_suggest_two_columns(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("alpha,beta,gamma\n0,1,2\n1,2,3\n2,4,5\n", encoding="utf-8")
     with pytest.raises(OpenQuestionError, match=r"columns\.input=alpha --set columns\.gap=beta"):

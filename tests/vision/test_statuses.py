@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fingervision.domain.frame import Frame, Pixels
+from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering import Camera, Light, Patch, Scene, dust, render, two_fingers
@@ -186,3 +186,14 @@ def test_a_scene_without_a_gap_says_why(name: str) -> None:
 def test_clutter_is_never_a_number(name: str, seed: int) -> None:
     found = measure_frame(Frame(CLUTTER[name](np.random.default_rng(seed)), 0), SETTINGS)
     assert isinstance(found, NoGap), found
+
+
+@pytest.mark.parametrize("coding", list(Coding))
+def test_a_broken_outline_blames_a_lossy_recording_only_where_the_recording_is_lossy(coding: Coding) -> None:
+    rng = np.random.default_rng(2)
+    scene = two_fingers(150.0, radius_px=30.0, tip_at_px=120.4)
+    dirty = Scene(scene.fingers, behind=scene.behind, light=scene.light, before=dust(540, rng, size_px=(2.0, 9.0)))
+    found = measure_frame(Frame(render(dirty, CAMERA, rng), 0, 0.0, coding), SETTINGS)
+    assert isinstance(found, NoGap)
+    assert "clean the fingers" in found.words
+    assert ("losslessly" in found.words) == (coding is not Coding.LOSSLESS)

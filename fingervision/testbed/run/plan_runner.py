@@ -19,6 +19,8 @@ from fingervision.testbed.run.safety_monitor import Watch
 FIRST_FRAMES = 75
 # A recorded run begins at rest.
 REST_FRAMES = 5
+# A stage that takes less than this share of the time foreseen does not keep its speed: ramps only make it longer.
+LEAST_SHARE = 0.5
 
 Progress = Callable[[float, float], None]
 
@@ -99,6 +101,7 @@ class Runner:
         watch.find_fingers()
         first = self._first_leg()
         total_s, done_s = sum(self.plan.seconds), sum(self.plan.seconds[:first])
+        foreseen_s = moved_s = 0.0
         record.event("began", f"{len(self.plan.legs)} legs.")
         self._rest(first)
         for number, (leg, seconds) in enumerate(zip(self.plan.legs, self.plan.seconds, strict=True)):
@@ -107,12 +110,27 @@ class Runner:
             watch.leg = leg
             words = f"Step {leg.step}: {leg.words}."
             record.event("leg", words, leg=number, step=leg.step, frame=record.counts.recorded)
+            began_s, from_mm = watch.bed.clock.now_s(), watch.sight.position.newest
             self._do(leg, number)
+            if isinstance(leg.act, Go) and leg.act.frames is None:
+                moved_s += watch.bed.clock.now_s() - began_s
+                foreseen_s += abs(leg.act.to_mm - from_mm) / leg.act.speed_mm_s
             done_s += seconds
             self.on_progress(done_s, total_s)
         record.write(at_once=True)
+        if moved_s < LEAST_SHARE * foreseen_s:
+            self._warn_of_speed(moved_s, foreseen_s)
         record.event("clocks", "The instruments' clocks beside the bed's.", **watch.sight.clocks())
         record.event("ended", f"{record.counts.recorded} frames.")
+
+    def _warn_of_speed(self, moved_s: float, foreseen_s: float) -> None:
+        words = (
+            f"warning: the recorded motions took {moved_s:.3g} s, but take {foreseen_s:.3g} s at the speeds of the "
+            "recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract tests; "
+            "`fingervision bed check` prints their command line."
+        )
+        self.watch.say(words)
+        self.watch.record.event("too_fast", words)
 
     def _first_leg(self) -> int:
         """Index of the first segment to execute: 0 with replay; without it, the segment that was interrupted."""
