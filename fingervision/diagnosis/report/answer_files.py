@@ -50,7 +50,7 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
     document["provenance"] = made.document()
     write_report(out / REPORT, document)
     before, after = (by_channel(done.data, mm) for mm in (done.before_mm, done.after_mm))
-    residuals = residual_figure(before, after if report.effects else None, done.data.chain.history)
+    residuals = residual_figure(before, after if report.effects else None, done.data.chain.history, done.left_out)
     write_figures(out, curves_of(done), residuals, f"{Path(model.base_path).name}: {report.verdict}")
     (out / PAGE).write_text(report_page(done, made, strip_html(table)), encoding="utf-8")
     return document

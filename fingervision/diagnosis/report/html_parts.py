@@ -55,9 +55,10 @@ def with_uncertainty(e: Estimate) -> list[str]:
 def chart(found: Chart, words: str) -> str:
     """HTML placeholder for a chart that the script draws, with a line below it for the value under the cursor."""
     name = escape(str(found["id"]), quote=True)
+    note = f'<p class="hint">{escape(str(found["note"]))}.</p>' if found.get("note") else ""
     return (
         f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{escape(words, quote=True)}. '
-        f'{HINT}"></div><p class="readout" aria-live="polite"></p>'
+        f'{HINT}"></div><p class="readout" aria-live="polite"></p>{note}'
     )
 
 

@@ -28,7 +28,7 @@ from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
 from fingervision.diagnosis.report.vector_figure import png_bytes
-from fingervision.domain.report import DiagnosisReport, Verdict
+from fingervision.domain.report import DiagnosisReport, Disagreement, Verdict
 from fingervision.effects import catalogue
 from fingervision.storage.provenance import Provenance
 
@@ -59,7 +59,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
     residual_mm = {SIMULATION: diagnosis.before_mm[:n]}
     if report.effects:
         residual_mm[CORRECTED] = diagnosis.after_mm[:n]
-    charts = charts_of(curves_of(diagnosis), residual_mm)
+    charts = charts_of(curves_of(diagnosis), residual_mm, diagnosis.left_out)
     by_name = {str(found["id"]): found for found in charts}
     gap = chart(by_name["gap-input"], "Gap over the input, measured and predicted")
     if "gap-time" in by_name:
@@ -68,7 +68,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
     if "residual-time" in by_name:
         residuals += chart(by_name["residual-time"], "Measured minus predicted gap over time")
     if history.both_edges or history.force:
-        figure = png_bytes(residual_figure(before, after if report.effects else None, history))
+        figure = png_bytes(residual_figure(before, after if report.effects else None, history, diagnosis.left_out))
         residuals += _picture(figure, "Measured minus predicted of each finger and channel, over input and time")
     parameters = [
         [named(effect.name), escape(effect.display_name(name)), *with_uncertainty(e)]
@@ -111,6 +111,7 @@ def _picture(png: bytes, words: str) -> str:
 def _how_much(report: DiagnosisReport) -> str:
     d = report.disagreement
     rows = [
+        [_counted(d), *(number(rms_mm) for rms_mm in d.counted_mm)],
         ["all rows", number(d.before_rms_mm), number(d.after_rms_mm)],
         ["runs that the fit did not see", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)],
         ["random noise", number(d.noise_rms_mm), ""],
@@ -118,9 +119,15 @@ def _how_much(report: DiagnosisReport) -> str:
     ]
     share = f'<data value="{report.explained_share!r}">{100.0 * report.explained_share:.1f}</data> %'
     return (
-        table(["disagreement, RMS", "before", "after"], rows)
-        + f"<p>The answer explains {share} of the squared disagreement.</p>"
+        table([f"disagreement of {'each finger edge' if d.of == 'edges' else 'the gap'}, RMS", "before", "after"], rows)
+        + f"<p>The answer explains {share} of the squared disagreement (first line of the table).</p>"
     )
+
+
+def _counted(d: Disagreement) -> str:
+    """What the verdict counts, in words."""
+    offsets = "" if d.unseen_before_rms_mm is None else ", without the runs' own offsets"
+    return f"counted: {d.rows - d.rows_left_out} of {d.rows} rows{offsets}"
 
 
 def _mechanisms(report: DiagnosisReport) -> str:
