@@ -72,7 +72,8 @@ def provenance_html(made: Provenance) -> str:
         ],
     )  # fmt: skip
     versions = ", ".join(f"{name} {version}" for name, version in made.versions.items())
-    return f"{files}<p>Made {escape(made.made_at)} by <code>{escape(made.command)}</code> with {escape(versions)}.</p>"
+    how = f"<p>Made {escape(made.made_at)} by <code>{escape(made.command)}</code> with {escape(versions)}.</p>"
+    return f"{files}{how}<p>To cite: {escape(made.citation)}</p>"
 
 
 def page(title: str, heading: str, verdict: str, sections: Sequence[tuple[str, str]], charts: list[Chart]) -> str:

@@ -50,8 +50,20 @@ def curves_of(diagnosis: Diagnosis) -> GapCurves:
     return gap_curves(data, diagnosis.report.disagreement.noise_rms_mm, predictions)
 
 
-def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
-    """Compose the report as HTML; `frames` is the HTML of the frames at the reversals."""
+def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement: Sequence[str] = ()) -> str:
+    """Compose the report as HTML.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the diagnosis.
+    made : Provenance
+        Files, command and versions.
+    frames : str
+        HTML of the frames at the reversals.
+    measurement : sequence of str
+        Sentences on the measurement: its clocks, and the uncertainty of the gap.
+    """
     report = diagnosis.report
     history = diagnosis.data.chain.history
     n = history.input_mm.size
@@ -90,6 +102,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
         ("Set aside", bullets(list(report.outliers))),
         ("Smallest size that this data would have shown", _detection_limits(report)),
         ("Not shown by this data", bullets([f"{e['name']}: {e['reason']}" for e in report.excluded])),
+        *([("How the gap was measured", bullets(measurement))] if measurement else []),
         ("Notes", bullets(list(report.notes))),
         *added_sections(diagnosis),
         ("Where this comes from", provenance_html(made)),

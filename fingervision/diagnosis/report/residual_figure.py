@@ -78,4 +78,4 @@ def _left_out(axes: Axes, x: Array, residual: Array, *, note: bool) -> None:
     axes.set_ylim(low, high)
     words = outside_words(residual, low, high)
     if note and words:
-        axes.text(0.01, 0.98, words, transform=axes.transAxes, va="top", fontsize="x-small", color="0.35")
+        axes.set_title(words, loc="right", fontsize="x-small", color="0.35")
