@@ -63,7 +63,7 @@ def test_every_row_set_aside_is_named_with_its_time(found: Diagnosis) -> None:
 
 def test_the_scale_of_a_figure_is_that_of_the_rows_that_count(found: Diagnosis) -> None:
     figure = residual_figure({"gap": found.before_mm[:500]}, None, found.data.chain.history, found.left_out)
-    axes = figure.axes[0]
+    axes = figure.axes[-1]
     assert axes.get_ylim()[1] < 2.0 * OFFSET_MM
     assert "3 of 3 rows left out lie outside the picture" in axes.get_title("right")
 

@@ -27,6 +27,7 @@ from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.diagnosis.report.sentences import EDGES
 from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Disagreement, Verdict
 from fingervision.effects import catalogue
@@ -132,7 +133,7 @@ def _how_much(report: DiagnosisReport) -> str:
     ]
     share = f'<data value="{report.explained_share!r}">{100.0 * report.explained_share:.1f}</data> %'
     return (
-        table([f"disagreement of {'each finger edge' if d.of == 'edges' else 'the gap'}, RMS", "before", "after"], rows)
+        table([f"disagreement{EDGES if d.of == 'edges' else ' of the gap'}, RMS", "before", "after"], rows)
         + f"<p>The answer explains {share} of the squared disagreement (first line of the table).</p>"
     )
 

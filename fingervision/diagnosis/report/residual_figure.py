@@ -57,7 +57,9 @@ def residual_figure(
                     style = STYLES[label] | {"markersize": (1.0 if label == "before" else 0.6) * size}
                     axes.plot(x[counts], residual[channel][counts], label=label, **style)
                 if left_out:
-                    _left_out(axes, x[~counts], list(drawn.values())[-1][channel][~counts], note=column == 0)
+                    _left_out(
+                        axes, x[~counts], list(drawn.values())[-1][channel][~counts], note=column == len(panels) - 1
+                    )
                 if row == len(before) - 1:
                     axes.set_xlabel(beneath)
                 if column == 0:
