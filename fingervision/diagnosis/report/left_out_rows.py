@@ -21,7 +21,7 @@ OutlierRow = Mapping[str, object]
 def outlier_rows(
     data: Observations, problem: Problem, after_mm: Array, left_out: Sequence[int]
 ) -> tuple[OutlierRow, ...]:
-    """Describe the rows set aside: run, time (or number, from 1), input, deviation of the gap, and whether they count.
+    """Describe the rows set aside: time (or number, from 1), input, deviation, and whether they count.
 
     Parameters
     ----------
@@ -35,12 +35,18 @@ def outlier_rows(
         Rows that the figures of the report do not count.
     """
     table, uncounted = data.table, frozenset(left_out)
+    n, both = table.input_mm.size, data.chain.history.both_edges
+    # Only where times restart does a time not tell the run; elsewhere the names of runs change nothing.
+    restarts = table.time_s is not None and not table.shared_clock
     out: list[OutlierRow] = []
     for run, name in zip(table.runs, table.run_names, strict=True):
         for i in (np.flatnonzero(problem.whitener.aside[run]) + run.start).tolist():
             when = {"row": i + 1} if table.time_s is None else {"time_s": float(table.time_s[i])}
-            place = {"input_mm": float(table.input_mm[i]), "gap_off_mm": float(after_mm[i])}
-            out.append({"run": name, **when, **place, "counted": i not in uncounted})
+            off = {"gap_off_mm": float(after_mm[i])}
+            if both:
+                off["midline_off_mm"] = float(after_mm[n + i])
+            which = {"run": name} if restarts else {}
+            out.append({**which, **when, "input_mm": float(table.input_mm[i]), **off, "counted": i not in uncounted})
     return tuple(out)
 
 
@@ -56,7 +62,7 @@ def outside_words(residual: Array, low: float, high: float) -> str:
 def outliers(data: Observations, problem: Problem, rows: Sequence[OutlierRow], after_mm: Array) -> tuple[str, ...]:
     """Sentences with the number of excluded rows and the first of them, and with the odd rows of a short table."""
     n = data.table.input_mm.size
-    out = [_sentence(rows, n, several=len(data.table.runs) > 1)] if rows else []
+    out = [_sentence(rows, n)] if rows else []
     if n <= FEW_ROWS:
         gap = after_mm[:n] - np.median(after_mm[:n])
         scale = 1.4826 * float(np.median(np.abs(gap)))
@@ -69,16 +75,16 @@ def outliers(data: Observations, problem: Problem, rows: Sequence[OutlierRow], a
     return tuple(out)
 
 
-def _sentence(rows: Sequence[OutlierRow], n: int, *, several: bool) -> str:
+def _sentence(rows: Sequence[OutlierRow], n: int) -> str:
     """Sentence with the number of rows set aside, the first of them, and the number of those that still count."""
     first = [
         (f"{row['time_s']:g} s" if "time_s" in row else f"row {row['row']}")
-        + (f" of run {row['run']}" if several and row["run"] else "")
+        + (f" of run {row['run']}" if row.get("run") else "")
         for row in rows[:FIRST]
     ]
     more = f" and {len(rows) - FIRST} more (outlier_rows in report.json)" if len(rows) > FIRST else ""
     words = f"{len(rows)} of {n} samples were set aside as outliers: {', '.join(first)}{more}"
     counted = sum(bool(row["counted"]) for row in rows)
     if counted:
-        words += f"; {counted} of them are the peak of a wider deviation, and count in the RMS"
+        words += f"; {counted} of them {'is' if counted == 1 else 'are'} the peak of a wider deviation, and in the RMS"
     return f"{words}."
