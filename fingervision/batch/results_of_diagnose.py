@@ -41,6 +41,8 @@ def digest_of(folder: Path) -> Digest:
     }
     caption = f"{report['verdict']}{': ' if names else ''}{names}; {1e3 * rms['before_rms_mm']:.3g} µm, after it "
     caption += f"{1e3 * rms['after_rms_mm']:.3g} µm, noise {1e3 * rms['noise_rms_mm']:.3g} µm"
+    if report["disagreement"].get("rows_left_out"):
+        caption += f" (all rows, with the {report['disagreement']['rows_left_out']} left out as outliers)"
     return Digest(cells, (rms["before_rms_mm"], rms["after_rms_mm"], rms["noise_rms_mm"]), caption)
 
 

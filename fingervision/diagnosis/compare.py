@@ -9,10 +9,13 @@ from fingervision.diagnosis.bodies.body_evidence import body_evidence, drawing_o
 from fingervision.diagnosis.bodies.place_diagnosis import without_places
 from fingervision.diagnosis.bodies.place_words import body_places
 from fingervision.diagnosis.inference.cross_validation import rms_mm
+from fingervision.diagnosis.inference.verdict import isolated
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
+from fingervision.diagnosis.report.clock_words import within_clock
 from fingervision.diagnosis.report.residual_channels import by_channel, places
+from fingervision.diagnosis.report.sentences import EDGES
 from fingervision.domain.effect import Array, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place
@@ -39,8 +42,13 @@ class Comparison:
     places : tuple of Place
         Regions, largest first.
     rms_mm, noise_mm : float
-        RMS disagreement of one gap reading, and an upper bound of its noise: fast changes of the disagreement count as
-        noise here, so that the bound is larger for a model that deviates more.
+        RMS disagreement over all rows, of each finger's edge if both were measured, else of the gap; and an upper bound
+        of the noise of one gap reading: fast changes of the disagreement count as noise here, so that the bound is
+        larger for a model that deviates more.
+    counted_rms_mm : float
+        RMS disagreement without the rows in `left_out`.
+    left_out : tuple of int
+        Outliers that stand alone.
     """
 
     data: Observations
@@ -48,6 +56,15 @@ class Comparison:
     places: tuple[Place, ...]
     rms_mm: float
     noise_mm: float
+    counted_rms_mm: float
+    left_out: tuple[int, ...]
+
+    def words(self) -> str:
+        """Return disagreement and noise as a part of a sentence."""
+        of = EDGES if self.data.chain.history.both_edges else ""
+        rows = f"{len(self.left_out)} of {self.data.table.gap_mm.size} rows"
+        without = f" ({self.counted_rms_mm:.3g} mm without {rows} set aside as outliers)" if self.left_out else ""
+        return f"RMS disagreement {self.rms_mm:.3g} mm{of}{without}, noise of the gap at most {self.noise_mm:.2g} mm"
 
     def document(self) -> dict[str, object]:
         """Return the comparison as a mapping that can be written as JSON."""
@@ -55,6 +72,10 @@ class Comparison:
             "schema": 1,
             "rms_mm": self.rms_mm,
             "noise_mm": self.noise_mm,
+            "of": "edges" if self.data.chain.history.both_edges else "gap",
+            "counted_rms_mm": self.counted_rms_mm,
+            "rows": self.data.table.gap_mm.size,
+            "rows_left_out": len(self.left_out),
             "where": [
                 {
                     "channel": p.channel,
@@ -131,5 +152,15 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         evidence, notes = body_evidence(table, answers, history.input_mm, np.random.default_rng(seed))
         found = (*found, *(() if evidence is None else body_places(evidence, answers)))
         data = replace(data, notes=(*data.notes, *notes))
-    rms = rms_mm(residual, history.input_mm.size, history.both_edges)
-    return Comparison(data, by_channel(data, residual), found, rms, problem.whitener.noises[0].total_mm)
+    n, both = history.input_mm.size, history.both_edges
+    aside = isolated(residual[:n], problem.whitener.aside[:n], history.runs)
+    counted = np.concatenate([part[~aside] for part in np.split(residual, len(data.channels))])
+    return Comparison(
+        data,
+        by_channel(data, residual),
+        within_clock(found, data),
+        rms_mm(residual, n, both),
+        problem.whitener.noises[0].total_mm,
+        rms_mm(counted, int(np.sum(~aside)), both),
+        tuple(np.flatnonzero(aside).tolist()),
+    )

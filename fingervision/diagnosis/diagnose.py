@@ -43,6 +43,8 @@ class Diagnosis:
         Results by ISO 230-2, if the table repeats its target positions.
     bodies : BodyEvidence or None
         Results from the poses of bodies, if there are any.
+    left_out : tuple of int
+        Rows that stand alone far off the others, which the verdict does not count.
     """
 
     report: DiagnosisReport
@@ -51,6 +53,7 @@ class Diagnosis:
     after_mm: Array
     positioning: PositioningReport | NoRepeatedTargets
     bodies: BodyEvidence | None = None
+    left_out: tuple[int, ...] = ()
 
 
 def diagnose(
@@ -137,7 +140,14 @@ def _explained(
     report = diagnosis_report(answered, refitted.posterior, mistake, rng, begin_s)
     progress(1.0)
     positioning = positioning_of_data(answered.data, answered.values())
-    return Diagnosis(report, answered.data, answered.before_mm, answered.after_mm, positioning)
+    return Diagnosis(
+        report,
+        answered.data,
+        answered.before_mm,
+        answered.after_mm,
+        positioning,
+        left_out=answered.stands.left_out,
+    )
 
 
 def _searched(

@@ -66,9 +66,25 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """RMS of measured minus predicted gap in mm, without the constant offset of the midline.
+    """RMS of measured minus predicted values in mm, of each finger's edge if both were measured, else of the gap.
 
-    The values `unseen` are from cross-validation: each run is predicted from a fit to the other runs.
+    The constant offset of the midline is removed. `before_rms_mm`, `after_rms_mm` and `by_channel` are over all rows.
+
+    Parameters
+    ----------
+    before_rms_mm, after_rms_mm, noise_rms_mm : float
+        RMS without and with the named effects, and that of the random noise.
+    unseen_before_rms_mm, unseen_after_rms_mm : float or None
+        The same from cross-validation: each run is predicted from a fit to the other runs.
+    by_channel : mapping
+        RMS without and with the named effects, by channel.
+    counted_before_rms_mm, counted_after_rms_mm : float or None
+        RMS from which the verdict and its shares are computed: without the rows left out, and without the runs'
+        deviations from their common mean; None if they are those over all rows.
+    rows, rows_left_out : int
+        Number of rows with a gap, and of those that the verdict leaves out.
+    of : str
+        `edges` or `gap`: the quantity of which the values are the RMS.
     """
 
     before_rms_mm: float
@@ -77,6 +93,18 @@ class Disagreement:
     unseen_before_rms_mm: float | None
     unseen_after_rms_mm: float | None
     by_channel: Mapping[str, Mapping[str, float]]
+    counted_before_rms_mm: float | None = None
+    counted_after_rms_mm: float | None = None
+    rows: int = 0
+    rows_left_out: int = 0
+    of: str = "gap"
+
+    @property
+    def counted_mm(self) -> tuple[float, float]:
+        """RMS without and with the named effects, from which the verdict and its shares are computed."""
+        if self.counted_before_rms_mm is None or self.counted_after_rms_mm is None:
+            return self.before_rms_mm, self.after_rms_mm
+        return self.counted_before_rms_mm, self.counted_after_rms_mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +124,8 @@ class DiagnosisReport:
     """The result of a diagnosis, with the fields of report.json.
 
     `explained_share` is 1 - (after / before)^2 and `standing_share` is after / before, where `before` and `after` are
-    the RMS disagreement without outliers and the scatter between runs; `pure_error_mm` is the standard deviation of
-    replicates of the gap, None without replicates.
+    the counted RMS of the disagreement: without outliers and the scatter between runs. `pure_error_mm` is the standard
+    deviation of replicates of the gap, None without replicates. `outlier_rows` describes each row set aside in the fit.
     """
 
     verdict: Verdict
@@ -115,6 +143,7 @@ class DiagnosisReport:
     next_run: NextRun | None
     excluded: tuple[Mapping[str, str], ...]
     outliers: tuple[str, ...]
+    outlier_rows: tuple[Mapping[str, object], ...]
     runners_up: tuple[Mapping[str, object], ...]
     notes: tuple[str, ...]
     seconds: float

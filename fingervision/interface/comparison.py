@@ -102,7 +102,7 @@ class Comparison:
         lines = []
         for name, found in self.models.items():
             which = "" if len(self.models) == 1 else f"{name}: "
-            lines.append(f"{which}RMS disagreement {found.rms_mm:.3g} mm, noise at most {found.noise_mm:.2g} mm")
+            lines.append(f"{which}{found.words()}")
             lines += [f"  {place.words}" for place in found.places] or ["  nowhere beyond the noise"]
             lines += [f"  note: {words}" for words in (*found.data.notes, *found.data.refitted())]
         return "\n".join(lines)

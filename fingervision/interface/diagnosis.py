@@ -98,7 +98,10 @@ class Diagnosis:
         """Draw the residuals before and after the correction, as in residuals.svg."""
         after = self.residual_after_mm if self.effects else None
         return residual_figure(
-            dict(self.residual_before_mm), None if after is None else dict(after), self.found.data.chain.history
+            dict(self.residual_before_mm),
+            None if after is None else dict(after),
+            self.found.data.chain.history,
+            self.found.left_out,
         )
 
     def sentences(self) -> str:

@@ -10,6 +10,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+AUTHORS, RELEASED = "The fingervision contributors", 2026
+"""Authors and year of the release, as in CITATION.cff."""
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "av")
 
 
@@ -43,6 +45,13 @@ class Provenance:
     command: str
     versions: Mapping[str, str]
     made_at: str
+
+    @property
+    def citation(self) -> str:
+        """Reference to the software, as CITATION.cff has it."""
+        return (
+            f"{AUTHORS} ({RELEASED}). fingervision, version {self.versions.get('fingervision', 'unknown')}. Software."
+        )
 
     def document(self) -> dict[str, object]:
         """Return the provenance as a mapping for JSON."""

@@ -46,6 +46,7 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
         },
         "excluded": list(report.excluded),
         "outliers": list(report.outliers),
+        "outlier_rows": [dict(row) for row in report.outlier_rows],
         "runners_up": list(report.runners_up),
         "notes": list(report.notes),
         "model": model_path,

@@ -78,6 +78,17 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
     raise UsageError(f"--out must be a folder of its own, but {folder} holds the results of {of}: name another folder.")
 
 
+def measurement_beside(table: Path) -> Mapping[str, Any]:
+    """Content of the summary beside a gaps.csv; empty for any other table."""
+    if table.name != GAPS:
+        return {}
+    try:
+        found = json.loads((table.parent / SUMMARY).read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def u_clock_beside(table: Path) -> float:
     """Standard uncertainty (s) of the offset between the clocks of gap and drive, from the summary beside a gaps.csv.
 
@@ -91,11 +102,9 @@ def u_clock_beside(table: Path) -> float:
     float
         Standard uncertainty in s; 0 for any other table, or if the offset was given instead of estimated.
     """
-    if table.name != GAPS:
-        return 0.0
     try:
-        settings = json.loads((table.parent / SUMMARY).read_bytes())["settings"]
+        settings = measurement_beside(table)["settings"]
         found = float(settings["u_drive_time_s"]) if settings["drive_offset"] == "found" else 0.0
-    except (OSError, ValueError, LookupError, TypeError):
+    except (ValueError, LookupError, TypeError):
         return 0.0
     return found if 0.0 < found < float("inf") else 0.0

@@ -13,7 +13,7 @@ from fingervision.diagnosis.bodies.next_view import next_view
 from fingervision.diagnosis.bodies.place_findings import Fitted
 from fingervision.diagnosis.bodies.place_words import set_words
 from fingervision.domain.parameter import Estimate
-from fingervision.domain.report import Disagreement, NamedEffect, Verdict
+from fingervision.domain.report import NamedEffect, Verdict
 from fingervision.effects import catalogue
 from fingervision.models.place_answers import PlaceAnswers
 
@@ -56,11 +56,15 @@ def composed(
     elif len(alternatives) > 1:
         verdict = Verdict.AMBIGUOUS
     before, after = first.report.disagreement, rest.disagreement
-    disagreement = Disagreement(
-        before.before_rms_mm, after.after_rms_mm, after.noise_rms_mm, before.unseen_before_rms_mm,
-        after.unseen_after_rms_mm, before.by_channel,
-    )  # fmt: skip
-    share = float(np.clip(1.0 - (after.after_rms_mm / max(before.before_rms_mm, 1e-300)) ** 2, 0.0, 1.0))
+    disagreement = replace(
+        after,
+        before_rms_mm=before.before_rms_mm,
+        unseen_before_rms_mm=before.unseen_before_rms_mm,
+        by_channel=before.by_channel,
+        counted_before_rms_mm=before.counted_before_rms_mm,
+    )
+    before_mm, after_mm = disagreement.counted_mm
+    share = float(np.clip(1.0 - (after_mm / max(before_mm, 1e-300)) ** 2, 0.0, 1.0))
     view = next_view(evidence, answers)
     said = set_words(members)
     sentence = f"Poses of the bodies tell the place: {said} (95 %)."

@@ -109,7 +109,12 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
         alternatives=(),
         unknown=None,
         next_run=None,
-        disagreement=replace(d, after_rms_mm=d.before_rms_mm, unseen_after_rms_mm=d.unseen_before_rms_mm),
+        disagreement=replace(
+            d,
+            after_rms_mm=d.before_rms_mm,
+            unseen_after_rms_mm=d.unseen_before_rms_mm,
+            counted_after_rms_mm=d.counted_before_rms_mm,
+        ),
         remaining=f"The remaining difference is {d.before_rms_mm:.3g} mm RMS: noise, or the form of the explanation.",
     )
     return replace(done, report=report, after_mm=done.before_mm)

@@ -51,6 +51,8 @@ class Standing:
         Largest rounding error of a reading: half of its last digit.
     aside_share : float
         Share of the rows excluded as gross errors.
+    left_out : tuple of int
+        Rows that were not used.
     """
 
     before_mm: float
@@ -60,6 +62,7 @@ class Standing:
     noise_degrees: int | None
     rounding_mm: float = 0.0
     aside_share: float = 0.0
+    left_out: tuple[int, ...] = ()
 
     @property
     def explained_share(self) -> float:
@@ -103,7 +106,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
     n, both, runs = history.input_mm.size, history.both_edges, history.runs
-    aside = problem.whitener.aside[:n] & ~_leans(after_mm[:n], problem.whitener.aside[:n], runs)
+    aside = isolated(after_mm[:n], problem.whitener.aside[:n], runs)
     noises = [noise.total_mm for noise in problem.whitener.noises]
     if history.commanded:
         # What the stage does after each jump is no noise, and passes for it in the spectrum.
@@ -135,7 +138,23 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     degrees = None if errors is None else min(error.degrees for error in errors)
     rounding_mm = 0.5 * resolution(data.table.gap_mm) if data.repeats is not None else 0.0
     kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
-    return Standing(rms(before_mm), rms(after_mm), noise, kept, degrees, rounding_mm, gross)
+    left_out = tuple(np.flatnonzero(aside).tolist())
+    return Standing(rms(before_mm), rms(after_mm), noise, kept, degrees, rounding_mm, gross, left_out)
+
+
+def isolated(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
+    """Mark the rows set aside that stand alone; all others are part of the disagreement.
+
+    Parameters
+    ----------
+    residual_mm : ndarray of float, shape (n,)
+        Measured minus predicted gap.
+    aside : ndarray of bool, shape (n,)
+        Rows set aside in the fit.
+    runs : tuple of slice
+        Rows of each run.
+    """
+    return aside & ~_leans(residual_mm, aside, runs)
 
 
 def _leans(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:

@@ -146,8 +146,8 @@ def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
         return ()
     return (
         "the clocks of input and pictures were laid on each other by this motion itself "
-        f"(U = {2.0 * table.u_clock_s:.2g} s, k = 2): a lag that is the same at all times is part of that offset, "
-        "and one is named only beyond its uncertainty.",
+        f"(U = {2.0 * table.u_clock_s:.2g} s over the frames, k = 2): a lag that is the same at all times is part of "
+        "that offset, and one is named only beyond its uncertainty.",
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from fingervision.diagnosis.diagnose import Diagnosis
 from fingervision.diagnosis.report.figure_files import write_figures
 from fingervision.diagnosis.report.frame_strip import strip_html
+from fingervision.diagnosis.report.measurement_words import measurement_words
 from fingervision.diagnosis.report.positioning_of_data import positioning_section
 from fingervision.diagnosis.report.report_page import curves_of, report_page
 from fingervision.diagnosis.report.residual_channels import by_channel
@@ -50,9 +51,9 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
     document["provenance"] = made.document()
     write_report(out / REPORT, document)
     before, after = (by_channel(done.data, mm) for mm in (done.before_mm, done.after_mm))
-    residuals = residual_figure(before, after if report.effects else None, done.data.chain.history)
+    residuals = residual_figure(before, after if report.effects else None, done.data.chain.history, done.left_out)
     write_figures(out, curves_of(done), residuals, f"{Path(model.base_path).name}: {report.verdict}")
-    (out / PAGE).write_text(report_page(done, made, strip_html(table)), encoding="utf-8")
+    (out / PAGE).write_text(report_page(done, made, strip_html(table), measurement_words(table)), encoding="utf-8")
     return document
 
 

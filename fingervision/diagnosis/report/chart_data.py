@@ -1,11 +1,13 @@
 """Data of the charts on a report's HTML page, as JSON for the page's script."""
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.report.gap_curves import GapCurves
+from fingervision.diagnosis.report.left_out_rows import outside_words
 from fingervision.domain.effect import Array, Flags
 
 MOST_ROWS = 3000
@@ -16,7 +18,7 @@ DASHES: tuple[list[int], ...] = ([6, 4], [], [8, 3, 2, 3], [2, 3])
 Chart = dict[str, object]
 
 
-def charts_of(curves: GapCurves, residual_mm: dict[str, Array]) -> list[Chart]:
+def charts_of(curves: GapCurves, residual_mm: dict[str, Array], left_out: Sequence[int] = ()) -> list[Chart]:
     """Compose the charts: gap and residual over the input, and over time if the runs have a common clock.
 
     Parameters
@@ -25,13 +27,17 @@ def charts_of(curves: GapCurves, residual_mm: dict[str, Array]) -> list[Chart]:
         Measurement and predictions.
     residual_mm : dict of ndarray of float, shape (n,)
         Measured minus predicted gap, by the name of the prediction.
+    left_out : sequence of int
+        Rows that the figures of the report do not count: drawn grey, and not considered by the scale.
     """
+    counts = np.ones(curves.input_mm.size, dtype=bool)
+    counts[list(left_out)] = False
     found = [_gap(curves, "gap-input", curves.input_mm, "input, mm", both_ways=True)]
     if curves.time_s is not None:
         found.append(_gap(curves, "gap-time", curves.time_s, "time, s", both_ways=False))
-    found.append(_residuals(residual_mm, "residual-input", curves.input_mm, "input, mm"))
+    found.append(_residuals(residual_mm, "residual-input", curves.input_mm, "input, mm", counts))
     if curves.time_s is not None:
-        found.append(_residuals(residual_mm, "residual-time", curves.time_s, "time, s"))
+        found.append(_residuals(residual_mm, "residual-time", curves.time_s, "time, s", counts))
     return found
 
 
@@ -74,14 +80,24 @@ def _gap(curves: GapCurves, name: str, x: Array, label: str, *, both_ways: bool)
     return {"id": name, "x": label, "y": f"gap, mm{thinned}", "at": _values(x, rows), "series": series}
 
 
-def _residuals(residual_mm: dict[str, Array], name: str, x: Array, label: str) -> Chart:
+def _residuals(residual_mm: dict[str, Array], name: str, x: Array, label: str, counts: Flags) -> Chart:
     rows, thinned = _shown(x)
-    series = [
+    series: list[dict[str, object]] = [
         {"label": f"measured minus {model}", "points": True, "filled": number > 0, "colour": 1 + number % 5, "dash": [],
-         "values": _values(residual, rows)}
+         "values": _values(residual, rows, counts)}
         for number, (model, residual) in enumerate(residual_mm.items())
     ]  # fmt: skip
+    note = ""
+    if not counts.all():
+        last = list(residual_mm.values())[-1]
+        series.append(
+            {"label": "left out", "points": True, "filled": False, "colour": 0, "dash": [], "aside": True,
+             "values": _values(last, rows, ~counts)}
+        )  # fmt: skip
+        shown = np.concatenate([residual[counts] for residual in residual_mm.values()])
+        note = outside_words(last[~counts], *(float(end(shown)) for end in (np.min, np.max))) if shown.size else ""
     return {
+        "note": note,
         "id": name,
         "x": label,
         "y": f"difference of the gap, mm{thinned}",

@@ -59,14 +59,19 @@ def residuals_of(found: Mapping[str, Comparison]) -> Figure:
     """Plot the residuals: of a single model by channel; of several models, the gap's residual of each."""
     first = next(iter(found.values()))
     if len(found) == 1:
-        return residual_figure(first.residual_mm, None, first.data.chain.history)
+        return residual_figure(first.residual_mm, None, first.data.chain.history, first.left_out)
     return residual_figure(
-        {name: one.residual_mm["gap"] for name, one in found.items()}, None, first.data.chain.history
+        {name: one.residual_mm["gap"] for name, one in found.items()}, None, first.data.chain.history, _left_out(found)
     )
 
 
+def _left_out(found: Mapping[str, Comparison]) -> tuple[int, ...]:
+    """Rows that no model's figure counts: what one model alone leaves out may be the other's disagreement."""
+    return tuple(sorted(set.intersection(*(set(one.left_out) for one in found.values()))))
+
+
 def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, frames: str) -> str:
-    charts = charts_of(curves, {name: one.residual_mm["gap"] for name, one in found.items()})
+    charts = charts_of(curves, {name: one.residual_mm["gap"] for name, one in found.items()}, _left_out(found))
     names = {
         "gap-input": "Gap over the input, measured and predicted",
         "gap-time": "Gap over time, measured and predicted",
@@ -78,10 +83,7 @@ def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, 
         [escape(name), number(one.rms_mm), number(one.noise_mm), f"{len(one.places)}"] for name, one in found.items()
     ]
     least = min(found, key=lambda name: found[name].rms_mm)
-    verdict = (
-        f"{least}: {found[least].rms_mm:.3g} mm RMS between measurement and model, where random noise is "
-        f"{found[least].noise_mm:.2g} mm."
-    )
+    verdict = f"{least}: {found[least].words()}."
     if len(found) > 1:
         verdict = f"Nearest of {len(found)} models is {verdict}"
     places = "".join(

@@ -17,13 +17,13 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.dead_band_hint import dead_band_hint
 from fingervision.diagnosis.report.force_hint import force_hint
+from fingervision.diagnosis.report.left_out_rows import outlier_rows, outliers
 from fingervision.diagnosis.report.open_parameters import draws_of, limited, open_parameters
 from fingervision.diagnosis.report.residual_channels import by_channel, places
 from fingervision.diagnosis.report.sentences import (
     answer,
     beyond_the_search,
     input_dominates,
-    outliers,
     remaining,
     rows_beyond_model,
 )
@@ -61,6 +61,7 @@ def diagnosis_report(
     best, mapped = found.best, data.position_map is not None
     decided, unknown = verdict(found, mapped=mapped, stands=stands)
     disagreement = _disagreement(answered)
+    rows = outlier_rows(data, found.problem, answered.after_mm, stands.left_out)
     effects = _named(data, found, posterior)
     errors = data.measured_pure_errors(np.split(found.problem.whitener.aside, len(data.channels)))
     members = tuple(e for e in found.alternatives if e.names)
@@ -81,7 +82,8 @@ def diagnosis_report(
         remaining=remaining(stands, found.left_over, best.sigma_mm),
         next_run=proposal,
         excluded=tuple({"name": name, "reason": reason} for name, reason in data.excluded.items()),
-        outliers=outliers(data, found.problem, answered.after_mm),
+        outliers=outliers(data, found.problem, rows, answered.after_mm),
+        outlier_rows=rows,
         runners_up=tuple(
             {
                 "effects": list(e.names),
@@ -108,7 +110,7 @@ def diagnosis_report(
 
 
 def _disagreement(answered: Answer) -> Disagreement:
-    """The disagreement without and with the named effects, in total and by channel."""
+    """The disagreement without and with the named effects: in total, by channel, and as the verdict counts it."""
     data, found = answered.data, answered.found
     before, after = answered.before_mm, answered.after_mm
     n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges
@@ -122,7 +124,19 @@ def _disagreement(answered: Answer) -> Disagreement:
     noises = [noise.total_mm for noise in found.problem.whitener.noises]
     noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
     unseen = left_out_rms_mm(data, found.problem, found.best)
-    return Disagreement(rms_mm(before, n, edges), rms_mm(after, n, edges), noise_rms, *unseen, channels)
+    stands = answered.stands
+    return Disagreement(
+        rms_mm(before, n, edges),
+        rms_mm(after, n, edges),
+        noise_rms,
+        *unseen,
+        channels,
+        counted_before_rms_mm=stands.before_mm,
+        counted_after_rms_mm=stands.after_mm,
+        rows=n,
+        rows_left_out=len(stands.left_out),
+        of="edges" if edges else "gap",
+    )
 
 
 def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:

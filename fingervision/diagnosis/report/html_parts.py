@@ -55,9 +55,10 @@ def with_uncertainty(e: Estimate) -> list[str]:
 def chart(found: Chart, words: str) -> str:
     """HTML placeholder for a chart that the script draws, with a line below it for the value under the cursor."""
     name = escape(str(found["id"]), quote=True)
+    note = f'<p class="hint">{escape(str(found["note"]))}.</p>' if found.get("note") else ""
     return (
         f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{escape(words, quote=True)}. '
-        f'{HINT}"></div><p class="readout" aria-live="polite"></p>'
+        f'{HINT}"></div><p class="readout" aria-live="polite"></p>{note}'
     )
 
 
@@ -71,7 +72,8 @@ def provenance_html(made: Provenance) -> str:
         ],
     )  # fmt: skip
     versions = ", ".join(f"{name} {version}" for name, version in made.versions.items())
-    return f"{files}<p>Made {escape(made.made_at)} by <code>{escape(made.command)}</code> with {escape(versions)}.</p>"
+    how = f"<p>Made {escape(made.made_at)} by <code>{escape(made.command)}</code> with {escape(versions)}.</p>"
+    return f"{files}{how}<p>To cite: {escape(made.citation)}</p>"
 
 
 def page(title: str, heading: str, verdict: str, sections: Sequence[tuple[str, str]], charts: list[Chart]) -> str:

@@ -27,8 +27,9 @@ from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.diagnosis.report.sentences import EDGES
 from fingervision.diagnosis.report.vector_figure import png_bytes
-from fingervision.domain.report import DiagnosisReport, Verdict
+from fingervision.domain.report import DiagnosisReport, Disagreement, Verdict
 from fingervision.effects import catalogue
 from fingervision.storage.provenance import Provenance
 
@@ -50,8 +51,20 @@ def curves_of(diagnosis: Diagnosis) -> GapCurves:
     return gap_curves(data, diagnosis.report.disagreement.noise_rms_mm, predictions)
 
 
-def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
-    """Compose the report as HTML; `frames` is the HTML of the frames at the reversals."""
+def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement: Sequence[str] = ()) -> str:
+    """Compose the report as HTML.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the diagnosis.
+    made : Provenance
+        Files, command and versions.
+    frames : str
+        HTML of the frames at the reversals.
+    measurement : sequence of str
+        Sentences on the measurement: its clocks, and the uncertainty of the gap.
+    """
     report = diagnosis.report
     history = diagnosis.data.chain.history
     n = history.input_mm.size
@@ -59,7 +72,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
     residual_mm = {SIMULATION: diagnosis.before_mm[:n]}
     if report.effects:
         residual_mm[CORRECTED] = diagnosis.after_mm[:n]
-    charts = charts_of(curves_of(diagnosis), residual_mm)
+    charts = charts_of(curves_of(diagnosis), residual_mm, diagnosis.left_out)
     by_name = {str(found["id"]): found for found in charts}
     gap = chart(by_name["gap-input"], "Gap over the input, measured and predicted")
     if "gap-time" in by_name:
@@ -68,7 +81,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
     if "residual-time" in by_name:
         residuals += chart(by_name["residual-time"], "Measured minus predicted gap over time")
     if history.both_edges or history.force:
-        figure = png_bytes(residual_figure(before, after if report.effects else None, history))
+        figure = png_bytes(residual_figure(before, after if report.effects else None, history, diagnosis.left_out))
         residuals += _picture(figure, "Measured minus predicted of each finger and channel, over input and time")
     parameters = [
         [named(effect.name), escape(effect.display_name(name)), *with_uncertainty(e)]
@@ -90,6 +103,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
         ("Set aside", bullets(list(report.outliers))),
         ("Smallest size that this data would have shown", _detection_limits(report)),
         ("Not shown by this data", bullets([f"{e['name']}: {e['reason']}" for e in report.excluded])),
+        *([("How the gap was measured", bullets(measurement))] if measurement else []),
         ("Notes", bullets(list(report.notes))),
         *added_sections(diagnosis),
         ("Where this comes from", provenance_html(made)),
@@ -111,6 +125,7 @@ def _picture(png: bytes, words: str) -> str:
 def _how_much(report: DiagnosisReport) -> str:
     d = report.disagreement
     rows = [
+        [_counted(d), *(number(rms_mm) for rms_mm in d.counted_mm)],
         ["all rows", number(d.before_rms_mm), number(d.after_rms_mm)],
         ["runs that the fit did not see", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)],
         ["random noise", number(d.noise_rms_mm), ""],
@@ -118,9 +133,15 @@ def _how_much(report: DiagnosisReport) -> str:
     ]
     share = f'<data value="{report.explained_share!r}">{100.0 * report.explained_share:.1f}</data> %'
     return (
-        table(["disagreement, RMS", "before", "after"], rows)
-        + f"<p>The answer explains {share} of the squared disagreement.</p>"
+        table([f"disagreement{EDGES if d.of == 'edges' else ' of the gap'}, RMS", "before", "after"], rows)
+        + f"<p>The answer explains {share} of the squared disagreement (first line of the table).</p>"
     )
+
+
+def _counted(d: Disagreement) -> str:
+    """What the verdict counts, in words."""
+    offsets = "" if d.unseen_before_rms_mm is None else ", without the runs' own offsets"
+    return f"counted: {d.rows - d.rows_left_out} of {d.rows} rows{offsets}"
 
 
 def _mechanisms(report: DiagnosisReport) -> str:

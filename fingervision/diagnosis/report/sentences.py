@@ -6,18 +6,17 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.verdict import Standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.report.open_parameters import open_parameters
-from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import Disagreement, NamedEffect, Verdict
 
 COVERAGE_FACTOR = 2.0
 """Coverage factor of an expanded uncertainty: about 95 % for a normal distribution (JCGM 100:2008, 6.2)."""
-ODD_SIGMAS = 2.5
-"""Deviation in standard deviations above which a row of a short table is mentioned, even if it was not excluded."""
+VISIBLE = 0.1
+"""Relative difference of the disagreement as the verdict counts it from that over all rows above which a sentence
+states both: less changes no reader's conclusion."""
+EDGES = " of each finger's edge"
 FEW_NAMES = 3
 """Number of explanations up to which the sentence of an ambiguous result names them; more are only counted."""
-FEW_ROWS = 60
-"""Number of rows up to which a table counts as short."""
 
 
 def phrase(effect: NamedEffect) -> str:
@@ -51,13 +50,18 @@ def answer(
 
     The sizes of several effects stand in lines of their own (`detail_lines`), so that the sentence stays short.
     """
-    fall = f"the disagreement falls from {d.before_rms_mm:.3g} to {d.after_rms_mm:.3g} mm RMS"
+    (before_mm, after_mm), without = _said(d)
+    of = EDGES if d.of == "edges" else ""
+    fall = f"the disagreement falls from {before_mm:.3g} to {after_mm:.3g} mm RMS{of}"
     fall += f" at a random noise of {d.noise_rms_mm:.2g} mm"
+    if without:
+        fall += f", {without} (all rows: {d.before_rms_mm:.3g} to {d.after_rms_mm:.3g} mm)"
+    all_rows = f", {without}; all rows: {d.before_rms_mm:.3g} mm" if without else ""
     what = phrase(effects[0]) if len(effects) == 1 else " and ".join(effect.name for effect in effects)
     if verdict is Verdict.AGREES:
         return (
             f"Simulation and measurement agree within the random noise of {d.noise_rms_mm:.2g} mm "
-            f"(RMS disagreement {d.before_rms_mm:.3g} mm)."
+            f"(RMS disagreement {before_mm:.3g} mm{of}{all_rows})."
         )
     if verdict is Verdict.NAMED:
         return f"The model lacks {what}; {fall}."
@@ -67,6 +71,17 @@ def answer(
         return f"These data cannot tell {len(alternatives)} explanations apart{which}. With the best fit, {fall}."
     part = f" {what} explain{'s' if len(effects) == 1 else ''} a part; {fall}." if effects else ""
     return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
+
+
+def _said(d: Disagreement) -> tuple[tuple[float, float], str]:
+    """RMS before and after that a sentence states, and what they leave out; nothing where the difference is small."""
+    counted_mm, whole_mm = d.counted_mm, (d.before_rms_mm, d.after_rms_mm)
+    differs = any(abs(one - all_mm) > VISIBLE * all_mm for one, all_mm in zip(counted_mm, whole_mm, strict=True))
+    if d.rows_left_out:
+        # Runs left out of the fit in turn exist where there are several.
+        offsets = "" if d.unseen_before_rms_mm is None else " and the runs' own offsets removed"
+        return counted_mm, f"with {d.rows_left_out} of {d.rows} rows left out as outliers{offsets}"
+    return (counted_mm, "with the runs' own offsets removed") if differs else (whole_mm, "")
 
 
 def detail_lines(
@@ -96,22 +111,6 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
     if max(scatter_mm, default=0.0) > 0.0:
         words += f"; the runs are offset against each other by {scatter_mm[0]:.2g} mm (standard deviation) in the gap"
     return words + "."
-
-
-def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, ...]:
-    """Sentences with the number of excluded rows and, for a short table, with the rows that deviate."""
-    n = data.chain.history.input_mm.size
-    aside = np.flatnonzero(problem.whitener.aside[:n])
-    out = [f"{aside.size} of {n} samples were set aside as outliers."] if aside.size else []
-    if n <= FEW_ROWS:
-        gap = after[:n] - np.median(after[:n])
-        scale = 1.4826 * float(np.median(np.abs(gap)))
-        out += [
-            f"the row at input {data.table.input_mm[i]:g} mm lies {gap[i]:+.3g} mm off the others "
-            f"({'set aside' if i in aside else 'kept'})."
-            for i in np.flatnonzero(np.abs(gap) > ODD_SIGMAS * scale)
-        ]
-    return tuple(out)
 
 
 def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:

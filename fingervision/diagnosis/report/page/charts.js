@@ -19,13 +19,15 @@
       label, stroke: ink, grid: { stroke: faint, width: 1 }, ticks: { stroke: faint, width: 1 }, labelSize: 22,
     });
     const series = figure.series.map((one) => {
-      const colour = one.colour === 0 ? ink : palette[one.colour - 1];
+      const colour = one.aside ? "#8a8a8a" : one.colour === 0 ? ink : palette[one.colour - 1];
       return {
         label: one.label,
         stroke: colour,
         width: one.points ? 0 : 1.5,
         dash: one.dash,
         spanGaps: true,
+        // Rows left out have no say in the scale: beside them nothing else would be seen.
+        auto: !one.aside,
         paths: one.points ? () => null : undefined,
         points: { show: one.points, size: 5, stroke: colour, fill: one.filled ? colour : "transparent" },
       };
