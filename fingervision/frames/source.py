@@ -209,7 +209,7 @@ def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
     if not (described and hasattr(source, "__iter__")):
         raise PluginShapeError(
             f"{who} must return a frame source (an iterable object with a Description), but returned a "
-            f"{type(source).__name__} that is none: {entry.origin.remedy}."
+            f"{type(source).__name__}: {entry.origin.remedy}."
         )
     return source
 

@@ -17,7 +17,7 @@ from fingervision.testbed.run.run_metadata import SIMULATION, write_expected
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """Options for the additional parts of a live measurement.
+    """What a live measurement does besides measuring the gap: options for model, gauges and bed.
 
     Parameters
     ----------

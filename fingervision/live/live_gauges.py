@@ -26,7 +26,7 @@ FRAMES_COUNTED = 100
 
 
 class LiveGauges:
-    """Measures the gauges of a gauge board in the measuring thread.
+    """Measures, in the measuring thread, the gauges that were drawn on the live picture.
 
     An unchanged gauge continues from its present position; a new or changed gauge starts in the next frame at the
     position at which it was drawn. If the measurement is too slow, some frames are measured without gauges, and the

@@ -1,10 +1,10 @@
 """The gripper's finger, from both hinges to the tip, as one elastic body condensed from plane finite elements.
 
-A model of bars that bend up to the points where their axes meet is not valid for the junction of root, cross bar,
-shuttle and finger, which are as wide as they are long: the force on a gripped part would be up to a third too low. The
-body is cut from the drawing at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965)
-380) to the motions of the cuts, of the tip's inner face, and of a few patches in between, which carry the body's mass.
-The remaining nodes of the bar model follow the body's motion; they are used for pictures and poses.
+Slender bars are no model of the junction of root, cross bar, shuttle and finger, because the pieces between the points
+where the axes meet are as wide as they are long: the force on a gripped part would be up to a third too low. The body
+is cut from the drawing at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380)
+to the motions of the cuts, of the tip's inner face, and of a few patches in between, which carry the body's mass. The
+remaining nodes of the bar model follow the body's motion; they are used for pictures and poses.
 """
 
 from dataclasses import dataclass, replace

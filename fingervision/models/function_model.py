@@ -74,8 +74,8 @@ class FunctionModel:
             reach = float(np.ptp(gap[:, 2]))
             if reach == 0.0:
                 raise ModelError(
-                    f"The gap of {self.path} must depend on its input, but is {gap[0, 2]:g} mm from {low_mm:g} to "
-                    f"{high_mm:g} mm: check its units and which variables are input and gap."
+                    f"The gap of {self.path} must depend on its input, but is {gap[0, 2]:g} mm at every input "
+                    f"from {low_mm:g} to {high_mm:g} mm: check its units and which variables are input and gap."
                 )
             if float(np.max(np.abs(gap[:, 2] - gap[:, 1]))) < SETTLED * reach:
                 break
@@ -120,7 +120,7 @@ class FunctionModel:
             except subprocess.TimeoutExpired:
                 raise ModelError(
                     f"{self.path} must answer within {LONGEST_S:g} s, but was still running and was ended: look for an "
-                    "endless loop, or simulate a table with it."
+                    "endless loop, or run it beforehand and give its results as a table."
                 ) from None
             if ended.returncode != 0 or not answered.is_file():
                 raise ModelError(self._failure(ended.returncode, ended.stderr))

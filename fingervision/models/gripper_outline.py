@@ -98,8 +98,8 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     askew_deg = abs((axis_deg - link_deg + 90.0) % 180.0 - 90.0)
     if askew_deg > _ASKEW_DEG:
         raise DataError(
-            f"lever.hinge{number}_axis_deg in {origin} must follow its link, which runs at {link_deg:.4g} degrees, "
-            f"within {_ASKEW_DEG:g} degrees, but is {axis_deg:g}."
+            f"lever.hinge{number}_axis_deg in {origin} must be within {_ASKEW_DEG:g} degrees of the direction of "
+            f"its link, {link_deg:.4g} degrees, but is {axis_deg:g}."
         )
     x, y = gripper.lever.hinge1_mm if number == 1 else gripper.lever.hinge2_mm
     if not region.holds(np.array([[x], [y]]))[0]:

@@ -98,9 +98,9 @@ def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
     for name, by in changes.items():
         value = attrgetter(name)(gripper) + by
         if not name.endswith(_ANY_SIGN) and value <= 0.0:
-            raise ModelError(f"{name} must be positive, but would be {value:g}.")
+            raise ModelError(f"{name} must be positive, but its uncertainty includes {value:g}: state a smaller u.")
         if name == "material.poisson_ratio" and value >= _MOST_POISSON:
-            raise ModelError(f"{name} must be below 0.5, but would be {value:g}.")
+            raise ModelError(f"{name} must be below 0.5, but its uncertainty includes {value:g}: state a smaller u.")
     for name, by in changes.items():
         gripper = redrawn(gripper, name, by)
     return gripper

@@ -28,7 +28,7 @@ class PluginVersionError(PluginError):
 
 
 class MisfitError(ValueError):
-    """A part does not meet its requirements; the message follows the plug-in's name: `must ..., but ...`."""
+    """A plug-in does not meet its requirements; the message `must ..., but ...` is printed after the plug-in's name."""
 
 
 class PluginFileError(UsageError):

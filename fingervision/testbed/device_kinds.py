@@ -74,7 +74,7 @@ NOUNS = {"actuator": "actuator", "force_sensor": "force sensor", "camera": "came
 
 
 def kinds(part: str) -> tuple[str, ...]:
-    """Names of the kinds of a device (`actuator`, `force_sensor`, `camera`): built in and sorted, then installed."""
+    """Names of the kinds of a device (`actuator`, `force_sensor`, `camera`): built-in ones first, then installed ones."""
     return REGISTRIES[part].names()
 
 

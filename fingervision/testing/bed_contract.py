@@ -264,7 +264,8 @@ def _still_mm(bed: Bed) -> float:
 def _known_mm(bed: Bed, speed_mm_s: float) -> float:
     """Uncertainty (mm) of a motion's length from readings: encoder steps, scatter, and uncertain times.
 
-    Start and end of a motion each lie between two readings; the declared durations of ramps and settling are added.
+    Start and end of a motion each lie between two readings. What the stage may move in that time, and while it settles,
+    is added.
     """
     limits = bed.actuator.limits
     return limits.encoder_step_mm + 2.0 * limits.repeatability_mm + (2.0 * WAIT_S + limits.settling_s) * speed_mm_s

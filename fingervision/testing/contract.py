@@ -5,7 +5,7 @@ from unittest import SkipTest
 
 
 class ContractError(AssertionError):
-    """A part violates its contract; the sentence states what the part must do, and what it does."""
+    """A plug-in (effect, model, device) violates its contract; the message states what it must do, and what it does."""
 
 
 class NotApplicable(SkipTest):

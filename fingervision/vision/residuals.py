@@ -57,7 +57,7 @@ def spread(end: FingerEnd) -> float:
 def shared_points(
     points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd], coding: Coding
 ) -> float:
-    """Number of neighbouring points that share an error; it is the same for both fingers.
+    """Number of neighbouring points that share an error; one number is used for both fingers.
 
     The error that a codec causes in a whole block is absorbed by the fitted shape and does not appear in the residuals;
     therefore the block's size is used for coded pictures.

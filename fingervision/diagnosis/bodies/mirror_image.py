@@ -11,7 +11,7 @@ partners."""
 
 
 def mirror_of(prediction: BodyPrediction) -> Callable[[str], str]:
-    """Return a function that replaces each hinge, probe or body in a text by its mirror image about x = 0."""
+    """Return a function that replaces names of hinges, probes and bodies in a text by those of their mirror images."""
     answers = prediction.answers
     size = answers.mechanism.region.size_mm
     at = {flexure.name: flexure.at_mm for flexure in answers.mechanism.flexures} | answers.mechanism.probes

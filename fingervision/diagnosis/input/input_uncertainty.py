@@ -1,4 +1,4 @@
-"""Systematic error of the recorded input: changes of the path smaller than this error are not significant."""
+"""Systematic error of the recorded input: differences in the stage's motion below this error are not significant."""
 
 import numpy as np
 

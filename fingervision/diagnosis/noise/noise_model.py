@@ -79,7 +79,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
 
 
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
-    """Mark parts of the range in which more samples deviate than gross errors, which occur anywhere, would explain."""
+    """Mark parts of the range with too many deviating samples for gross errors, which occur anywhere in the range."""
     there = np.zeros(out.size, dtype=bool)
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)

@@ -54,7 +54,7 @@ def obey(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Return the state of all topics, for the browser page."""
+    """Return the part of the state that each command module shows on the browser page, in one mapping."""
     told: dict[str, Any] = {}
     for module in modules():
         if hasattr(module, "section"):

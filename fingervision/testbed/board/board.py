@@ -129,7 +129,7 @@ class Board:
 
     @property
     def ready(self) -> bool:
-        """Whether a motion may begin: no fault has released the drive line, and the enable line (if any) is up."""
+        """Whether a motion may begin: no fault has switched the drive off, and the enable line (if any) is high."""
         enabled = Role.ENABLE not in self.settings.lines or wire.Levels.ENABLE in self.levels
         return enabled and self.dropped is None
 

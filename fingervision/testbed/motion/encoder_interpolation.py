@@ -119,7 +119,7 @@ class StageTrack:
         return a.position_mm + share * (b.position_mm - a.position_mm)
 
     def _onwards_mm(self, device_s: float, cell_mm: float) -> float:
-        """Extrapolate from the last border at the motion's speed, within the encoder step that the encoder reports."""
+        """Extrapolate from the reading's last change at the motion's speed, limited to the encoder's step."""
         if len(self._borders) < 2:
             return cell_mm
         first, last = self._borders[0], self._borders[-1]

@@ -66,8 +66,8 @@ def route(
     )
     raise LimitError(
         f"A stored step must end at {to_mm:g} mm, but none does: the absolute steps in the controller end at "
-        f"{targets or 'no position'} mm, and no relative step leads to {to_mm:g} mm. Store a step to "
-        f"{to_mm:g} mm in the controller, or change the move."
+        f"{targets or 'no position'} mm, and no relative step leads to {to_mm:g} mm. Store an absolute "
+        f"step to {to_mm:g} mm in the controller, or let the recipe move to one of the stored positions."
     )
 
 
