@@ -74,7 +74,7 @@ NOUNS = {"actuator": "actuator", "force_sensor": "force sensor", "camera": "came
 
 
 def kinds(part: str) -> tuple[str, ...]:
-    """Names of the kinds of a device (`actuator`, `force_sensor`, `camera`): built-in ones first, then installed ones."""
+    """Names of the kinds of a device (`actuator`, `force_sensor`, `camera`): first built-in, then installed ones."""
     return REGISTRIES[part].names()
 
 
