@@ -160,8 +160,11 @@ class NetworkStream:
                         time_s = self._time_s(tick, arrived_s, last_s)
                         item = self._item(next(numbers), time_s, found, last_s)
                         last_s = time_s
-                        yield Received(item, arrived_s, tuple(waiting))
-                        waiting.clear()
+                        # A packet whose picture the decoder still holds back stays: the end of a recording would hold a
+                        # picture more than the table of what was measured.
+                        arrived = _until_shown(waiting, tick)
+                        yield Received(item, arrived_s, tuple(waiting[:arrived]))
+                        del waiting[:arrived]
         finally:
             self._container.close()
 
@@ -231,6 +234,12 @@ class NetworkStream:
             # Its header was lost. The host's clock is another one: all frames behind would move in time.
             return (before_s or 0.0) + float(self._stream.time_base)
         return float(tick * self._stream.time_base)
+
+
+def _until_shown(waiting: list[OwnPacket], tick: int | None) -> int:
+    """Number of the waiting packets up to that of the picture shown at a tick; all of them if none states this tick."""
+    shown = [place for place, own in enumerate(waiting, 1) if tick is not None and own.packet.pts == tick]
+    return shown[-1] if shown else len(waiting)
 
 
 def _reason(error: Exception) -> str:
