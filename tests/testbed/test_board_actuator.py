@@ -136,8 +136,8 @@ def test_a_move_that_no_step_makes_is_refused_before_anything_moves(bed: Bed, co
     stands(bed)
     for move, said in (
         ((1.23, 50.0), "A stored step must end at 1.23 mm, but none does: the absolute steps in the controller end "
-         "at 0, 5, 9 mm, and no relative step leads to 1.23 mm. Store a step to 1.23 mm in the controller, or change "
-         "the move."),
+         "at 0, 5, 9 mm, and no relative step leads to 1.23 mm. Store an absolute step to 1.23 mm in the controller, "
+         "or let the recipe move to one of the stored positions."),
         ((5.0, 10.0), "The move to 5 mm must not be faster than 10 mm/s, but the slowest step that leads there has "
          "20 mm/s: allow this speed, or store a slower step in the controller."),
         ((11.0, 10.0), "The target must lie between 0 and 10 mm, but is 11 mm: nothing was moved."),
