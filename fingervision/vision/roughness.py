@@ -11,9 +11,11 @@ well.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
@@ -159,7 +161,8 @@ def best_linear(
     _errors(x, y, points.u * slant, bare.u * slant, found.covariance, errors)
     errors[np.diag_indices(x.size)] += 1.0 / np.maximum(end.robust, LEAST_WEIGHT) - 1.0
     # No combination of points is surer than their own noise: rounding of the tabulated covariance may say so.
-    values, vectors = np.linalg.eigh(errors)
+    with _blas().limit(limits=1, user_api="blas"):
+        values, vectors = np.linalg.eigh(errors)
     whitening = vectors / np.sqrt(np.maximum(values, float(np.min((bare.u / points.u) ** 2))))
     prior = np.diag(1.0 / u_prior**2)
     for _ in range(STEPS):
@@ -170,6 +173,12 @@ def best_linear(
         parameters[[INNER_R, OUTER_R]] = np.maximum(parameters[[INNER_R, OUTER_R]], 0.0)
     residual, _, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
     return FingerEnd(parameters, covariance, end.origin, 1.0, residual, end.robust)
+
+
+@lru_cache(maxsize=1)
+def _blas() -> ThreadpoolController:
+    """Control of the linear algebra's threads: the others would wait busily, for four times the work of one."""
+    return ThreadpoolController()
 
 
 def _correlation(distance: Floats, length: float) -> Floats:
