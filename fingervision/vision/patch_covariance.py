@@ -32,11 +32,10 @@ def noise_covariance(
 
     Both pictures have noise of variance `sigma^2` per pixel. Smoothing and interpolation reduce it by the factors `k_0`
     (first picture) and `k` (second picture, by the sub-pixel phase), so that the residuals have the variance
-    `sigma^2 (k_0 + g^2 k)`, where g is the gain. The estimate is
-    affected by the pixels' noise after smoothing only, because the texture is coarser than the pixels: the covariance
-    of the gradient projections is `2 sigma^2` times the Gram matrix of the gradients smoothed once more. The noise in
-    the gradients of the reference increases their Gram matrix and is subtracted from it (errors in variables):
-    covariance = sigma_r^2 H^-1 S_seen H^-1.
+    `sigma^2 (k_0 + g^2 k)`, where g is the gain. The estimate is affected by the pixels' noise after smoothing only,
+    because the texture is coarser than the pixels: the covariance of the gradient projections is `2 sigma^2` times the
+    Gram matrix of the gradients smoothed once more. The noise in the gradients of the reference increases their Gram
+    matrix and is subtracted from it (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
     count, (n, turned) = squares.size, extent(*half_size)
     table = phase_power(SMOOTHING_PX, CURVATURE)

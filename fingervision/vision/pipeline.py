@@ -163,6 +163,14 @@ def _coded(frame: Frame, settings: Settings) -> _Coded:
     return _Coded(frame.coding if quantiser is None else Coding.LOSSLESS, quantiser)
 
 
+@dataclass(frozen=True, slots=True)
+class _Scale:
+    """Full scale of the light, and the level at which the picture is cut off."""
+
+    top: int
+    highest: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Attempt:
     """Intermediate results of a frame's analysis: the binary picture, the fingers, their edges, and the result."""
@@ -176,16 +184,16 @@ class _Attempt:
 def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     if min(grey.shape) < SMALLEST_SIDE_PX:
         return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to hold two fingers."))
-    scale = _scale(grey, settings)
-    highest = settings.response.cut_off_at(grey, scale)
+    top = _top_level(grey, settings)
+    scale = _Scale(top, settings.response.cut_off_at(grey, top))
     denoised = denoise(grey)
-    binary = binarise(denoised, scale)
+    binary = binarise(denoised, top)
     # The grey picture itself is counted only where denoising has left it nearly white.
-    is_bright = binary.full_scale_share > 0.9 or highest < scale
-    if is_bright and np.count_nonzero(grey >= highest) > SATURATED_SHARE * grey.size:
+    is_bright = binary.full_scale_share > 0.9 or scale.highest < top
+    if is_bright and np.count_nonzero(grey >= scale.highest) > SATURATED_SHARE * grey.size:
         words = "The picture is white: nearly every pixel is at full scale."
         return _Attempt(NoGap(Status.SATURATED, words), binary)
-    if binary.contrast < CONTRAST_FLOOR * scale:
+    if binary.contrast < CONTRAST_FLOOR * top:
         return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
     for split, fingers, light_gap in candidates(denoised, binary, settings):
@@ -209,7 +217,7 @@ def _measured(
     light_gap: bool,
     settings: Settings,
     coded: _Coded,
-    scale: int,
+    scale: _Scale,
 ) -> _Attempt:
     """Measure a pair of fingers; if they are rough, measure longer flanks too, and keep the more certain result."""
     upright = fingers.orientation.view(grey)
@@ -223,39 +231,39 @@ def _measured(
         if isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_PX * sqrt(SHARED_POINTS[coded.coding]):
             outcome = replace(TOO_ROUGH, held=outcome.held)
     if settings.other_response is not None and isinstance(outcome, GapMeasurement):
-        shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
+        shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale.top)
         outcome = replace(outcome, response_shift_px=shift)
     return _Attempt(outcome, split, fingers, edges)
 
 
 def _edges_and_gap(
-    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coded: _Coded
+    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: _Scale, light_gap: bool, coded: _Coded
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
     """Fit the edges of a pair of fingers, and derive the result."""
-    levels, highest = int(np.iinfo(upright.dtype).max) + 1, settings.response.cut_off_at(upright, scale)
-    light = _light(settings.response, scale, levels, highest)
+    top, levels = scale.top, int(np.iinfo(upright.dtype).max) + 1
+    light = _light(settings.response, top, levels, scale.highest)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
-    edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
+    edges, apart_px = fit_edges(upright, lines, light, top), 0.0
     if fingers.orientation.direction.is_vertical:
         edges, apart_px = at_half_way(edges)
 
     def displaced_px(found: EdgePoints) -> tuple[float, float]:
         if coded.quantiser is not None:
-            return flanks_displaced_px(found, fingers.orientation, coded.quantiser, light, scale)
+            return flanks_displaced_px(found, fingers.orientation, coded.quantiser, light, top)
         if coded.coding is Coding.LOSSLESS:
             return 0.0, 0.0
         alike_px = SHARED_SHIFTS[coded.coding] * shared_shift_px(flanks(upright, found, light))
         return alike_px, alike_px
 
     with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
-        edges = with_profile(upright, edges, light, scale, settings.is_outline, displaced_px)
+        edges = with_profile(upright, edges, light, top, settings.is_outline, displaced_px)
     if edges.beside == STRIP:
         return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
-    outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coded.coding)
+    outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
         if coded.quantiser is not None:
-            outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, scale)
+            outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, top)
         elif coded.coding is not Coding.LOSSLESS:
             outcome = with_shared_shift(outcome, shared_shift_px(flanks(upright, edges, light)), coded.coding)
         elif not edges.beside:  # what stands beside an edge has its own price
@@ -273,7 +281,7 @@ def _with_two_tones(
     light_gap: bool,
     settings: Settings,
     coded: _Coded,
-    scale: int,
+    scale: _Scale,
 ) -> _Attempt:
     """Return the attempt, or a new one with another threshold if a shadow or pad was put into the wrong class."""
     if not isinstance(attempt.outcome, GapMeasurement) or attempt.fingers is None or attempt.edges is None:
@@ -295,7 +303,7 @@ def _with_two_tones(
     return _Attempt(THIRD_TONE, attempt.binary, attempt.fingers, attempt.edges)
 
 
-def _scale(grey: GreyImage, settings: Settings) -> int:
+def _top_level(grey: GreyImage, settings: Settings) -> int:
     """Full scale of the light, which is different for a measured camera response."""
     known = settings.response.top_level
     bits = settings.bits if known is None or grey.dtype == np.uint8 else known.bit_length()
@@ -310,8 +318,8 @@ def _scale(grey: GreyImage, settings: Settings) -> int:
 
 
 @lru_cache(maxsize=4)
-def _light(response: CameraResponse, scale: int, levels: int, highest: int) -> NDArray[np.float64]:
-    return response.table(scale, levels, highest)
+def _light(response: CameraResponse, top: int, levels: int, highest: int) -> NDArray[np.float64]:
+    return response.table(top, levels, highest)
 
 
 def _shifted(measured: GapMeasurement | NoGap, region: Region | None) -> GapMeasurement | NoGap:
