@@ -2,9 +2,9 @@
 
 If an edge is parallel to the codec's blocks, all its rows share an error, which the scatter of the rows about a line
 does not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture
-either. The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For
-an edge of contrast A the codec's transform coefficients change by about A per pixel of displacement, so that the
-displacement is a fixed fraction of the ratio of step to contrast.
+either. The quantiser step limits the error of a codec, which corrects every difference larger than a fraction of the
+step. For an edge of contrast A the codec's transform coefficients change by about A per pixel of displacement, so that
+the displacement is a fixed fraction of the ratio of step to contrast.
 """
 
 from dataclasses import replace

@@ -3,10 +3,10 @@
 Texture of a frequency f above the Nyquist frequency (half a cycle per pixel) appears at the frequency `1 - f` and seems
 to move in the opposite direction: relative to the rest of the patch its phase changes by 2 pi for every pixel of
 displacement. After a displacement d its residual is `2 sin(pi d)` times as large as the aliased texture itself. The
-part of this residual that looks like a displacement is a bias, which depends on the sub-pixel phase. The power above
-the Nyquist frequency is extrapolated from the power of the patch below it. The aliased power is assumed to be equal for
-all frequencies along the other axis, so that an edge parallel to the pixels, whose phase is constant along its length,
-counts as a single edge.
+part of the aliased residual that looks like a displacement is a bias, which depends on the sub-pixel phase. The power
+above the Nyquist frequency is extrapolated from the power of the patch below it. The aliased power is assumed to be
+equal for all frequencies along the other axis, so that an edge parallel to the pixels, whose phase is constant along
+its length, counts as a single edge.
 """
 
 import cv2
