@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binom
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
@@ -42,7 +43,12 @@ STRETCH_SIGMAS = 3.0
 """Standard deviations, each 1 / sqrt(n), by which neighbours must be alike for rows to lie in stretches:
 a servo at rest repeats far better than on its way, and nothing is wrong with it."""
 FEWEST_VALUES = 30
-"""Values from which such a share is told from 20 %: 40 % of 30 are 2.8 standard deviations more."""
+"""Values from which a share is told from that of normal noise (`BY_CHANCE`)."""
+NORMAL_SHARE = 0.2
+"""Share of normal values within `NARROW` standard deviations."""
+BY_CHANCE = 1e-3
+"""Probability, for normal noise, of so extreme a count, above which it is chance: of 42 rows of one noise, rounded to a
+quarter of it, 40 % lay together (probability 0.002)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +115,12 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     together = min(_share_near(values, float(np.median(values))) for values in both)
     if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
         return None
-    if between < SHARES[0]:
+    count = residual_mm.size
+    if between < SHARES[0] and binom.cdf(round(between * count), count, NORMAL_SHARE) < BY_CHANCE:
         above = residual_mm > np.mean(residual_mm)
         apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
         words = f"what is left falls into two groups about {apart_mm:.2g} mm apart"
-    elif together > SHARES[1]:
+    elif together > SHARES[1] and binom.sf(round(together * count) - 1, count, NORMAL_SHARE) < BY_CHANCE:
         words = f"{100.0 * together:.0f} % of the rows lie together, and the others off them by {sigma:.2g} mm and more"
     else:
         return None
