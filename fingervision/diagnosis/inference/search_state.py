@@ -21,8 +21,8 @@ NOISY = 2.0 * 2.0**0.5
 """Excess of the chi-square of noise over the number of rows n that occurs now and then, in units of sqrt(n): two
 standard deviations sqrt(2 n)."""
 ROUGH = 2
-"""Starts, and explanations refitted thoroughly, of a first search that is for the noise alone; where its fit is poor,
-the chi-square of the answer says so, and the search is repeated (`searched.QUIET`)."""
+"""Number of starts, and of explanations refitted thoroughly, in a first search whose only purpose is to estimate the
+noise. If its fit is poor, the chi-square of the result shows this, and the search is repeated (`searched.QUIET`)."""
 SHORT = 100
 """Number of samples below which the noise is estimated with single effects only."""
 
@@ -138,7 +138,7 @@ def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: 
     problem = problem_beside(None)
     atoms = signatures(problem)
     rough = single_effects(problem, atoms, 4, ROUGH)
-    # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
+    # A pair that is fitted to few samples absorbs their noise, so that the noise would be underestimated.
     many = problem.chain.history.input_mm.size >= SHORT
     pairs = extended(problem, atoms, rough[:3], 16, lambda _: None, scanned=1, refined=ROUGH) if many else []
     first = [*rough[:1], *pairs[:1]]
