@@ -92,14 +92,17 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
                 continue
             listed = " or ".join(f"'{raw.columns[k].name}'" for k in candidates)
             about.questions.append(
-                Question(f"the {role} may be {listed}", f"columns.{role}={raw.columns[suggest(candidates)].name}")
+                Question(
+                    f"the column of the {role} may be {listed}",
+                    f"columns.{role}={raw.columns[suggest(candidates)].name}",
+                )
             )
         elif role in NEEDED[kind] and not (role == "gap" and sides):
             free = [k for k in range(len(raw.columns)) if k not in set(chosen.values())]
             listed = ", ".join(f"'{raw.columns[k].name}'" for k in free[:12]) + (" ..." if len(free) > 12 else "")
             about.questions.append(
                 Question(
-                    f"no column is called as the {role} is (the columns are {listed or 'taken'})",
+                    f"no column has a usual name for the {role} (the columns are {listed or 'taken'})",
                     f"columns.{role}={raw.columns[suggest(free)].name if free else 'NAME'}",
                     CANONICAL[role],
                 )
@@ -125,8 +128,8 @@ def _lone_u(
     if len(found) == 1:
         roles["input"] = found
         about.notes.append(
-            f"'{raw.columns[found[0]].name}' is taken for the input, a prescribed displacement: columns.input in "
-            "columns.toml would name another."
+            f"'{raw.columns[found[0]].name}' is read as the input (a prescribed displacement); to name another "
+            f"column, set columns.input in columns.toml."
         )
 
 
@@ -138,7 +141,7 @@ def _one_clock(
     elapsed = [k for k in times if not _is_dated(raw.columns[k])]
     if len(both) > 1 and len(elapsed) == 1:
         others = ", ".join(raw.columns[k].name for k in both if k != elapsed[0])
-        about.notes.append(f"{raw.columns[elapsed[0]].name} is taken for the time, not {others}.")
+        about.notes.append(f"{raw.columns[elapsed[0]].name} is read as the time, not {others}.")
         return elapsed
     if len(times) == 1 and not elapsed and len(both) > 1:
         return times  # a day and a time of day in columns of their own: joined later
