@@ -92,8 +92,8 @@ def test_a_gripper_is_compared_with_its_model() -> None:
     assert found.after.value_mm("E") == pytest.approx(0.0, abs=1e-12)
     document = positioning_document(found)
     assert document["reference"] == "model"
-    assert "not of the axis alone" in document["notes"][0]
-    assert "as play makes it" in positioning_words(found)[0]
+    assert "together with those of the axis" in document["notes"][0]
+    assert "as a play causes" in positioning_words(found)[0]
 
 
 @pytest.mark.parametrize("slope", [1.0, -1.0])
@@ -106,7 +106,7 @@ def test_a_reversal_of_the_wrong_sign_is_asked_about(slope: float, play_mm: floa
     assert found.reference == "target"
     assert found.after is None
     assert ("swapped?" in positioning_words(found)[0]) == (play_mm < 0.0)
-    assert ("as play makes it" in positioning_words(found)[0]) == (play_mm > 0.0)
+    assert ("as a play causes" in positioning_words(found)[0]) == (play_mm > 0.0)
 
 
 def test_a_reversal_within_its_uncertainty_has_no_side() -> None:

@@ -83,14 +83,14 @@ def body_evidence(
     known, notes = known_channels(answers, tuple(table.channels)), []
     unknown = [name for name in table.channels if name not in known]
     if unknown:
-        notes.append(f"not compared, for the model foretells no such channel: {', '.join(unknown)}.")
+        notes.append(f"not compared, because the model does not predict these channels: {', '.join(unknown)}.")
     scarce = [name for name in known if float(table.channels[name].present.mean()) < LEAST_PRESENT]
     if scarce:
-        notes.append(f"not compared, for more than half of their readings are missing: {', '.join(scarce)}.")
+        notes.append(f"not compared, because more than half of their readings are missing: {', '.join(scarce)}.")
     names = [name for name in known if name not in scarce]
     still = [name for name in names if np.ptp(table.channels[name].value[table.channels[name].present]) == 0.0]
     if still:
-        notes.append(f"not compared, for they stand at one value in every row: {', '.join(still)}.")
+        notes.append(f"not compared, because their value is the same in every row: {', '.join(still)}.")
     names = [name for name in names if name not in still]
     if not names:
         return None, tuple(notes)

@@ -78,9 +78,9 @@ def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
         if told:
             least = min(gain for gain in gains if gain > ALIKE)
             words = (
-                f"measuring {label} as well (u {_stated(channels, sigma)}) is expected to tell "
-                f"{best.candidate.key} from {' and from '.join(told)} (expected chi-square "
-                f"{least:.0f} and more)."
+                f"measuring {label} as well (u {_stated(channels, sigma)}) is expected to distinguish "
+                f"{best.candidate.key} from {' and from '.join(told)} (expected chi-square at least "
+                f"{least:.0f})."
             )
             found.append((min(gains), len(told), NextView(channels, float(min(gains)), told, words)))
     return max(found, key=lambda entry: (entry[1], entry[0]))[2] if found else None

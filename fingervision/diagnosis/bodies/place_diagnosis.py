@@ -75,8 +75,8 @@ def diagnose_with_bodies(
     first = explain(table if answers is None else _beside_condensed(table, model, answers), model)
     if answers is None:
         named = ", ".join(table.channels)
-        return _noted(first, (f"{named}: not compared, for the model draws no bodies; give a gripper.toml or "
-                              "mechanism.toml as --model.",))  # fmt: skip
+        return _noted(first, (f"{named}: not compared, because the model has no drawing of bodies; give a "
+        f"gripper.toml or mechanism.toml as --model.",))  # fmt: skip
     driven_mm = _driven_input(first)
     evidence, notes = body_evidence(table, answers, driven_mm, rng)
     if evidence is None:
@@ -115,7 +115,8 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
             unseen_after_rms_mm=d.unseen_before_rms_mm,
             counted_after_rms_mm=d.counted_before_rms_mm,
         ),
-        remaining=f"The remaining difference is {d.before_rms_mm:.3g} mm RMS: noise, or the form of the explanation.",
+        remaining=f"The remaining difference is {d.before_rms_mm:.3g} mm RMS, caused by noise or by the simplified "
+        f"form of the effect.",
     )
     return replace(done, report=report, after_mm=done.before_mm)
 
@@ -179,9 +180,11 @@ def _nothing_named(evidence: BodyEvidence) -> str:
     if evidence.findings.structure:
         return (
             f"poses of bodies ({compared}): they differ from the drawing in a way that no single hinge, link or pivot "
-            "explains; what is said above is the gap's answer alone."
+            f"explains; the result above follows from the gap alone."
         )
-    return f"poses of bodies ({compared}) agree with the drawing: no hinge, link or pivot differs that would show."
+    return (
+        f"poses of bodies ({compared}) agree with the drawing: no hinge, link or pivot differs by more than the noise."
+    )
 
 
 def _where(report: DiagnosisReport, evidence: BodyEvidence, answers: PlaceAnswers) -> tuple:  # type: ignore[type-arg]

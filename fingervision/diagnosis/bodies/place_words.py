@@ -83,4 +83,4 @@ def _joined(channel: str, answers: PlaceAnswers) -> str:
     if body not in numbers:
         return ""
     hinges = [f.name for n, f in enumerate(answers.mechanism.flexures) if numbers[body] in answers.ends(n)]
-    return f" ({body} hangs on {' and '.join(hinges)})" if hinges else ""
+    return f" ({body} is held by {' and '.join(hinges)})" if hinges else ""

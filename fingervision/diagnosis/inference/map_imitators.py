@@ -89,7 +89,9 @@ def _of_the_place(problem: Problem) -> list[str]:
 def _reason(problem: Problem) -> str:
     history = problem.chain.history
     span = f"{history.input_mm.min():g} to {history.input_mm.max():g} mm"
-    return f"beside a map of position errors it is a part of the map: over {span} it depends on the place alone"
+    return (
+        f"cannot be distinguished from a map of position errors: over {span} the effect depends on the position alone"
+    )
 
 
 def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[Flags, Flags]:

@@ -63,21 +63,22 @@ def gross_mistake(data: Observations) -> Finding | None:
     way, predicted_way = (float(np.diff(np.quantile(values, ENDS))[0]) for values in (gap, predicted))
     if order < -LEAST_CORRELATION:
         return Finding(
-            "the measured gap falls where the model says that it rises: input_mm or the gap "
-            "is mirrored (the sign of one column is turned round), or the model belongs to another rig.",
+            "the measured gap decreases where the predicted gap increases: the sign of input_mm or of the gap is "
+            "reversed, or the model belongs to another rig.",
             blocks=True,
         )
     if abs(order) < LEAST_CORRELATION:
         return Finding(
-            f"the measured gap does not follow the model (rank correlation {order:.2f}): the model has nothing to do "
-            "with these data, or most rows are wrong; look at the columns before anything is named.",
+            f"the measured gap does not follow the model (rank correlation {order:.2f}): the model does not belong to "
+            f"these data, or most rows are wrong; check the columns of the table.",
             blocks=True,
         )
     ratio = way / max(predicted_way, 1e-300)
     if not 1.0 / LARGEST_RATIO < ratio < LARGEST_RATIO:
         return Finding(
-            f"the measured gap moves {ratio:.3g} times as far as the model says: check the units of the gap and of the "
-            "model (a factor of 1000 is micrometres for millimetres), no effect of the catalogue makes so much.",
+            f"the measured gap moves {ratio:.3g} times as far as the model predicts, which no effect of the catalogue "
+            f"can cause: check the units of the gap and of the model (a factor of 1000 means micrometres instead of "
+            f"millimetres).",
             blocks=True,
         )
     return None
@@ -112,14 +113,17 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     if between < SHARES[0]:
         above = residual_mm > np.mean(residual_mm)
         apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
-        words = f"what is left falls into two groups about {apart_mm:.2g} mm apart"
+        words = f"the residuals form two groups about {apart_mm:.2g} mm apart"
     elif together > SHARES[1]:
-        words = f"{100.0 * together:.0f} % of the rows lie together, and the others off them by {sigma:.2g} mm and more"
+        words = (
+            f"{100.0 * together:.0f} % of the rows agree with each other, and the others deviate from them by "
+            f"{sigma:.2g} mm or more"
+        )
     else:
         return None
     return Finding(
-        f"the rows are no one measurement with one noise: {words}; look at the rows that lie apart before anything is "
-        "named.",
+        f"the rows cannot come from one measurement with one noise level: {words}; check the rows that deviate, and "
+        f"diagnose again.",
         blocks=True,
     )
 
@@ -176,8 +180,8 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
     if sigmas > -SWAPPED_SIGMAS * scatter or gain < SWAPPED_SHARE * stands:
         return None
     return Finding(
-        f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "
-        "mechanism does: are the directions swapped, or the sign of the gap's error?",
+        f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which is "
+        f"impossible for a mechanism: are the two directions exchanged, or is the sign of the gap's error wrong?",
         blocks=True,
     )
 

@@ -103,10 +103,10 @@ def why_no_map(history: History, path: InputPath | None) -> str | None:
     if isinstance(narrowed, str):
         return narrowed
     if history.time_s is None:
-        return "the table has no time_s, so nothing tells how often each place was passed"
+        return "the table has no time_s, so that it is unknown how often each position was passed"
     travel = sum(float(np.sum(np.abs(np.diff(history.input_mm[run])))) for run in history.runs)
     if travel < PASSES * history.input_span_mm:
-        return "each place was passed once, and what was seen once is not known to repeat"
+        return "each position was passed only once, so that it is unknown whether its error repeats"
     return None
 
 

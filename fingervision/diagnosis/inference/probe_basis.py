@@ -93,8 +93,8 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         sense = np.sign(np.where(np.abs(speed) > 0.1 * np.max(np.abs(speed)), speed, 0.0))
         shapes += [
             ("a difference between opening and closing", sense),
-            ("another slope opening than closing", sense * (u - low)),
-            ("something that follows the speed", speed),
+            ("different slopes in opening and closing", sense * (u - low)),
+            ("a deviation that follows the speed", speed),
         ]
         for index, run in enumerate(history.runs):
             mask = np.zeros(n)
@@ -104,7 +104,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         if len(history.runs) > 1:
             mask = np.zeros(n)
             mask[run] = u[run] - np.mean(u[run])
-            shapes.append((f"another slope in run {index + 1}", mask))
+            shapes.append((f"a different slope in run {index + 1}", mask))
     shapes += [(f"curvature of order {k} over the input", ((u - low) / span) ** k) for k in (2, 3, 4)]
     channels = [(1.0, 0.0, 0.0, "the gap")]
     if history.both_edges:

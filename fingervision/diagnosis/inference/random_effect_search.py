@@ -126,8 +126,8 @@ def beside_map(state: Searched, look: Look) -> Searched:
 def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
     rms_um, sigma_um = 1e3 * repeated.rms_mm.value, 1e3 * problem.chain.history.input_sigma_mm
     return (
-        f"the recorded input errs alike by {rms_um:.2g} um RMS whenever it comes to the same places: as this is less "
-        f"than its own standard uncertainty, {sigma_um:.2g} um, it is no {NAME}."
+        f"the error of the recorded input repeats at the same positions by {rms_um:.2g} um RMS. As this is less than "
+        f"the standard uncertainty of the input, {sigma_um:.2g} um, it is not named as {NAME}."
     )
 
 

@@ -54,7 +54,7 @@ def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Finding
     best = min(left, key=lambda e: e.score + costs[members.index(e)])
     others = [e for e in left if e is not best]
     told = replace(found, best=best, alternatives=(best, *others))
-    return told, (*said, f"that rules out {dropped}.")
+    return told, (*said, f"the measured width of the reference slot rules out {dropped}.")
 
 
 def seen_mm(data: Observations, values: Values, size_mm: float) -> float:
@@ -94,6 +94,6 @@ def _sentence(data: Observations, explanation: Explanation, slot: ReferenceSlot)
     fits = "as" if _surprise(data, explanation, slot) < REFUTED else "but"
     answer = "+".join(explanation.names) or "the model"
     return (
-        f"the reference slot of {slot.size_mm:g} mm measures {slot.measured_mm:.4f} mm, {fits} {answer} foretells "
+        f"the reference slot of {slot.size_mm:g} mm measures {slot.measured_mm:.4f} mm, {fits} {answer} predicts "
         f"{expected_mm:.4f} mm."
     )

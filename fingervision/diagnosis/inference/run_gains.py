@@ -60,8 +60,8 @@ class RunGains:
         """Sentence with the estimated scatter of the runs' gains."""
         each = ", ".join(f"{100.0 * self.sd * number:+.2g}" for number in self.coefficients - self.coefficients.mean())
         return (
-            f"the gain differs from run to run (by {each} %): taken as the runs' own scatter, like their offsets, and "
-            "not as an effect."
+            f"the gain differs from run to run (by {each} %): these differences are treated as scatter of the runs, "
+            f"like the run offsets, and not as an effect."
         )
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":

@@ -205,15 +205,15 @@ def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict
     """Return the verdict that follows from the residual, and describe any *unknown* structure."""
     named = bool(found.best.names) or mapped
     remains = (
-        f"{1e3 * stands.after_mm:.3g} um RMS remain where {1e3 * stands.noise_mm:.2g} um are noise, "
-        f"{100.0 * stands.share:.0f} % of the disagreement"
+        f"{1e3 * stands.after_mm:.3g} um RMS remain, {100.0 * stands.share:.0f} % of the disagreement, at a noise of "
+        f"{1e3 * stands.noise_mm:.2g} um"
     )
     if found.unknown is not None:
         return Verdict.UNKNOWN, found.unknown
     if not named and stands.aside_share > MANY_ASIDE:
         return (
             Verdict.UNKNOWN,
-            f"{100.0 * stands.aside_share:.0f} % of the rows lie far off the model, the others on it",
+            f"{100.0 * stands.aside_share:.0f} % of the rows deviate far from the model, and the others agree with it",
         )
     if not named:
         return (Verdict.AGREES, None) if stands.is_noise else (Verdict.UNKNOWN, remains)

@@ -197,8 +197,8 @@ class Observations:
         along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
         path = input_path(self.table, self.chain.history, along_mm, commanded=commanded, overshoots=True)
         said = (
-            f"{turning_readings(self.table).size} readings repeat an outermost target: the stage was taken to have run "
-            "over beyond it in between, as in ISO 230-2, which explains the data better."
+            f"{turning_readings(self.table).size} readings repeat an outermost target: it was assumed that the stage "
+            f"moved beyond the target between them, as in ISO 230-2, because this explains the data better."
         )
         return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
 
@@ -241,7 +241,7 @@ class Observations:
             number = drawn.uncertain[name]
             u = number.u or 0.0
             left = self.refit.known.get(name, 1.0) * u
-            far = ": it lies farther off than the drawing states" if abs(by) > DOUBTFUL else ""
+            far = ": this deviation is larger than the uncertainty in the drawing allows" if abs(by) > DOUBTFUL else ""
             out.append(
                 f"{name} was refitted to {number.value + by * u:.6g} +-{left:.2g}, "
                 f"drawn as {number.value:g} +-{u:.2g}{far}."

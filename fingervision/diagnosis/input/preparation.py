@@ -135,9 +135,11 @@ def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
 def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str, ...]:
     notes = []
     if table.midline_mm is None:
-        notes.append("only the gap was measured: what moves both fingers together cannot show.")
+        notes.append("only the gap was measured: an effect that moves both fingers together cannot be seen.")
     if recorded.is_motion:
-        notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
+        notes.append(
+            "the small fluctuations of the input also appear in the gap: they are real motion and were not smoothed."
+        )
     return tuple(notes)
 
 
@@ -145,9 +147,9 @@ def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
     if table.u_clock_s <= 0.0:
         return ()
     return (
-        "the clocks of input and pictures were laid on each other by this motion itself "
-        f"(U = {2.0 * table.u_clock_s:.2g} s over the frames, k = 2): a lag that is the same at all times is part of "
-        "that offset, and one is named only beyond its uncertainty.",
+        "the offset between the clocks of input and camera was determined from this motion (U = "
+        "{2.0 * table.u_clock_s:.2g} s over the frames, k = 2): a constant lag is part of this offset, and is named "
+        "only if it exceeds the uncertainty of the offset.",
     )
 
 

@@ -154,7 +154,7 @@ def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
     last = int(np.argmax(ratios))
     if ratios[last] < SPACING_RATIO:
         return NoRepeatedTargets(
-            "the inputs do not gather at targets: none is visited again, or readings were taken on the way"
+            "the inputs do not form targets: no position is visited twice, or readings were taken during the motion"
         )
     parts = np.split(ordered, np.flatnonzero(steps >= falling[last]) + 1)
     if len(parts) < FEWEST_TARGETS:
@@ -162,7 +162,7 @@ def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
     centres = np.array([part.mean() for part in parts])
     halfwidth = max(max(abs(part[0] - c), abs(part[-1] - c)) for part, c in zip(parts, centres, strict=True))
     if max(np.ptp(part) for part in parts) > WIDEST * float(np.min(np.diff(centres))):
-        return NoRepeatedTargets("the inputs scatter too widely about the places where they gather to be set-points")
+        return NoRepeatedTargets("the inputs scatter too widely about the positions that they form to be set-points")
     # Rows without a reading scatter as much, and one of them may lie a little farther off than any that has one.
     return centres, 2.0 * float(halfwidth) + floor
 
@@ -230,13 +230,19 @@ def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str
     if paired:
         notes.append(
             "The table has no rows beyond its end targets: of the readings that follow one another there, the first "
-            "was taken as approached from inside, the second from beyond, as in an ISO 230-2 cycle."
+            "was taken as approached from inside the range of targets, the second from outside, as in an ISO 230-2 "
+            "cycle."
         )
     if began_beyond:
-        notes.append("Runs that begin at an end target were taken to have come from beyond it.")
+        notes.append(
+            "In runs that begin at an end target, this target was taken as approached from outside the range "
+            "of targets."
+        )
     unknown = sum(len(visit.rows) for visit in out if not visit.direction)
     if unknown:
-        notes.append(f"{unknown} readings were left out: from which side their target was approached is not known.")
+        notes.append(
+            f"{unknown} readings were left out, because it is not known from which side their target was approached."
+        )
     return out, tuple(notes)
 
 

@@ -31,8 +31,8 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
     if put.any() and put.sum() < MOST_SET * put.size:
         out |= put
         notes.append(
-            f"the row at input 0 agrees with the simulated rest gap of {rest_gap_mm:.4g} mm to its last digit: "
-            "it was probably set and not measured, and was set aside in the fit."
+            f"the row at input 0 agrees with the simulated rest gap of {rest_gap_mm:.4g} mm to the last digit: the "
+            f"reading was probably typed in and not measured, and was left out of the fit."
         )
     if isinstance(model, TableModel) and model.input_mm.size >= 8:
         gap = model.right_mm - model.left_mm
@@ -45,7 +45,8 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
             places = model.input_mm[faulty]
             out |= np.isin(table.input_mm, places)
             notes.append(
-                f"the simulation lies off its own straight line at input {', '.join(f'{x:g}' for x in places)} mm: "
-                "check those rows of the model; measured rows there were set aside in the fit."
+                f"the simulation deviates from its own straight line at input {', '.join(f'{x:g}' for x in places)} "
+                f"mm: "
+                "check those rows of the model; the measured rows at these inputs were left out of the fit."
             )
     return out, notes

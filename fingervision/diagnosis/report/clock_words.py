@@ -48,7 +48,8 @@ def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ..
     if abs(by_s - too_s) > ALIKE * max(abs(by_s), abs(too_s)):
         return tuple(places)
     words = (
-        f" (clocks {1e3 * abs(by_s + too_s) / 2.0:.2g} ms apart would do the same in both directions; their offset has "
+        f" (clocks {1e3 * abs(by_s + too_s) / 2.0:.2g} ms apart would cause the same differences in both directions; "
+        f"the clock offset has "
         f"U = {1e3 * expanded_s:.2g} ms, k = 2)"
     )
     return tuple(

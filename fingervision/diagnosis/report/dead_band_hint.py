@@ -66,7 +66,9 @@ def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> 
     idle = np.abs(steps[~followed])
     words = []
     if idle.size >= FEWEST_IDLE and float(idle.max()) < float(np.min(np.abs(steps[followed]), initial=np.inf)):
-        words.append(f"{idle.size} steps of up to {idle.max():.2g} mm were not answered, all larger ones were")
+        words.append(
+            f"{idle.size} steps of up to {idle.max():.2g} mm of the command caused no motion, but all larger steps did"
+        )
     away = (rests - rests.mean())[followed] * np.sign(steps[followed])
     short = int(np.sum(away < 0.0))
     chance = binomtest(short, away.size, 0.5, alternative="greater").pvalue if away.size else 1.0
@@ -74,12 +76,11 @@ def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> 
     still = AT_REST * float(np.median(np.abs(creeps[followed]))) if away.size else 0.0
     if chance < BY_CHANCE and short >= SHORT_SHARE * away.size and band > still:
         words.append(
-            f"after {short} of {away.size} steps it rested short of the command, on the side from which it came, by "
-            f"{band:.2g} mm (median)"
+            f"after {short} of {away.size} steps the stage stopped short of the command by {band:.2g} mm (median)"
         )
     if not words:
         return None
-    return f"the stage rests away from its commands as a servo with a dead band does: {'; '.join(words)}."
+    return f"the stage stops away from its commands, like a servo with a dead band: {'; '.join(words)}."
 
 
 def _holds(history: History, error_mm: Array, path_mm: Array) -> tuple[Array, Array, Array, Array, Array]:

@@ -148,8 +148,8 @@ def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
     if errors is None or not errors[0].has_trend:
         return ()
     return (
-        "repeats of the same place drift or run in (neighbouring visits agree better than distant ones, by "
-        f"{errors[0].trend_sigmas:.1f} standard deviations): that was taken out of the pure error.",
+        "repeated readings at the same position drift (successive readings agree better than distant ones, by "
+        "{errors[0].trend_sigmas:.1f} standard deviations): the drift is not included in the pure error.",
     )
 
 

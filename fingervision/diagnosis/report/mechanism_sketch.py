@@ -89,14 +89,14 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
                        "names": [body.name for body in bodies]})  # fmt: skip
     said = (
         f"Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, its difference from the prediction "
-        f"magnified {magnified:.3g} times. Colour: how far a body's mean is off in units of its standard uncertainty u "
-        "by the noise, up to 3 grey, up to 6 yellow, beyond red. Rings: hinges, heavy where one is in the answer. "
-        "Bodies that are held are not measured."
+        f"magnified {magnified:.3g} times. Colour: mean deviation of a body in units of its standard uncertainty; "
+        f"grey up to 3, yellow up to 6, red above. Rings: hinges; a heavy ring marks a hinge that the result names. "
+        f"Fixed bodies are not measured."
     )
     if unseen:
         said += f" Not measured: {', '.join(unseen)}."
     if partly:
-        said += f" Measured in part, the rest as predicted: {', '.join(partly)}."
+        said += f" Measured in part, otherwise drawn as predicted: {', '.join(partly)}."
     return (
         f"<style>{_STYLE}</style>"
         f'<svg id="mechanism" viewBox="{box}" role="img" aria-label="The mechanism as predicted and as measured">'

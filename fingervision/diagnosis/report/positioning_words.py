@@ -21,11 +21,12 @@ NAMES = {
 }
 REFERENCES = {
     "target": "Deviations are measured gap minus recorded input, less a constant.",
-    "model": "Deviations are measured minus simulated gap: figures of what the model lacks, not of the axis alone.",
+    "model": "Deviations are measured minus simulated gap: they describe the errors of the model together with those "
+    "of the axis.",
 }
 SHARES = (
-    "Shares are the best explanation's: the figure minus the figure with the effect's predicted change taken out. "
-    "Figures are ranges and maxima: shares need not add up."
+    "The share of an effect is the value minus the value without the change that the best explanation predicts for "
+    "this effect. The values are ranges and maxima, so that the shares need not add up."
 )
 SIDES = {"up": "approached from below", "down": "approached from above"}
 
@@ -71,7 +72,7 @@ def positioning_document(report: PositioningReport) -> dict[str, object]:
 def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the table in report.html; lengths in mm, with their full values for programs."""
     effects = list(report.without)
-    after = [] if report.after is None else ["after the answer, mm"]
+    after = [] if report.after is None else ["after correction, mm"]
     head = ["figure", "measured, mm", *after, *(f"share of {effect}, mm" for effect in effects), "definition"]
     rows = []
     for symbol, figure in report.measured.figures.items():
@@ -119,13 +120,13 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
         if share is None or abs(share) <= TOLD * abs(value):
             continue
         if 0.0 < share * value <= (1.0 + TOLD) * value**2:
-            causes.append(f"{_mm(abs(share))} mm of it is {effect}")
+            causes.append(f"{_mm(abs(share))} mm are caused by {effect}")
         else:
             # It hides a part of the figure, or others hide a part of it: what would stand without it is true always.
-            causes.append(f"without {effect} it would be {_mm(value - share)} mm")
+            causes.append(f"without {effect} the value would be {_mm(value - share)} mm")
     words += f"; {', '.join(causes)}" if causes else ""
     rest = None if report.after is None else report.after.figures[symbol].value_mm
-    return words + (f"; {_mm(rest)} mm remain." if rest is not None else ".")
+    return words + (f"; {_mm(rest)} mm remain after correction." if rest is not None else ".")
 
 
 def _side_words(figure: Figure, slope_sign: int) -> str:
@@ -137,8 +138,8 @@ def _side_words(figure: Figure, slope_sign: int) -> str:
     if interval is None:
         return words
     if value * slope_sign < 0.0:
-        return f"{words}, as play makes it"
-    return f"{words}; play makes it the other way round: are the directions swapped?"
+        return f"{words}, as a play causes"
+    return f"{words}; a play would cause the opposite: are the two directions exchanged?"
 
 
 def _visits(visits: Visits | None) -> dict[str, float | None] | None:

@@ -68,7 +68,7 @@ def answer(
     if verdict is Verdict.AMBIGUOUS:
         names = "; ".join(" + ".join(names) for names in alternatives)
         which = f": {names}" if len(alternatives) <= FEW_NAMES else ""
-        return f"These data cannot tell {len(alternatives)} explanations apart{which}. With the best fit, {fall}."
+        return f"These data cannot distinguish {len(alternatives)} explanations{which}. With the best fit, {fall}."
     part = f" {what} explain{'s' if len(effects) == 1 else ''} a part; {fall}." if effects else ""
     return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
 
@@ -107,7 +107,7 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
             f"disagreement; {stands.noise_mm:.2g} mm of it would be random noise"
         )
     if left_over is not None:
-        words += f"; its largest part is {left_over}, small beside what was explained"
+        words += f"; the largest part of it is {left_over}, small compared with the explained part"
     if max(scatter_mm, default=0.0) > 0.0:
         words += f"; the runs are offset against each other by {scatter_mm[0]:.2g} mm (standard deviation) in the gap"
     return words + "."
@@ -125,8 +125,8 @@ def beyond_the_search(best: Explanation, problem: Problem) -> tuple[str, ...]:
     """Sentences on parameters that may lie beyond the range in which they were searched."""
     return tuple(
         f"{effect}: the {parameter.words} may lie beyond {parameter.upper:.4g} {parameter.unit}, the end of its search "
-        "range: it is longer than these data can show, and so the effect's parameters are limited on one side only; "
-        "what it does within the table is known."
+        "range: the data are too short to determine it, so that the parameters of the effect are limited on one side "
+        "only; the effect within the table is known."
         for effect, parameter in open_parameters(best, problem)
     )
 
@@ -135,5 +135,7 @@ def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
     """Sentence for a table whose noise comes mainly from the error of the recorded input."""
     error = float(np.median(data.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
-        return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)
+        return (
+            f"the error of the recorded input ({error:.2g} mm of gap) is larger than the error of the measured gap.",
+        )
     return ()
