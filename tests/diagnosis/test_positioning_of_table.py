@@ -105,7 +105,7 @@ def test_a_reversal_of_the_wrong_sign_is_asked_about(slope: float, play_mm: floa
     found = report(gap, lambda inputs: 10.0 + slope * inputs)
     assert found.reference == "target"
     assert found.after is None
-    assert ("swapped?" in positioning_words(found)[0]) == (play_mm < 0.0)
+    assert ("exchanged?" in positioning_words(found)[0]) == (play_mm < 0.0)
     assert ("as a play causes" in positioning_words(found)[0]) == (play_mm > 0.0)
 
 
