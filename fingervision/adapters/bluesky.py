@@ -219,7 +219,7 @@ class GapDevice:
     def read(self) -> dict[str, dict[str, Any]]:
         """Return gap, edges, stage position and force of the last triggered frame; None for a missing gap."""
         if self._newest is None:
-            raise StateError(f"{self.name} must be triggered before it is read: no frame was taken yet.")
+            raise StateError(f"{self.name} must be triggered before it is read, because no frame has been taken yet.")
         at_s = self._unix_s + self._at_s
         return {key: {"value": value, "timestamp": at_s} for key, value in self._newest.items()}
 

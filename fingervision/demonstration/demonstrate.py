@@ -119,14 +119,17 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
     before: Path | None = None
     for number in range(1, MOST_RUNS + 1):
         folder, asked = out / f"run-{number}", read_recipe(recipe)
-        say(f"Run {number}, {asked.name}: the stage moves, a camera looks on, every picture is measured.")
+        say(f"Run {number}, {asked.name}: the stage moves, the camera records, and the program measures every frame.")
         rows = [] if before is None else rows_before(before)
         bed = open_bed(SIMULATED, hidden, seed=seed, earlier_s=times_of(rows))
         try:
             done = run_recipe(asked, bed, folder, hidden, before=rows)
         finally:
             bed.close()
-        say(f"{done.counts.with_gap} gaps in {done.counts.recorded} pictures. They are compared with the simulation.")
+        say(
+            f"{done.counts.with_gap} gaps in {done.counts.recorded} frames were measured. The gaps are compared with "
+            "the simulation."
+        )
         table = folder / (SAMPLES if before is None else JOINED)
         answer, page = _answer(table, folder / SIMULATION, out / f"diagnosis-{number}", seed)
         say(f"{answer.report.verdict}: {answer.report.sentence}")

@@ -81,7 +81,7 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of the parameters to what the given data can show."""
     places = np.unique(np.round(history.input_mm / max(1e-6 * history.input_span_mm, 1e-300)))
     if places.size < FEWEST_PLACES:
-        return f"a map must be seen at {FEWEST_PLACES} different inputs at least, but the table has {places.size}"
+        return f"a map needs readings at {FEWEST_PLACES} or more different inputs, but the table has {places.size}"
     return EFFECT.parameters
 
 

@@ -58,7 +58,7 @@ def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
 def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of the parameters to what the given data can show."""
     if history.dwell_s > 0.0:
-        return "the stage is taken to have arrived and waited before each reading, however slowly it went"
+        return "the stage is assumed to have arrived and waited before each reading, so that its speed is unknown"
     moving: list[Array] = []
     jumping: list[Array] = []
     for run in history.runs:
@@ -74,7 +74,10 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     fastest = float(np.max(np.concatenate([steady, asked])))
     slowest, fast = np.quantile(steady, (SLOWEST_SHARE, FASTEST_SHARE)) if steady.size else (JUMP_RANGE * fastest, 0.0)
     if max(float(fast), float(np.max(asked, initial=0.0))) < APART * slowest:
-        return f"the input moves at one speed only, about {fastest:.3g} mm/s: a limit below it would follow nothing"
+        return (
+            f"the input moves at one speed only, about {fastest:.3g} mm/s, so that a lower limit of speed cannot "
+            f"be distinguished from a stage that does not follow"
+        )
     (speed_limit,) = EFFECT.parameters
     return (replace(speed_limit, lower=float(slowest), upper=fastest, neutral=fastest),)
 

@@ -136,7 +136,7 @@ def _checked_drive(effect: DriveEffect, input_mm: Array, history: History, value
         raise EffectAnswerError(effect.name, _raised(error, values)) from error
     _same(effect.name, "input", answer, input_mm.shape, values)
     if not np.array_equal(asked, input_mm, equal_nan=True):
-        raise EffectAnswerError(effect.name, "must leave the input that it is given as it is, but changed it in place")
+        raise EffectAnswerError(effect.name, "must not change the input that it receives, but changed it in place")
     return answer
 
 
@@ -150,7 +150,7 @@ def _checked_points(effect: PointEffect, response: Response, history: History, v
     for side in ("left_mm", "right_mm"):
         _same(effect.name, side, getattr(answer, side), response.left_mm.shape, values)
     if (answer.force_n is None) != (response.force_n is None):
-        raise EffectAnswerError(effect.name, "must return a force where it is given one, and only there, but does not")
+        raise EffectAnswerError(effect.name, "must return a force if, and only if, it receives a force, but does not")
     if answer.force_n is not None:
         _same(effect.name, "force_n", answer.force_n, response.left_mm.shape, values)
     return answer
@@ -162,15 +162,15 @@ def _same(name: str, what: str, answer: object, shape: tuple[int, ...], values: 
         raise EffectAnswerError(name, f"must return {what} as an array of float, but returned a {kind}")
     if answer.shape != shape:
         raise EffectAnswerError(
-            name, f"must return {what} of shape {shape}, as it is given, but returned {answer.shape}"
+            name, f"must return {what} of shape {shape}, the shape that it received, but returned {answer.shape}"
         )
     if not np.all(np.isfinite(answer)):
-        raise EffectAnswerError(name, f"must return finite numbers, but returned others at {_told(values)}")
+        raise EffectAnswerError(name, f"must return finite numbers, but returned NaN or infinity at {_told(values)}")
 
 
 def _raised(error: Exception, values: Values) -> str:
     words = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-    return f"must answer for every value within its bounds, but raised {words} at {_told(values)}"
+    return f"must compute a result for all parameter values within their bounds, but raised {words} at {_told(values)}"
 
 
 def _told(values: Values) -> str:

@@ -31,7 +31,7 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Exclude time constants much shorter than the stage's rest before each reading, whose creep would be complete."""
     kept = tuple(p for p, tau_s in zip(EFFECT.parameters, TAUS_S, strict=True) if tau_s >= SLOWER * history.dwell_s)
     if not kept:
-        return f"the stage stood for {history.dwell_s:.3g} s or longer before each reading: creep is over by then"
+        return f"the stage was at rest for {history.dwell_s:.3g} s or longer before each reading: its creep is over"
     return kept
 
 

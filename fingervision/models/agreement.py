@@ -52,6 +52,6 @@ def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
             sentences.append(
                 f"{better} and {other} must agree on the {name} within their model errors of {100.0 * errors:.2g} % "
                 f"together, but have {a:.4g} and {b:.4g}{unit}, {100.0 * apart:.3g} % apart; trust {better}: "
-                f"{why_trusted(better) or 'it stands first'}."
+                f"{why_trusted(better) or 'it is named first'}."
             )
     return sentences

@@ -141,8 +141,8 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         towards = np.array([wall[1, 1] - wall[1, 0], wall[0, 0] - wall[0, 1]])
         if outward @ towards <= 0.0:
             raise DataError(
-                f"The wall of contact {contact.name} of {mechanism.name} must lie before its face, but lies "
-                "behind it, where the body is."
+                f"The wall of contact {contact.name} of {mechanism.name} must lie in front of its face, but lies "
+                f"behind it, inside the body."
             )
         pair = ContactPair(contact.name, nodes, np.zeros((2, 0), dtype=np.int64), wall)
     else:

@@ -40,7 +40,7 @@ from fingervision.models.triangulate import PlaneMesh
 from fingervision.models.width_effect import force_uncertainty, gripper_zones
 
 KIND = "finite_element"
-TRUST, WHY_TRUSTED = 3, "it has the outline itself, and the other takes the body for bars and notches joined at points"
+TRUST, WHY_TRUSTED = 3, "it computes with the exact outline, but the other kind with bars and notches joined at points"
 
 _MODES = 3
 _ON_NOTCH = 1e-6

@@ -134,8 +134,8 @@ class FunctionModel:
             return f"{self.path} {said[-1].removeprefix(SAYS)}"
         if code < 0:
             name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-            return f"{self.path} must answer, but crashed ({name}): the fault is in the model; nothing was lost."
-        last = f" Its last words: {said[-1][:300]}" if said else ""
+            return f"{self.path} must answer, but crashed ({name}): correct the model."
+        last = f" Its last output: {said[-1][:300]}" if said else ""
         return f"{self.path} must answer, but its process ended with code {code}: correct the model.{last}"
 
 

@@ -80,7 +80,7 @@ def check_uncertainties(gripper: Gripper) -> None:
         for by in (-(estimate.u or 0.0), estimate.u or 0.0):
             try:
                 drawn = _changed(gripper, {name: by})
-                check_outline(drawn, "the drawing so changed")
+                check_outline(drawn, "the changed drawing")
             except FingervisionError as error:
                 raise ModelError(
                     f"The uncertainty of {name} is too large: with {name} = {estimate.value + by:g}, one standard "

@@ -34,7 +34,7 @@ from fingervision.models.static_answer import (
 from fingervision.models.width_effect import force_uncertainty
 
 KIND = "lumped"
-TRUST, WHY_TRUSTED = 2, "both take the body for bars, and it has more of them"
+TRUST, WHY_TRUSTED = 2, "both kinds compute with bars, but this kind with more of them"
 
 _SEGMENTS = 10
 _MODES = 3

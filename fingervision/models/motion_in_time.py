@@ -123,7 +123,7 @@ def gripper_motion(
     apart = np.ones_like(force, dtype=bool) if onset_mm is None else drive.input_mm > onset_mm
     motion = about_equilibria(small, static, force, apart)
     return GripperMotion(
-        motion, f"equilibria, and about them {small.modes_hz.size} modes at rest where the fingers do not touch"
+        motion, f"static equilibria, with vibrations about them in {small.modes_hz.size} modes without contact"
     )
 
 

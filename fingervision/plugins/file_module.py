@@ -51,7 +51,7 @@ def needs(who: str, specifier: str) -> str:
     """Return the error for a plug-in that needs another version of fingervision."""
     from fingervision import __version__
 
-    return f"{who} needs fingervision {specifier}, but this is {__version__}: install the version that it asks for."
+    return f"{who} needs fingervision {specifier}, but this is {__version__}: install the required version."
 
 
 def load_file(path: Path) -> ModuleType:

@@ -188,7 +188,8 @@ def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> So
     if not within.lower_mm < within.upper_mm:
         section.refuse(
             None,
-            f"must leave the actuator a way to go, but it reaches from {able.lower_mm:g} to {able.upper_mm:g} mm.",
+            f"must leave the actuator a range of motion, but the actuator's own range is {able.lower_mm:g} to "
+            f"{able.upper_mm:g} mm.",
         )
     return within
 

@@ -91,8 +91,8 @@ def planned_bed(name: str) -> PlannedBed:
     if describe is None:
         sections["actuator"].refuse(
             "kind",
-            "must say what it can do without its hardware, but has no function without_hardware(section, folder): add "
-            "one to its file, or let `bed run` check the recipe when it starts.",
+            "must state the range of its stage without the hardware, but has no function without_hardware(section, "
+            "folder): add this function to its file, or let `bed run` check the recipe when it starts.",
         )
     actuator: MoveCheck = describe(sections["actuator"], folder)
     scale = stated_scale(top.table("scale"), folder)

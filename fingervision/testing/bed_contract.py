@@ -79,7 +79,7 @@ class ActuatorContract(_BedContract):
                 at_mm = _until_rest(bed)[-1].value
                 hold(
                     abs(at_mm - to_mm) <= _near_mm(bed),
-                    f"{bed.actuator.name} must come to a stand within {_near_mm(bed):.3g} mm of {to_mm:g} mm, but "
+                    f"{bed.actuator.name} must come to rest within {_near_mm(bed):.3g} mm of {to_mm:g} mm, but "
                     f"stands at {at_mm:g} mm.",
                 )
 
@@ -119,7 +119,9 @@ class ActuatorContract(_BedContract):
             speed_mm_s = _speed_mm_s(bed, SLOW_MM_S)
             bed.actuator.jog(speed_mm_s)
             before += _watched(bed, 1.0)
-            hold(bed.actuator.busy, f"{bed.actuator.name} must jog until stopped, but stands ({bed.actuator.alarm}).")
+            hold(
+                bed.actuator.busy, f"{bed.actuator.name} must jog until stopped, but is at rest ({bed.actuator.alarm})."
+            )
             bed.actuator.stop()
             asked_s = bed.clock.now_s()
             readings = before + _until_rest(bed)
@@ -142,7 +144,8 @@ class ActuatorContract(_BedContract):
             later_mm = bed.actuator.readings()[-1].value
             hold(
                 abs(later_mm - readings[-1].value) <= _still_mm(bed),
-                f"{bed.actuator.name} must stand after a stop, but went on by {later_mm - readings[-1].value:.3g} mm.",
+                f"{bed.actuator.name} must be at rest after a stop, but moved on by "
+                f"{later_mm - readings[-1].value:.3g} mm.",
             )
 
     def test_readings_come_in_order_and_between_question_and_answer(self) -> None:
@@ -163,7 +166,7 @@ class ActuatorContract(_BedContract):
             ):
                 move = partial(bed.actuator.move, to_mm, mm_s)
                 _refused(move, f"a move to {to_mm:g} mm at {mm_s:g} mm/s")
-            hold(not bed.actuator.busy, f"{bed.actuator.name} must stand after a refused motion, but moves.")
+            hold(not bed.actuator.busy, f"{bed.actuator.name} must be at rest after a refused motion, but moves.")
             after_mm = bed.actuator.readings()[-1].value
             hold(
                 abs(after_mm - before_mm) <= _still_mm(bed),
@@ -186,7 +189,7 @@ class ActuatorContract(_BedContract):
 
     def _needs_motor(self) -> None:
         if not self.has_motor:
-            raise NotApplicable("a stage turned by hand has no set speed, and is at rest once its reading is typed")
+            raise NotApplicable("a stage turned by hand has no set speed, and is at rest when its reading is typed")
 
 
 class ForceSensorContract(_BedContract):
@@ -219,7 +222,7 @@ class CameraContract(_BedContract):
             indices = [shot.index for shot in shots]
             hold(
                 indices == list(range(indices[0], indices[0] + 5)),
-                f"Frames must be counted without holes, but are {indices}.",
+                f"Frames must be numbered without gaps, but are {indices}.",
             )
             for a, b in pairwise(shots):
                 hold(
@@ -228,7 +231,7 @@ class CameraContract(_BedContract):
                     f"on the camera's clock, {a.arrived_s:g} and {b.arrived_s:g} s on the bed's.",
                 )
             item = shots[-1].item()
-            hold(item.time_s == shots[-1].device_s, "A frame must bear the time of its shot, but bears another.")
+            hold(item.time_s == shots[-1].device_s, "A frame must have the time of its exposure, but has another time.")
             described = camera.description
             if isinstance(item, Frame):
                 size = item.width_px, item.height_px
@@ -322,13 +325,14 @@ def _check_order(
         newest, now_s = given[-1], bed.clock.now_s()
         hold(
             not asked or before_s <= newest.asked_s <= newest.got_s <= now_s,
-            f"{name} must take its newest reading between question and answer ({before_s:.6g} to {now_s:.6g} s), but "
+            f"{name} must take its newest reading between the request and the answer ({before_s:.6g} to {now_s:.6g} "
+            f"s), but "
             f"says {newest.asked_s:.6g} to {newest.got_s:.6g} s.",
         )
         seen += given
     hold(
         all(a.device_s < b.device_s for a, b in pairwise(seen)) and all(one.asked_s <= one.got_s for one in seen),
-        f"{name} must give its readings in the order of their times, but does not.",
+        f"{name} must return its readings in the order of their times, but does not.",
     )
     return seen
 

@@ -115,7 +115,7 @@ class EffectContract:
                 response = self._chain().respond({self.effect.name: values})
                 hold(
                     bool(np.all(np.isfinite(response.left_mm)) and np.all(np.isfinite(response.right_mm))),
-                    f"The effect {self.effect.name} must answer with finite numbers at {_told(values)}, but does not.",
+                    f"The effect {self.effect.name} must return finite numbers at {_told(values)}, but does not.",
                 )
 
     def test_the_same_values_give_the_same_answer(self) -> None:
@@ -125,7 +125,8 @@ class EffectContract:
         moved_mm = _moved_mm(first, again)
         hold(
             moved_mm == 0.0,
-            f"The effect {self.effect.name} must answer alike to the same values, but differs by {moved_mm:.3g} mm.",
+            f"The effect {self.effect.name} must return the same result for the same values, but the results differ "
+            f"by {moved_mm:.3g} mm.",
         )
 
     def test_memory_starts_each_run_at_rest(self) -> None:
@@ -139,7 +140,7 @@ class EffectContract:
             hold(
                 off_mm <= ROUNDING_MM,
                 f"The effect {self.effect.name} must start each run at rest, but run {number} starts {off_mm:.3g} mm "
-                "beside it.",
+                f"away from it.",
             )
 
     def test_a_mirrored_picture_mirrors_the_answer(self) -> None:
@@ -154,7 +155,8 @@ class EffectContract:
         )
         hold(
             moved_mm <= ROUNDING_MM,
-            f"The effect {self.effect.name} must be mirrored by a mirrored picture, but differs by {moved_mm:.3g} mm: "
+            f"The effect {self.effect.name} must have a mirrored result for a mirrored picture, but differs by "
+            f"{moved_mm:.3g} mm: "
             "state in `odd` the parameters that change their sign.",
         )
 
@@ -170,7 +172,8 @@ class EffectContract:
             searched = self.effect.search(without) if needed else "not asked"
             hold(
                 isinstance(searched, str) and len(searched) > 0,
-                f"The effect {self.effect.name} must be excluded with a reason without {words}, but is searched for.",
+                f"The effect {self.effect.name} must be excluded, with a reason, from tables without {words}, but is "
+                f"searched for.",
             )
 
     def test_without_times_it_works_unless_it_says_that_it_needs_them(self) -> None:

@@ -28,7 +28,7 @@ class FrameSourceContract:
         """The kind accepts its own recording, and does not accept a missing file."""
         hold(bool(self.kind.accepts(self.name)), f"The source must accept {self.name}, but does not.")
         for name in NOWHERE:
-            hold(not self.kind.accepts(name), f"The source must not accept {name!r}, which is nothing, but does.")
+            hold(not self.kind.accepts(name), f"The source must not accept {name!r}, which does not exist, but does.")
 
     def test_it_describes_its_frames(self) -> None:
         """The description agrees with the frames that the source yields."""
@@ -56,7 +56,7 @@ class FrameSourceContract:
         """Frame numbers, including those of lost frames, are consecutive from 0, and times increase."""
         frames = self._frames(self.source())
         indices = [frame.index for frame in frames]
-        hold(indices == list(range(len(frames))), f"Frames must be counted from 0 without holes, but are {indices}.")
+        hold(indices == list(range(len(frames))), f"Frames must be numbered from 0 without gaps, but are {indices}.")
         times = [frame.time_s for frame in frames if isinstance(frame, Frame) and frame.time_s is not None]
         hold(all(a < b for a, b in pairwise(times)), f"Times of frames must rise, but are {times}.")
 
@@ -82,7 +82,7 @@ class FrameSourceContract:
             and (not isinstance(a, Frame) or not isinstance(b, Frame) or (a.pixels == b.pixels).all())
             for a, b in zip(first, again, strict=False)
         )
-        hold(alike, f"{self.name} must read alike twice, but does not.")
+        hold(alike, f"{self.name} must give the same frames when it is read twice, but does not.")
 
     def _frames(self, source: FrameSource) -> list[Frame | LostFrame]:
         frames = list(islice(source, LOOKED_AT))

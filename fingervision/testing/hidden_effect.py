@@ -105,7 +105,7 @@ class HiddenEffectContract:
         advice = (
             f"give {' and '.join(shapes)} more starts, so that more than one value is tried between the bounds"
             if shapes
-            else "look whether its bounds and its neutral value are those that are meant"
+            else "check its bounds and its neutral value"
         )
         hold(
             any(effect.name in names for names in report.alternatives),

@@ -30,7 +30,10 @@ class ModelContract:
         """The gap at input 0 is `rest_gap_mm`, and 0 lies in the range of inputs."""
         model = self.model()
         low, high = model.input_range_mm
-        hold(low < 0.0 < high, f"The inputs of {self.kind.KIND} must reach from below 0 to above, but are {low, high}.")
+        hold(
+            low < 0.0 < high,
+            f"The inputs of {self.kind.KIND} must range from negative to positive values, but range over {low, high}.",
+        )
         at_rest = float(model.respond(np.zeros(1)).gap_mm[0])
         hold(
             abs(at_rest - model.rest_gap_mm) < RELATIVE * model.rest_gap_mm,
@@ -46,7 +49,7 @@ class ModelContract:
         apart = float(np.max(np.abs(answer.left_mm + answer.right_mm)))
         hold(
             apart < RELATIVE * float(np.max(np.abs(answer.gap_mm))),
-            f"{self.kind.KIND} must move both fingers alike, but their middle moves by {apart:.3g} mm.",
+            f"{self.kind.KIND} must move both fingers by the same distance, but their midline moves by {apart:.3g} mm.",
         )
 
     def test_its_figures_are_those_of_its_answer(self) -> None:

@@ -216,8 +216,8 @@ def test_a_reset_in_the_middle_is_said_and_lets_go_of_every_line(emulated: Emula
     with pytest.raises(DeviceError) as raised:
         until_lost(board)
     assert str(raised.value) == (
-        f"The board on {emulated.port} was reset in the middle, by its button, its supply or another program; all its "
-        "lines are off: begin again."
+        f"The board on {emulated.port} was reset during the command, by its button, its supply or another program; all "
+        "its lines are off: start the command again."
     )
     assert emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) is None, since=len(emulated.edges) - 5)
 
@@ -229,7 +229,7 @@ def test_a_pulled_cable_is_said_and_drops_the_drive_line(emulated: EmulatedBoard
     pulled_s = emulated.done_s(emulated.say("unplug"))
     down = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 0, since=since)
     assert down.host_s - pulled_s <= 0.1
-    with pytest.raises(DeviceError, match=rf"^The board on {emulated.port} was lost \(.*\): is its cable in\?"):
+    with pytest.raises(DeviceError, match=rf"^The board on {emulated.port} was lost \(.*\): plug its cable in"):
         until_lost(strict_board)
 
 

@@ -92,7 +92,9 @@ def build(section: Section, context: BuildContext) -> Esp300Stage:
         from pymeasure.instruments.newport import ESP300
         from pymeasure.instruments.newport.esp300 import Axis
     except ImportError as error:
-        section.refuse("kind", f"needs pymeasure, which is not here ({error}): pip install 'fingervision[pymeasure]'.")
+        section.refuse(
+            "kind", f"needs pymeasure, which could not be imported ({error}): pip install 'fingervision[pymeasure]'."
+        )
     limits, port, number = stated_limits(section), section.word("port"), section.whole("axis", 1, low=1, high=3)
     try:
         with warnings.catch_warnings():

@@ -51,7 +51,10 @@ class HandScrew:
 
     def home(self) -> None:
         """Ask the user to set the screw to its zero."""
-        self._ask_for("Turn the screw to where the gripper rests, set its reading to zero, and type that reading", 0.0)
+        self._ask_for(
+            "Turn the screw until the gripper is at rest, set the reading of the screw to zero, and type this reading",
+            0.0,
+        )
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse motions beyond the limits of the screw."""
@@ -109,7 +112,7 @@ class HandScrew:
                     self._turned.append(Reading(at_s, at_s, at_s, mm))
                 self._at_mm = typed_mm
                 return
-        raise StateError(f"The reading must be typed in mm, but was not, {ASK_AT_MOST} times: the run ends here.")
+        raise StateError(f"The reading must be typed in mm, but was not, {ASK_AT_MOST} times: the run has ended.")
 
 
 def _number(words: str, otherwise: float) -> float | None:

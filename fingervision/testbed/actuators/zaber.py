@@ -98,7 +98,9 @@ def build(section: Section, context: BuildContext) -> ZaberStage:
     try:
         from zaber_motion.ascii import Connection
     except ImportError as error:
-        section.refuse("kind", f"needs zaber-motion, which is not here ({error}): pip install 'fingervision[zaber]'.")
+        section.refuse(
+            "kind", f"needs zaber-motion, which could not be imported ({error}): pip install 'fingervision[zaber]'."
+        )
     limits, port = stated_limits(section), section.word("port")
     device, axis = section.whole("device", 1, low=1, high=99), section.whole("axis", 1, low=1, high=9)
     microstep_mm = section.number("microstep_mm", above=0.0)

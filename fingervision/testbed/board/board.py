@@ -22,7 +22,7 @@ JOINED_WITHIN_S = 20 * FEWEST * ASK_EVERY_S
 MOST_SAMPLES = 120_000
 DROPPED = {
     "w": "the board had heard nothing from this program for {silence_ms} ms (is the computer overloaded?)",
-    "l": "the motion took longer than it may",
+    "l": "the motion took longer than its time limit",
     "a": "the motor controller raised its alarm",
     "h": "this program stopped it",
 }
@@ -199,12 +199,14 @@ class Board:
     def _explain(self, reason: str) -> NoReturn:
         sentences = {
             "alarm": "The motor controller must have no alarm, but its alarm line is active: clear it there.",
-            "busy": "The motor controller must stand before it moves again, but its busy line is active.",
+            "busy": "The motor controller must be at rest before it moves again, but its busy line is active.",
             "stopped": f"The board must be cleared before it moves again, because {self.dropped or 'it was stopped'}: "
-            "home it.",
+            f"home the stage.",
         }
         raise DeviceError(
-            sentences.get(reason, f"{self.name} refused a command ({reason}): set it up anew by beginning again.")
+            sentences.get(
+                reason, f"{self.name} refused a command ({reason}): start the command again, which sets the board up."
+            )
         )
 
 

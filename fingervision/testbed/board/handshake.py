@@ -89,7 +89,9 @@ class Handshake:
             return False
         self.board.release()
         if Role.IN_POSITION in self.board.settings.lines:
-            return self._came(wire.Levels.IN_POSITION, LINE_WITHIN_S, "the motor controller has not come into position")
+            return self._came(
+                wire.Levels.IN_POSITION, LINE_WITHIN_S, "the motor controller has not reported its position"
+            )
         return True
 
     def _came(self, level: wire.Levels, within_s: float, otherwise: str) -> bool:

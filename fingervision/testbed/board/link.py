@@ -178,7 +178,7 @@ class BoardLink:
         self.check()
 
     def _pulled(self, error: Exception) -> str:
-        return f"The board on {self._port.name} was lost ({error}): is its cable in? Plug it in and begin again."
+        return f"The board on {self._port.name} was lost ({error}): plug its cable in, and start the command again."
 
     def _fail(self, sentence: str) -> None:
         with self._news:
@@ -221,8 +221,8 @@ class BoardLink:
         if isinstance(message, wire.Answer) and self._session is not None:
             if message.session != self._session:
                 self._fail(
-                    f"The board on {self._port.name} was reset in the middle, by its button, its supply or another "
-                    "program; all its lines are off: begin again."
+                    f"The board on {self._port.name} was reset during the command, by its button, its supply or "
+                    f"another program; all its lines are off: start the command again."
                 )
                 return
             if message.cause != wire.GOING:
@@ -240,8 +240,8 @@ class BoardLink:
     def _stay_awake(self, now_s: float) -> None:
         if now_s - self._last_heard_s > LOST_AFTER_S:
             self._fail(
-                f"The board on {self._port.name} was lost: it has said nothing for {LOST_AFTER_S:g} s. Look at its "
-                "cable and its supply, and begin again."
+                f"The board on {self._port.name} was lost: it has sent nothing for {LOST_AFTER_S:g} s. Check its "
+                f"cable and its supply, and start the command again."
             )
             return
         if now_s - self._last_asked_s >= (STOP_EVERY_S if self._stopping else ASK_EVERY_S):

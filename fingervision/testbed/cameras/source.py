@@ -65,7 +65,7 @@ class SourceCamera:
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._ended, self._patience_s)
             if not self._waiting:
-                why = self._ended or f"it gave no frame for {self._patience_s:g} s"
+                why = self._ended or f"the camera sent no frame for {self._patience_s:g} s"
                 raise DeviceError(
                     f"The camera {self.description.name} must give frames while the test bed works, but "
                     f"{why}: the motor "
@@ -89,7 +89,7 @@ class SourceCamera:
                     self._waiting.append(received)
                     self._changed.notify()
         except FingervisionError as error:
-            ended = f"it was cut off ({error})"
+            ended = f"its stream was cut off ({error})"
         with self._changed:
             self._ended = ended
             self._changed.notify()

@@ -37,7 +37,7 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
     upper.set_title(name, pad=TITLE_PAD_POINTS)
     upper.set_ylabel("position (mm)")
     lower.set_ylabel("speed (mm/s)")
-    lower.set_xlabel("time (s), with a short stand after each motion; shaded: pushing, dashed: what the stage can do")
+    lower.set_xlabel("time (s), with a short rest after each motion; shaded: pushing, dashed: limits of the stage")
     for level_mm in (limits.lower_mm, limits.upper_mm):
         upper.axhline(level_mm, color=LIMIT_COLOUR, linewidth=0.8, linestyle="--")
     fastest_mm_s = max((each.motion.speed_mm_s for each in motions), default=0.0)

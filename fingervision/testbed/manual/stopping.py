@@ -26,7 +26,7 @@ def stop_bed(name: str) -> str:
         The bed cannot be opened, or the other process does not let go of it.
     """
     if name == SIMULATED:
-        return "The simulated bed stands: its motor moves only while a command runs."
+        return "The simulated test bed is at rest: its motor moves only while a command runs."
     top = read_configuration(name)
     section = top.table("actuator")
     find_holder = getattr(kind_of("actuator", section), "holder", None)
@@ -48,4 +48,4 @@ def stop_bed(name: str) -> str:
         bed.actuator.stop()
     finally:
         bed.close()
-    return f"{words}The motor stands, and all its lines are off."
+    return f"{words}The motor is at rest, and all its lines are off."

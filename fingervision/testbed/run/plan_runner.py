@@ -120,12 +120,15 @@ class Runner:
         record.write(at_once=True)
         if moved_s < LEAST_SHARE * foreseen_s:
             self._warn_of_speed(moved_s, foreseen_s)
-        record.event("clocks", "The instruments' clocks beside the bed's.", **watch.sight.clocks())
+        record.event(
+            "clocks", "Compare the clocks of the instruments with the clock of the test bed.", **watch.sight.clocks()
+        )
         record.event("ended", f"{record.counts.recorded} frames.")
 
     def _warn_of_speed(self, moved_s: float, foreseen_s: float) -> None:
         words = (
-            f"warning: the recorded motions took {moved_s:.3g} s, but take {foreseen_s:.3g} s at the speeds of the "
+            f"warning: the recorded motions took {moved_s:.3g} s, but should take {foreseen_s:.3g} s at the speeds of "
+            f"the "
             "recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract tests; "
             "`fingervision bed check` prints their command line."
         )

@@ -118,8 +118,8 @@ class Watch:
             if measured.status is Status.OK:
                 return
         raise DeviceError(
-            f"The camera must show both fingers before anything moves, but does not: {words} "
-            "Bring both into the picture (camera, light, focus), and run the recipe again."
+            f"The camera must show both fingers before anything moves, but does not: {words} Bring both fingers into "
+            f"the picture (camera, light, focus), and run the recipe again."
         )
 
     def _end_if_stopped(self) -> None:
@@ -168,7 +168,7 @@ class Watch:
         """Wait while the run is paused; return whether there was a pause."""
         if not self.controls.paused:
             return False
-        self.say("Paused: p and Enter go on, q and Enter end the run.")
+        self.say("Paused: type p and Enter to continue, or q and Enter to end the run.")
         began_s = self.bed.clock.now_s()
         if self.bed.replays:
             while self.controls.waits:

@@ -121,7 +121,7 @@ def _settle(watch: Watch) -> None:
         last = [*last[-STILL_FRAMES + 1 :], row]
         if len(last) == STILL_FRAMES and _still(last):
             return
-    words = f"The picture was not still after {STILL_WITHIN_S:g} s, and is measured as it is."
+    words = f"The picture was not still after {STILL_WITHIN_S:g} s, and is measured in this state."
     watch.record.event("not_still", words)
 
 
