@@ -47,7 +47,7 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
         raise ArgumentTypeError(argument, MUST, f"is {what_it_is(pictures)}", advice)
     if np.ma.isMaskedArray(pictures):
         raise ArgumentTypeError(
-            argument, MUST, "is a masked array, and a pixel that is masked has no level", "use roi, or .filled(...)"
+            argument, MUST, "is a masked array, in which masked pixels have no grey level", "use roi, or .filled(...)"
         )
     if pictures.dtype.kind == "c":
         raise ArgumentTypeError(
@@ -57,12 +57,12 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
         raise ArgumentTypeError(
             argument,
             MUST,
-            "holds true and false",
+            "holds true and false values only",
             "a binary picture lacks the exact positions of edges; give the grey picture",
         )
     if not (pictures.dtype.kind == "f" or (pictures.dtype.kind == "u" and pictures.dtype.itemsize <= 2)):
         advice = (
-            "where the levels end at 255, .astype(numpy.uint8) makes them so" if pictures.dtype.kind in "iu" else ""
+            "if no level exceeds 255, convert the array by .astype(numpy.uint8)" if pictures.dtype.kind in "iu" else ""
         )
         raise ArgumentTypeError(argument, MUST, f"is of type {pictures.dtype}", advice)
     if pictures.size == 0:
@@ -117,9 +117,9 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
         if least < 0.0 or largest > 1.0:
             raise ArgumentError(
                 subject,
-                "be from 0 to 1 where its levels are floats (0 black, 1 the end of the scale)",
+                "be from 0 to 1 if its levels are floats (0 is black, 1 is full scale)",
                 f"runs from {least:.6g} to {largest:.6g}",
-                "divide by the level at which the camera's scale ends",
+                "divide by the level of the camera's full scale",
             )
         picture = _stored(picture)
     native = picture.astype(picture.dtype.newbyteorder("="), copy=False)
@@ -133,7 +133,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
         if see_through:
             raise ArgumentError(
                 subject,
-                "be opaque where it has an alpha channel",
+                "be opaque if it has an alpha channel",
                 f"{see_through} of {native[:, :, 3].size} pixels are not",
                 "give the colours alone, source[..., :3], if they are what the camera recorded",
             )

@@ -148,8 +148,8 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
         notes.append(f"The camera was asked for the format {wish.camera.format} and gives {settings['format']}.")
     if settings["format"] == "MJPG":
         notes.append(
-            "The camera compresses its pictures (MJPG) before they arrive here: they count as lossy, and the "
-            "uncertainty is larger for it; choose a size or rate that it delivers raw (--format YUYV)."
+            "The camera compresses its pictures (MJPG) before they arrive here: the pictures are lossy, which "
+            "increases the uncertainty; choose a size or rate that it delivers raw (--format YUYV)."
         )
     rate_hz = read.get(cv2.CAP_PROP_FPS, UNSUPPORTED)
     if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=controls.SAME_SHARE):
@@ -220,4 +220,4 @@ def _cannot(backend: str, control: Control, asked: float) -> str:
     words = f"The camera was asked for {control.name} {_words(control, asked)}"
     if backend in (V4L2, MSMF):
         return f"{words}, but has no such setting."
-    return f"{words}, but {backend} lets no program set it: set it in the camera's own program."
+    return f"{words}, but {backend} does not allow programs to change it: change it in the camera's own program."

@@ -24,7 +24,7 @@ def cut_off(
     """
     kind = container.format.name
     if "mp4" in kind and stream.frames > packets:
-        return f"The recording is cut off here: the file announces {stream.frames} frames and holds {packets}."
+        return f"The recording is cut off here: the file announces {stream.frames} frames but holds only {packets}."
     stated_s = None
     if "matroska" in kind:
         stated_s = _clock_s(stream.metadata.get("DURATION")) or (

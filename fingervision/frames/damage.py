@@ -42,7 +42,7 @@ class DamageTrail:
         if packet.is_keyframe and self._broken:
             self._stated_keys.add(self._last)
         if packet.is_corrupt:
-            self.breaks("It is incomplete in the file.")
+            self.breaks("The frame is incomplete in the file.")
         if packet.pts is not None and not packet.is_discard and is_shown:
             heapq.heappush(self._entered, (packet.pts, self._last))
 
@@ -97,7 +97,7 @@ class DamageTrail:
                 self._given_up.add(early)
                 yield early, self._words(early_number)
         if picture.is_corrupt:
-            self._broken.setdefault(number, "It was decoded with errors.")
+            self._broken.setdefault(number, "The frame was decoded with errors.")
         # One flipped bit makes a picture call itself a key frame: the container must say so too.
         since = number if picture.key_frame and number in self._stated_keys else self._recoveries.get(number)
         if since is not None and not any(since <= broken <= number for broken in self._broken):
@@ -123,5 +123,5 @@ class DamageTrail:
         if own is not None:
             return own
         if self._hangs_on_damage(number):
-            return "It is coded as a difference to a frame that is damaged."
-        return "It was lost where the recording is damaged."
+            return "The frame is coded as a difference from a frame that is damaged."
+        return "The frame was lost where the recording is damaged."

@@ -76,7 +76,7 @@ def request_settings(nodes: Any, wish: Wish) -> tuple[str, ...]:
                 getattr(nodes, node).value = value
         except Exception as error:  # not there, not now, beyond its range: each producer has its own class
             if node != "AcquisitionFrameRateEnable":  # many cameras have no such switch, and need none
-                notes.append(f"The camera was asked for {node} = {value}, and did not take it ({error_words(error)}).")
+                notes.append(f"The camera was asked for {node} = {value}, and refused it ({error_words(error)}).")
             continue
     return tuple(notes)
 

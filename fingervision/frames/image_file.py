@@ -112,7 +112,7 @@ def _check_png(name: str, content: bytes) -> None:
         kind = content[place + 4 : place + 8]
         (stated,) = struct.unpack_from(">I", content, end)
         if zlib.crc32(memoryview(content)[place + 4 : end]) != stated:
-            raise UnreadableImageError(f"{name} is damaged: a part of it fails its checksum.")
+            raise UnreadableImageError(f"{name} is damaged: a checksum in the file does not match.")
         if kind == b"IEND":
             return
         place = end + 4

@@ -97,7 +97,7 @@ class ImageFolder:
         for index, file in enumerate(self.description.files):
             time_s = self._time_s(index)
             if self.times_s is not None and time_s == last_s:
-                yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+                yield LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the frame before.")
                 continue
             last_s = time_s
             try:

@@ -22,7 +22,9 @@ CHECKSUM = b"\xbf"
 CHECKSUM_BYTES, ELEMENT_BYTES = 4, 6
 UNCHECKED_CODECS = frozenset({"vp8", "vp9"})
 """Codecs, by FFmpeg's canonical names, that decode any bytes without an error."""
-BROKEN = "The checksum of the part of the file that it stands in (a Matroska cluster) does not fit: bytes are damaged."
+BROKEN = (
+    "The part of the file that contains the frame (a Matroska cluster) does not match its checksum: bytes are damaged."
+)
 
 
 class ClusterChecksums:

@@ -51,19 +51,25 @@ FEWEST_LENGTHS, KEYS_SHARE = 3, 0.9
 # A bit that turns by chance does so in half of the pictures: nineteen in twenty, of ten at least, are no chance.
 FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
-OWN_RECORDING = "Recorded by fingervision, with a list of its lost frames beside it."
+OWN_RECORDING = "Recorded by fingervision, with a list of the lost frames in the same folder."
 """Comment in a container whose packets were checked during the recording, and whose list of lost frames is stored with
 it."""
 
-NUMBER_LEFT_OUT = "A picture that it hangs on is missing: the numbers of the coded pictures leave one out."
-BIT_NOT_TURNED = (
-    "A picture that it hangs on is missing: the bit that turns with every coded picture (vop_rounding_type) did not."
+NUMBER_LEFT_OUT = (
+    "A picture that this frame was coded from is missing: the numbers of the coded pictures leave one out."
 )
-SHOWN_TOO_LATE = "A picture that it hangs on is missing: it should be shown between two, and only one came."
+BIT_NOT_TURNED = (
+    "A picture that this frame was coded from is missing: the bit that changes with every coded picture "
+    "(vop_rounding_type) did not change."
+)
+SHOWN_TOO_LATE = (
+    "A picture that this frame was coded from is missing: the frame must be shown between two such "
+    "pictures, but only one arrived."
+)
 TIME_LEFT_OUT = (
-    "It is coded with the help of a picture that is missing: the recording's times, otherwise an even row, leave out "
-    "{count} before it. If the camera itself skipped there, convert the file with "
-    "`ffmpeg -i IN -c:v ffv1 -g 1 OUT.mkv` and measure that."
+    "A picture that this frame was coded from is missing: before the frame, {count} times are missing in an otherwise "
+    "equidistant series. If the camera itself skipped these frames, convert the file with "
+    "`ffmpeg -i IN -c:v ffv1 -g 1 OUT.mkv` and measure the new file."
 )
 
 

@@ -178,10 +178,10 @@ class NetworkStream:
             try:
                 packet = next(demuxed, None)
             except (av.FFmpegError, OSError) as error:
-                why = "it broke off" if isinstance(error, av.InvalidDataError) else _reason(error)
+                why = "the connection broke off" if isinstance(error, av.InvalidDataError) else _reason(error)
                 raise DeviceError(self._cut(why)) from error
             if packet is None or not packet.size:
-                raise DeviceError(self._cut("the camera ended it"))
+                raise DeviceError(self._cut("the camera ended the stream"))
             yield packet, monotonic()
 
     def _cut(self, why: str) -> str:
@@ -189,11 +189,11 @@ class NetworkStream:
 
     def _decoded(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
         if packet.size and (fault := self._jpegs.fault(bytes(packet))):
-            trail.breaks(f"It arrived damaged ({fault}).")
+            trail.breaks(f"The frame arrived damaged ({fault}).")
         try:
             pictures = packet.decode()
         except av.FFmpegError as error:
-            why = f"It could not be decoded ({error.strerror})."
+            why = f"The frame could not be decoded ({error.strerror})."
             if self.description.coding is Coding.INTERFRAME:
                 trail.breaks(why)
             else:
@@ -202,7 +202,7 @@ class NetworkStream:
         finally:
             said = heard.of_picture()
         if said:
-            trail.breaks(f"It arrived damaged ({said}).")
+            trail.breaks(f"The frame arrived damaged ({said}).")
         for picture in pictures:
             yield from trail.leaves(picture)
 
@@ -211,10 +211,10 @@ class NetworkStream:
         if isinstance(found, str):
             return LostFrame(index, time_s, Status.DAMAGED, found)
         if (found.width, found.height) != size_px:
-            words = f"It has {found.width}x{found.height} pixels, but the stream {size_px[0]}x{size_px[1]}."
+            words = f"The frame has {found.width}x{found.height} pixels, but the stream {size_px[0]}x{size_px[1]}."
             return LostFrame(index, time_s, Status.DAMAGED, words)
         if time_s == last_s:
-            return LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+            return LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the frame before.")
         coding = self.description.coding
         return Frame(luma(found), index, time_s, coding, not found.key_frame, quantiser_steps(found))
 

@@ -6,7 +6,7 @@ from fingervision.frames.damage import DamageTrail
 from fingervision.frames.reference_chain import Link, ReferenceChain
 from fingervision.frames.transport_stream import MISSING, TransportLosses
 
-LOST_REFERENCE = "A picture that it hangs on is missing: the numbers of the coded pictures leave one out."
+LOST_REFERENCE = "A picture that this frame was coded from is missing: the numbers of the coded pictures leave one out."
 
 
 class StreamLosses:
@@ -35,7 +35,7 @@ class StreamLosses:
         if link is Link.BROKEN:
             trail.missing(LOST_REFERENCE)
         elif leaps and link is not Link.FOLLOWS:
-            trail.hole("Frames are missing before it.")
+            trail.hole("Frames are missing before this frame.")
         return MISSING if leaps else ""
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:

@@ -12,8 +12,10 @@ EVEN_STEPS = 8
 # Containers round a time to their tick, and a step has two ends.
 TICKS = 1.01
 
-BACKWARDS = "Its time is not after that of the frame before it: one of the two is damaged in the file."
-OUT_OF_ROW = "Its time does not fit between those of the frames around it, which are evenly spaced."
+BACKWARDS = (
+    "The time of the frame is not later than the time of the frame before: one of the two times is damaged in the file."
+)
+OUT_OF_ROW = "The time of the frame does not fit between the times of the frames around it, which are evenly spaced."
 
 
 def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:

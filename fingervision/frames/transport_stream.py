@@ -5,7 +5,7 @@ import av
 from fingervision.frames.damage import DamageTrail
 from fingervision.frames.told_times import EvenRow
 
-MISSING = "Frames are missing here: the times leave an even row."
+MISSING = "Frames are missing here: the times are no longer equidistant."
 
 
 # These codecs know no uneven rate: in whatever container, frames that leave the row were lost.
@@ -39,5 +39,5 @@ class TransportLosses:
         """Report an incomplete packet as damaged after it entered the decoder, if the stream does not mark it so."""
         # Pictures are cut out of the stream after its damage was marked: the mark may be one too early.
         if self._is_one and (packet.pts is None or self._was_corrupt):
-            trail.breaks("It is incomplete.")
+            trail.breaks("The frame is incomplete.")
         self._was_corrupt = packet.is_corrupt

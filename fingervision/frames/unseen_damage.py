@@ -21,9 +21,9 @@ from fingervision.frames.spoken_damage import STRICT, listening
 
 FILES_KEPT = 16
 DAMAGE_SEEN = (
-    "Damage was noticed in this recording ({what}), and {codec} carries no checksum, so that no frame of it can be "
-    "told to be sound: copy the file again from its source, or cut out a part that is whole "
-    "(`ffmpeg -ss 10 -to 20 -i IN -c copy OUT.mkv`); record with FFV1 or H.264."
+    "Damage was noticed in this recording ({what}), and {codec} has no checksums, so that no frame of the recording "
+    "can be shown to be undamaged: copy the file again from its source, or cut out an undamaged part (`ffmpeg -ss 10 "
+    "-to 20 -i IN -c copy OUT.mkv`); record with FFV1 or H.264."
 )
 
 

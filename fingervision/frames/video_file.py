@@ -40,9 +40,9 @@ RAW_CAMERA_FILES = {
 """Advice for files of high-speed cameras that cannot be read."""
 
 NO_CHECKSUM = (
-    "Pictures of {codec} carry no checksum, and neither does this file: where its bytes were damaged on the way, a "
-    "frame may look sound and be wrong. If it came over a network or from an old disk, compare it with its source; "
-    "record with FFV1 or H.264."
+    "Pictures of {codec} have no checksum, and this file has none either: if bytes of the file were damaged, a frame "
+    "may look undamaged and be wrong. If the file came over a network or from an old disk, compare it with its "
+    "source; record with FFV1 or H.264."
 )
 
 
@@ -118,7 +118,10 @@ class VideoFile:
                 notes += (NO_CHECKSUM.format(codec=stream.codec.canonical_name),)
             turned = _rotation_deg(container, stream)
             if turned % QUARTER_DEG:
-                notes += (f"The file states a rotation of {turned} degrees, which is no quarter turn: not applied.",)
+                notes += (
+                    f"The file states a rotation of {turned} degrees, which is not a multiple of 90 degrees: "
+                    f"the rotation was not applied.",
+                )
             elif turned:
                 size_px = (size_px[1], size_px[0]) if turned % (2 * QUARTER_DEG) else size_px
                 notes += (f"The pictures are turned by {turned} degrees, as the file asks of every player.",)
@@ -165,7 +168,7 @@ class VideoFile:
                 if pixels.shape[1::-1] != (self.description.width_px, self.description.height_px):
                     yield LostFrame(index, time_s, Status.DAMAGED, _of_another_size(pixels, self.description))
                 elif tick is not None and tick == last_tick:
-                    yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+                    yield LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the frame before.")
                 else:
                     hangs = not found.key_frame
                     yield Frame(pixels, index, time_s, self.description.coding, hangs, upright_steps(found))
@@ -224,7 +227,7 @@ def upright_steps(picture: av.VideoFrame) -> Quantiser | None:
 
 def _of_another_size(pixels: Pixels, description: Description) -> str:
     return (
-        f"It has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "
+        f"The frame has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "
         f"{description.width_px}x{description.height_px}."
     )
 
@@ -240,6 +243,7 @@ def _not_a_video(name: str, error: Exception) -> FingervisionError:
     if path.is_file() and path.stat().st_size == 0:
         return DataError(f"{name} must be a video, but the file is empty: record or copy it again.")
     return DataError(
-        f"{name} must be a video, but cannot be read as one: it is of another kind, or was cut off before its index "
+        f"{name} must be a video, but cannot be read as one: the file is of another kind, or was cut off before its "
+        f"index "
         "was written (an MP4 file needs its end); record or copy it again."
     )

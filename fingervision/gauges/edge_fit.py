@@ -138,13 +138,13 @@ def _refused(
     if fitted.blur_px >= LARGEST_BLUR_PX:
         return NotFound(GaugeStatus.BLURRED)
     if fitted.noise > MOST_NOISE * abs(contrast):
-        return NotFound(GaugeStatus.NO_EDGE, "texture, no step")
+        return NotFound(GaugeStatus.NO_EDGE, "texture instead of a step")
     if abs(float(fitted.slope[k])) > MOST_LEAN:
-        return NotFound(GaugeStatus.NO_EDGE, "it leans by more than 45 degrees against the direction")
+        return NotFound(GaugeStatus.NO_EDGE, "the edge is inclined by more than 45 degrees to the stated direction")
     if k == 0 and fitted.least_piece < LEAST_PIECE:
-        return NotFound(GaugeStatus.NO_EDGE, "it ends within the gauge's length")
+        return NotFound(GaugeStatus.NO_EDGE, "the edge ends within the gauge's length")
     if k == 0 and fitted.bend_px > max(LARGEST_BEND_PX, LARGEST_BEND * follower.length_px):
-        return NotFound(GaugeStatus.NO_EDGE, f"it is bent by {fitted.bend_px:.1f} px: shorten length_px")
+        return NotFound(GaugeStatus.NO_EDGE, f"the edge is bent by {fitted.bend_px:.1f} px: shorten length_px")
     variance = float(fitted.covariance[k, k])
     if not 0.0 < variance < LEAST_SURE_PX**2:
         return NotFound(GaugeStatus.LOW_CONTRAST)

@@ -104,7 +104,7 @@ class EdgeFollower:
                 GaugeStatus.AMBIGUOUS, f"{len(alike)} edges within reach, at {places} px along the direction"
             )
         if abs(alike[0].position_px) > reach + 1.0:
-            return NotFound(GaugeStatus.NO_EDGE, "it lies farther away than it may have moved")
+            return NotFound(GaugeStatus.NO_EDGE, "the edge found is farther away than reach_px")
         return alike[0], steps
 
     def _in_reach(self, steps: list[StepCandidate], reach: float) -> list[StepCandidate]:

@@ -120,7 +120,7 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
     if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
         section.refuse("name", f"must be 1 to {LONGEST_NAME} printable characters, but is {name[:200]!r}.")
     if name in others:
-        section.refuse("name", f"must be another than those before, but {name!r} comes again: rename one.")
+        section.refuse("name", f"must differ from the names of earlier gauges, but {name!r} occurs twice: rename one.")
     kind_name = section.word("kind", of=kinds())
     kind = kind_named(kind_name)
     section.only(("name", "kind", *kind.KEYS))

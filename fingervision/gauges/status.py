@@ -26,13 +26,13 @@ class GaugeStatus(StrEnum):
 
 
 MEANING = {
-    GaugeStatus.OUT_OF_VIEW: "what it measures, or a part of it that is needed, lies outside of the picture",
-    GaugeStatus.NO_EDGE: "no straight edge of this polarity and contrast lies where it may be",
-    GaugeStatus.NOT_FOUND: "nothing that looks like it lies where it may be",
-    GaugeStatus.AMBIGUOUS: "more than one thing that looks like it lies where it may be: lower reach_px, state the "
+    GaugeStatus.OUT_OF_VIEW: "the measured object, or a part that the fit needs, lies outside the picture",
+    GaugeStatus.NO_EDGE: "there is no straight edge of this polarity and contrast within reach_px",
+    GaugeStatus.NOT_FOUND: "nothing similar to the object lies within reach_px",
+    GaugeStatus.AMBIGUOUS: "several similar objects lie within reach_px: lower reach_px, state the "
     "polarity, or move the gauge",
-    GaugeStatus.LOW_CONTRAST: "too little is seen there to measure",
-    GaugeStatus.SATURATED: "the flank of its edge is clipped at the end of the scale",
-    GaugeStatus.BLURRED: "its edge is spread by more than 5 px (standard deviation)",
-    GaugeStatus.TOUCHING: "its two edges are too near each other to be told apart",
+    GaugeStatus.LOW_CONTRAST: "too little contrast to measure",
+    GaugeStatus.SATURATED: "the flank of an edge is clipped at full scale",
+    GaugeStatus.BLURRED: "an edge is spread by more than 5 px (standard deviation)",
+    GaugeStatus.TOUCHING: "the two edges are too close together to be distinguished",
 }

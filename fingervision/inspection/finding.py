@@ -104,7 +104,7 @@ def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy
     if not count or count < FEW_REFUSED * sample.frames:
         return None
     words = next(sample.refused[status].words for status in statuses if status in sample.refused)
-    figure = f"{count} of {sample.frames} frames gave no number: {words[0].lower()}{words[1:]}"
+    figure = f"{count} of {sample.frames} frames could not be measured: {words[0].lower()}{words[1:]}"
     share = count / sample.frames
     return Finding(name, Severity.POOR, figure, None, None, remedy, "frames without a number", share)
 

@@ -44,7 +44,7 @@ def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None
         left.imshow(canvas)
     left.set_axis_off()
     mend = to_mend(findings)
-    left.set_title(f"First to mend: {mend[0].name}" if mend else NOTHING.split(":")[0], loc="left")
+    left.set_title(f"Improve first: {mend[0].name}" if mend else NOTHING.split(":")[0], loc="left")
     in_um = sample.scale is not None
     costs = [(each.cost_um if in_um else each.cost_px) for each in findings]
     longest = max([cost for cost in costs if cost is not None] or [0.0]) or NO_NUMBER_PX

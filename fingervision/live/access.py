@@ -12,10 +12,11 @@ LEAST_LETTERS = 12
 """Smallest length of a password; one guess per second is allowed (`guard.GUESS_COSTS_S`), so that guessing is
 hopeless."""
 PLAIN = (
-    "The page is served beyond this machine, over plain HTTP: who can listen to the network can read it, its token and "
-    "its password. Use it on a bench's own network alone, through an SSH tunnel, or with --tls-cert and --tls-key."
+    "Other machines can open the browser page, over plain HTTP: whoever can listen to the network can read the page, "
+    "its token and its password. Use plain HTTP only on a separate network of the laboratory or through an SSH "
+    "tunnel; otherwise give --tls-cert and --tls-key."
 )
-ENCRYPTED = "The page is served beyond this machine, over TLS: whoever has the password and the address can look."
+ENCRYPTED = "Other machines can open the browser page, over TLS: whoever has the password and the address can see it."
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,11 +129,11 @@ class Capture:
                 self._put(Happening("failed", why))
                 self._put(Ended())
                 return
-            self._put(Happening("interrupted", f"{why} Waiting for it to come back."))
+            self._put(Happening("interrupted", f"{why} The live view waits for the source to return."))
             if not self._reopened():
                 return
             self._timeline.cut()
-            self._put(Happening("resumed", "The source is back; the gap in the data is a gap."))
+            self._put(Happening("resumed", "The source has returned; the frames in between are missing."))
 
     def _reopened(self) -> bool:
         assert self._again is not None  # noqa: S101 - only called where it can be opened again
@@ -151,12 +151,12 @@ class Capture:
                     self._put(Happening("camera", words))
                 if source.description.camera != before:
                     notes = "".join(f" {note}" for note in source.description.notes[-1:])
-                    self._put(Happening("camera", f"The camera is set otherwise now.{notes}"))
+                    self._put(Happening("camera", f"The camera's settings are now different.{notes}"))
                 return True
             source.close()
             words = (
-                f"The source came back with {found[0]}x{found[1]} pixels, but had {size_px[0]}x{size_px[1]}: "
-                "set it as before, or start again."
+                f"The source returned with {found[0]}x{found[1]} pixels, but had {size_px[0]}x{size_px[1]} before: "
+                f"restore the earlier size, or start the live view again."
             )
             if words != said:
                 said = words
@@ -169,7 +169,10 @@ class Capture:
             time_s, jump_s = self._timeline.at(item.time_s, received.arrived_s)
             if jump_s:
                 self._put(
-                    Happening("time_jumped", f"The source's clock jumped by {jump_s:+.3f} s; the host's joins it.")
+                    Happening(
+                        "time_jumped",
+                        f"The source's clock jumped by {jump_s:+.3f} s; times are continued by the computer's clock.",
+                    )
                 )
         else:
             time_s = None

@@ -13,7 +13,7 @@ from fingervision.measuring.task import Task
 
 MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
 """Settings whose change invalidates the zero."""
-ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region or direction."
+ZERO_IS_OFF = "The zero was removed, because it was set with another scale, height, region or direction."
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,8 @@ class Exposure:
         elif ground < DARK_SHARE:
             self.words = "The picture is too dark: raise the exposure or the light."
         elif max(self._ground) - min(self._ground) > CHANGE_SHARE:
-            self.words = "The light is changing: switch off automatic exposure, or shield the bench."
+            self.words = (
+                "The light is changing: switch off automatic exposure, or shield the set-up from changing light."
+            )
         else:
             self.words = ""

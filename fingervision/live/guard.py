@@ -94,14 +94,14 @@ class Guard:
         if origin is not None and origin != f"{self._scheme}://{headers.get('host', '')}":
             return 403, "The Origin must be this live view's page."
         if self._password and not is_password(headers.get("authorization", ""), self._password):
-            return UNAUTHORISED, "The password is asked for: any name will do."
+            return UNAUTHORISED, "A password is required; any user name is accepted."
         if scope["type"] == "http" and scope["path"].startswith(PUBLIC_PATH):
             return None
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
         # Each is compared, so that the time tells nothing of which was nearly right.
         roles = [role for token, role in self._tokens.items() if hmac.compare_digest(given.encode(), token.encode())]
         if not roles:
-            return 403, "The address must hold the token: open the one that the terminal shows."
+            return 403, "The address must contain the token: open the address that the terminal shows."
         scope["role"] = roles[0]
         return None
 

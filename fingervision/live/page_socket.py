@@ -29,7 +29,10 @@ PREVIEW_EVERY_S, STATE_EVERY_S = 0.03, 0.2
 PREVIEW_IN_A_HURRY_EVERY_S = 0.5
 # A page that does not acknowledge is gone.
 ACKNOWLEDGED_WITHIN_S = 20.0
-ONLY_LOOKS = "This address only looks: whoever started the live view has the one that works it."
+ONLY_LOOKS = (
+    "This address only shows the live view. The address that also controls it was printed in the terminal of "
+    "the live view."
+)
 TAKE_OVER = "take_over"
 
 
@@ -78,7 +81,7 @@ class PageSocket:
             silent = isinstance(failed, TimeoutError)
             why = "The page did not answer." if silent else f"Sending failed ({type(failed).__name__})."
             if not silent:
-                self._view.say("page", f"{why} The page connects again.")
+                self._view.say("page", f"{why} The page will connect again.")
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
                 await page.close(TRY_AGAIN_LATER, why)
 
@@ -129,7 +132,7 @@ class PageSocket:
             raise StateError(ONLY_LOOKS)
         if takes_over:
             self._pen.take(self)
-            self._view.say("pen", "Another page works the live view from now on.")
+            self._view.say("pen", "Another page controls the live view from now on.")
         self._pen.write(self)
 
     async def _answer(self, request: dict[str, Any]) -> dict[str, Any]:

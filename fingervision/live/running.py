@@ -148,7 +148,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
         if out_there.left_out:
             session.say("left_out", f"{out_there.left_out} lines were not printed: the reader was too slow.")
         elif broken:
-            session.say("unread", "Nobody reads standard output any more: the live view has ended.")
+            session.say("unread", "Standard output was closed by the reading program: the live view has ended.")
         said.close()
     if page is None and not session.history.count and session.ended.is_set():
         raise DeviceError(f"{session.description.name} gave no frame: check the source.")
@@ -159,7 +159,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
 
 def _announce(page: Page, outlet: Outlet, *, browser: bool) -> None:
     outlet.put(f"The live view is at {page.address}  (Ctrl-C ends it)\n")
-    outlet.put(f"For those who only look: {page.viewer_address}\n")
+    outlet.put(f"Address that only shows the live view: {page.viewer_address}\n")
     if browser and is_terminal(sys.stdout):
         # Everybody on this machine sees what stands on a command line: the browser gets a file of this user's alone.
         webbrowser.open(page.door().as_uri())

@@ -58,8 +58,8 @@ def bound(host: str, port: int) -> socket.socket:
         if error.errno == errno.EADDRNOTAVAIL:
             raise UsageError(f"--host must be an address of this machine, but is {host}.") from error
         raise ProcessError(
-            f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may run there; end "
-            "it, or choose another port with --port (0 takes any free one)."
+            f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may use this "
+            f"port; end that live view, or choose another port with --port (0 takes any free one)."
         ) from error
     return listening
 
@@ -169,7 +169,7 @@ class Page:
     async def _socket(self, page: WebSocket) -> None:
         if len(self._sockets) >= PAGES_AT_ONCE:
             await page.accept()  # a socket that was never open cannot say why it closes
-            await page.close(TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} pages may look at once: close one.")
+            await page.close(TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} pages may be open at once: close one of them.")
             return
         socket_of_page = PageSocket(page, self._view, self._watch, self._pen, self._steps)
         self._sockets.add(socket_of_page)

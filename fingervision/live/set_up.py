@@ -33,11 +33,9 @@ class SetUp:
 
     def __init__(self, view: View) -> None:
         if view.choices.task is None:
-            raise StateError(
-                "The set-up is judged by errors in micrometres, which need the scale: give the scale first."
-            )
+            raise StateError("The inspection states errors in micrometres, which need the scale: give the scale first.")
         self.findings: list[dict[str, Any]] | None = None
-        self.words = "Looking at the picture for three seconds."
+        self.words = "The inspection records frames for three seconds."
         self._view = view
         self._thread = Thread(target=self._look, name="set-up", daemon=True)
         self._thread.start()
@@ -56,7 +54,7 @@ class SetUp:
             if task is None or len(frames) < FEWEST_FRAMES:
                 self.words = f"Only {len(frames)} pictures came in {LOOKS_FOR_S:g} s: check the camera or stream first."
                 return
-            self.words = f"Judging {len(frames)} pictures."
+            self.words = f"{len(frames)} frames are being inspected."
             settings, _ = task.settings_for(self._view.description.files)
             sample = take_sample(frames, self._view.description, settings, task.scale)
             report = as_json(sample, inspect(sample))
@@ -64,11 +62,13 @@ class SetUp:
             self.words = str(error)
             return
         except Exception as error:  # a fault of ours must not look like a set-up without faults
-            self.words = f"The set-up could not be judged ({type(error).__name__}: {error})."
+            self.words = f"The set-up could not be inspected ({type(error).__name__}: {error})."
             return
         self.findings = report["findings"]
         self.words = (
-            f"{len(frames)} frames: nothing to mend." if report["nothing_to_mend"] else f"{len(frames)} frames judged."
+            f"{len(frames)} frames inspected: nothing to improve."
+            if report["nothing_to_mend"]
+            else f"{len(frames)} frames inspected."
         )
 
     def _frames(self) -> list[Frame]:

@@ -38,6 +38,6 @@ def through_jpeg(pixels: Pixels, quality: int) -> Pixels:
     done, packet = cv2.imencode(".jpg", pixels[..., ::-1] if colour else pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
     read = cv2.imdecode(packet, cv2.IMREAD_COLOR if colour else cv2.IMREAD_GRAYSCALE) if done else None
     if read is None:
-        msg = f"OpenCV could not take a frame of {pixels.shape[1]} x {pixels.shape[0]} pixels through JPEG."
+        msg = f"OpenCV could not code a frame of {pixels.shape[1]} x {pixels.shape[0]} pixels as JPEG."
         raise DataError(msg)
     return read[..., ::-1].astype(np.uint8) if colour else read.astype(np.uint8, copy=False)

@@ -130,8 +130,8 @@ def _lone_u(
     if len(found) == 1:
         roles["input"] = found
         about.notes.append(
-            f"'{raw.columns[found[0]].name}' is taken for the input, a prescribed displacement: columns.input in "
-            "columns.toml would name another."
+            f"'{raw.columns[found[0]].name}' is read as the input (a prescribed displacement); to name another "
+            f"column, set columns.input in columns.toml."
         )
 
 
@@ -143,7 +143,7 @@ def _one_clock(
     elapsed = [k for k in times if not _is_dated(raw.columns[k])]
     if len(both) > 1 and len(elapsed) == 1:
         others = ", ".join(raw.columns[k].name for k in both if k != elapsed[0])
-        about.notes.append(f"{raw.columns[elapsed[0]].name} is taken for the time, not {others}.")
+        about.notes.append(f"{raw.columns[elapsed[0]].name} is read as the time, not {others}.")
         return elapsed
     if len(times) == 1 and not elapsed and len(both) > 1:
         return times  # a day and a time of day in columns of their own: joined later

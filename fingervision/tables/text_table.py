@@ -78,13 +78,13 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
         mark, name = (",", "comma") if "," in example else (".", "point")
         other = "." if mark == "," else ","
         words = (
-            f"each {name} in its numbers may be the decimal one or set thousands apart ('{example}'): decimal={mark} "
-            f"or decimal={other} says which sign is the decimal one"
+            f"each {name} in the numbers may be the decimal sign or a thousands separator ('{example}'): "
+            f"decimal={mark} or decimal={other} states the decimal sign"
         )
         raise OpenQuestionError(path, "table", [Question(words, f"decimal={mark}")])
     rows = _Rows(path, dialect, header, first)
     columns, numbers, left_out, restarts = rows.read(lines)
-    notes = () if header.names else (f"The file names no columns: they are called 1 to {len(columns)}.",)
+    notes = () if header.names else (f"The file has no column names: its columns are named 1 to {len(columns)}.",)
     return RawTable(
         path,
         f"text, {encoding}, {dialect.words}",
@@ -113,7 +113,7 @@ def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect
         if 2 * len(names) == dialect.wide and not any(is_value(name, ".") for name in names):
             raise DataError(
                 f"{path} has {len(names)} names and {dialect.wide} cells a row between commas: decimal commas and "
-                "commas between cells cannot be told apart. Export it with semicolons or tabs."
+                "commas between cells cannot be distinguished. Export it with semicolons or tabs."
             )
 
 
@@ -197,7 +197,7 @@ class _Rows:
                 )
             raise DataError(
                 f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
-                f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
+                f"{len(rows) + len(odd)} rows do not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
                 "key separator in columns.toml."
             )
         left_out = []

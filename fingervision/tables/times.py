@@ -86,7 +86,7 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
         falls = np.diff(value[known]) < -HALF_DAY_S
         if falls.any():
             value[known[1:]] += DAY_S * np.cumsum(falls)
-            notes.append(f"Times of day pass midnight {int(falls.sum())} time(s): a day was added each time.")
+            notes.append(f"The times of day pass midnight {int(falls.sum())} time(s): a day was added each time.")
     first = int(np.argmax(present))
     unread = sum(cells[row].strip().lower() not in MISSING for row in np.flatnonzero(~present).tolist())
     return Seconds(

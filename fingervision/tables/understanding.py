@@ -150,7 +150,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
         if column.since and role == "time":
             taken[-1] = Taken(column.name, role, DATE)
         if column.since:
-            about.notes.append(f"{column.name} counts from {column.since}.")
+            about.notes.append(f"The times in {column.name} are counted from {column.since}.")
     run_cells = _runs(raw, chosen, columns, given, about)
     if not about.questions and "input" in columns:
         codes = None if run_cells is None else _codes(run_cells)
@@ -182,7 +182,9 @@ def _unit(
         return stated[0]
     optional = role not in NEEDED[kind] and role in ("force", "u_gap", "u_random")
     if optional:
-        about.notes.append(f"{column.name} has no unit and is not used: units.{role} in columns.toml would say it.")
+        about.notes.append(
+            f"{column.name} has no unit and is not used; state its unit as units.{role} in columns.toml."
+        )
         return None
     example = {
         "length": "mm",
@@ -197,7 +199,7 @@ def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
     dimension = DIMENSION[role]
     example = {"length": "0.1 um", "time": "ms", "force": "mN"}[dimension]
     return Question(
-        f"'{column.name}' ({role}) must be a {dimension}, but its unit is '{unit}': say what one of it is worth",
+        f"'{column.name}' ({role}) must be a {dimension}, but its unit is '{unit}': state what one unit is worth",
         f"units.{role}={example}",
     )
 
@@ -238,10 +240,10 @@ def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findin
         about.notes.append(f"{raw.columns[day].name} and {column.name} are read as one date.")
     read = seconds_of(cells, given.words.get("date_order", ""))
     if read.open_order:
-        about.questions.append(Question(f"day and month of '{read.since}' could be either way round", "date_order=dmy"))
+        about.questions.append(Question(f"the order of day and month in '{read.since}' is ambiguous", "date_order=dmy"))
     if read.unread:
         about.left_out.append(f"{read.unread} cells of '{column.name}' are no times")
-    about.notes += [*read.notes, f"{column.name} counts from {read.since}."]
+    about.notes += [*read.notes, f"The times in {column.name} are counted from {read.since}."]
     return read.numbers
 
 
@@ -257,7 +259,9 @@ def _from_epoch(values: Numbers, column: RawColumn, unit: str, about: Findings) 
         return Numbers(np.where(values.present, values.value - first, 0.0), values.present)
     for scale, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
         if epoch := is_epoch(first / scale):
-            about.notes.append(f"{column.name} counts {epoch} ({unit}): it is taken from its first row, {first:.6f}.")
+            about.notes.append(
+                f"{column.name} counts {epoch} ({unit}); times are counted from its first row, {first:.6f}."
+            )
             return Numbers(np.where(values.present, values.value - first, 0.0), values.present)
     return values
 
@@ -281,7 +285,7 @@ def _runs(
         known = np.flatnonzero(columns["time"].present)
         starts[known[1:][np.diff(columns["time"].value[known]) < 0.0]] = 1
     number = np.cumsum(starts) + 1
-    about.notes.append(f"{number[-1]} runs: one from each restart of the time or of the header to the next.")
+    about.notes.append(f"{number[-1]} runs: a run begins where the time or the header restarts.")
     return tuple(str(each) for each in number.tolist())
 
 

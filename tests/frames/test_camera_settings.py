@@ -139,8 +139,8 @@ def test_avfoundation_is_asked_for_size_and_rate_alone_and_the_rest_is_said() ->
     assert set(asked) == {cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FPS}
     found = settled("AVFOUNDATION", Wish(camera=CameraWish(exposure_ms=8.0)), dict.fromkeys(READ, 0.0))
     assert found.notes[0] == (
-        "The camera was asked for exposure 8 ms, but AVFOUNDATION lets no program set it: set it in the camera's own "
-        "program."
+        "The camera was asked for exposure 8 ms, but AVFOUNDATION does not allow programs to change it: change it "
+        "in the camera's own program."
     )
     assert set(found.settings) == {"format"}
 

@@ -127,7 +127,7 @@ def test_a_flipped_byte_in_a_png_fails_its_checksum(tmp_path: Path) -> None:
     (tmp_path / "1.png").write_bytes(content)
     items = frames_of(open_source(str(tmp_path)))
     assert isinstance(items[1], LostFrame)
-    assert items[1].words == "1.png is damaged: a part of it fails its checksum."
+    assert items[1].words == "1.png is damaged: a checksum in the file does not match."
 
 
 def test_an_image_of_another_size_is_damaged(tmp_path: Path) -> None:

@@ -152,7 +152,7 @@ def test_a_frame_of_another_size_is_damaged_and_the_rest_is_read(tmp_path: Path)
     found = read(tmp_path / "clip.mkv")
     assert statuses(found) == [Status.OK, Status.OK, Status.DAMAGED, Status.OK]
     assert isinstance(found[2], LostFrame)
-    assert found[2].words == "It has 32x32 pixels, but the recording 64x48."
+    assert found[2].words == "The frame has 32x32 pixels, but the recording 64x48."
 
 
 def test_a_repeated_time_is_a_duplicate_and_equal_pictures_are_not(tmp_path: Path) -> None:

@@ -124,7 +124,7 @@ class FollowedCircle:
             return refused
         reach = self._spec.reach_px * self._times
         if hypot(found.x_px - x, found.y_px - y) > reach + 1.0:
-            return GaugeStatus.NOT_FOUND, "it lies farther away than it may have moved"
+            return GaugeStatus.NOT_FOUND, "the disc found is farther away than reach_px"
         return found
 
     def _refused(self, picture: Picture, found: Circle) -> tuple[GaugeStatus, str] | None:
@@ -139,7 +139,7 @@ class FollowedCircle:
         if self._spec.polarity * found.contrast < 0.0:
             return GaugeStatus.NOT_FOUND, "of the other tone"
         if found.least_piece < LEAST_PIECE or found.unround_px > MOST_UNROUND * radius:
-            return GaugeStatus.NOT_FOUND, "its outline is no whole circle"
+            return GaugeStatus.NOT_FOUND, "the outline is not a whole circle"
         if not LEAST_STATED * stated <= radius <= MOST_STATED * stated:
             return GaugeStatus.NOT_FOUND, "of another diameter"
         known = self._known

@@ -106,7 +106,7 @@ class FollowedMarker:
         away = hypot(place[0] - self._at[0], place[1] - self._at[1])
         first_reach = min(self._spec.reach_px, NEAR * self._spec.size_px)
         if away > (first_reach if self._template is None else self._spec.reach_px * self._times) + 1.0:
-            return GaugeStatus.NOT_FOUND, "it lies farther away than it may have moved"
+            return GaugeStatus.NOT_FOUND, "the mark found is farther away than reach_px"
         if self._template is None:
             refused = self._taken(picture, place)
             if refused is not None:
@@ -156,11 +156,11 @@ class FollowedMarker:
         if found.spread < CONTRAST_FLOOR * picture.top:
             return GaugeStatus.LOW_CONTRAST, ""
         if found.half_turn < LEAST_SYMMETRY:
-            return GaugeStatus.NOT_FOUND, "it does not look the same after half a turn"
+            return GaugeStatus.NOT_FOUND, "the mark does not look the same after half a turn"
         if not self._has_shape(found):
-            return GaugeStatus.NOT_FOUND, f"it is no {self._spec.shape}"
+            return GaugeStatus.NOT_FOUND, f"the mark is not a {self._spec.shape}"
         if not float(np.max(np.diag(found.covariance))) < LEAST_SURE_PX**2:
-            return GaugeStatus.LOW_CONTRAST, "it slides along itself"
+            return GaugeStatus.LOW_CONTRAST, "the mark can be shifted along itself without a change"
         return found, (found.x_px + origin[0], found.y_px + origin[1])
 
     def _has_shape(self, found: Symmetric) -> bool:

@@ -130,7 +130,7 @@ class FollowedPatch:
         (a, b), (x, y) = self.half, self._spec.middle_px
         column, row = round(x), round(y)
         if not picture.holds(column - a, row - b, 2 * a + 1, 2 * b + 1):
-            return self._never(GaugeStatus.OUT_OF_VIEW, "a part of it lies outside of the first frame")
+            return self._never(GaugeStatus.OUT_OF_VIEW, "part of the patch lies outside the first frame")
         reach = ceil(GUARD * self._spec.reach_px) + BEYOND_PX + MARGIN_PX
         part = _padded(picture, column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1)
         reference = patch_reference(part, a + reach, b + reach, a, b)
@@ -138,14 +138,16 @@ class FollowedPatch:
         spread = float(np.sqrt(np.mean(reference.levels.astype(np.float64) ** 2)))
         if spread < LEAST_SPREAD or not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._never(
-                GaugeStatus.LOW_CONTRAST, "the first frame shows no texture there that tells how it moves"
+                GaugeStatus.LOW_CONTRAST, "the patch in the first frame has too little texture to show its motion"
             )
         template = Template(reference.template)
         if not template.best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX]).is_alone:
-            return self._never(GaugeStatus.AMBIGUOUS, "its pattern repeats within 1.5 reach_px: lower reach_px")
+            return self._never(GaugeStatus.AMBIGUOUS, "the pattern repeats within 1.5 reach_px: lower reach_px")
         chance = chance_correlation(reference.template)
         if chance > MOST_BY_CHANCE:
-            return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
+            return self._never(
+                GaugeStatus.LOW_CONTRAST, "the texture is too coarse for the size of the patch: enlarge the patch"
+            )
         self._least_correlation = max(LEAST_CORRELATION, chance)
         self.reference = reference
         self._around, self._template = part, template
@@ -203,7 +205,7 @@ class FollowedPatch:
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
         if hypot(x - self._at[0], y - self._at[1]) > self._spec.reach_px * self._times + 1.0:
-            return self._failed(GaugeStatus.NOT_FOUND, "it would have moved farther than it may")
+            return self._failed(GaugeStatus.NOT_FOUND, "the patch would have moved farther than reach_px")
         if not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._failed(GaugeStatus.LOW_CONTRAST)
         self._at, self._times = place, 1.0

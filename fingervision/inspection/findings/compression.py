@@ -26,7 +26,7 @@ def find(sample: Sample) -> Finding | None:
         cost_px = float(np.hypot(cost_px, sample.u_shift_px))
     how = f"stored with loss ({sample.description.codec})" if lossy else "stored without loss"
     seen = f"steps between blocks of {BLOCK_PX} px are {100 * max(blocks, 0.0):.0f} % larger than within them"
-    before = "" if lossy or blocks <= BLOCKY else ", but they were coded before"
+    before = "" if lossy or blocks <= BLOCKY else ", but the pictures were compressed earlier"
     return weighed(sample, "compression", cost_px, f"Pictures are {how}; {seen}{before}.", REMEDY, FORMULA)
 
 

@@ -16,7 +16,9 @@ def find(sample: Sample) -> Finding | None:
     if refused is not None or not sample.looks:
         return refused
     if sample.moves:
-        words = "The fingers move while the shutter is open: focus cannot be told until they do not."
+        words = (
+            "The fingers move while the shutter is open, so that the focus cannot be judged: inspect fingers at rest."
+        )
         return weighed(sample, "focus", 0.0, words, REMEDY, FORMULA)
     blur_px = sample.median(look.focus_blur_px for look in sample.looks)
     cost_px = sample.median(

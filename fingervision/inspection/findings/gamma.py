@@ -24,12 +24,12 @@ def find(sample: Sample) -> Finding | None:
     if not 1.0 - SURELY < share < SURELY:
         more_even = seen.other if share > 0.5 else seen.assumed
         figure = (
-            f"The edges look as those of a camera with {more_even} levels do; they are taken as {seen.assumed}, and "
-            f"the other would change the gap by {abs(seen.shift_px):.2f} px."
+            f"The edges look like those of a camera with {more_even} levels; the levels are taken as {seen.assumed}, "
+            f"and the other response would change the gap by {abs(seen.shift_px):.2f} px."
         )
     else:
         figure = (
-            f"The edges' shape does not tell {seen.assumed} from {seen.other} levels "
-            f"({100 * share:.0f} % for {seen.other}); the two differ by {abs(seen.shift_px):.2f} px."
+            f"The shape of the edges does not distinguish {seen.assumed} from {seen.other} levels ({100 * share:.0f} "
+            f"% for {seen.other}); the two differ by {abs(seen.shift_px):.2f} px."
         )
     return weighed(sample, "gamma", cost_px, figure, REMEDY, FORMULA, is_doubt=is_doubt)

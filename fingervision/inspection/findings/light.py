@@ -11,7 +11,7 @@ from fingervision.inspection.plateaus import plateaus
 from fingervision.inspection.profile_fit import fit_step
 from fingervision.inspection.sample import Sample
 
-WEAK = "Light the ground from behind, or darken the fingers, and lower the camera's gain."
+WEAK = "Light the background from behind, or darken the fingers, and lower the camera's gain."
 UNEVEN = "Make the light even across the gap: a diffuser behind the fingers, farther from them."
 FORMULA = (
     "sqrt(n^2 + e^2 + s^2); n = sqrt(u^2 - u'^2), u' the random uncertainty with noise of 2 % of the contrast "
@@ -52,7 +52,7 @@ def _lost(sample: Sample) -> Finding | None:
     """Finding for frames without a measured gap because no contrast in them exceeds the noise."""
     if not sample.is_lost_in_noise:
         return None
-    words = "No frame gave a number, and what is in view hardly rises above the noise."
+    words = "No frame could be measured: the contrast in the picture is hardly larger than the noise."
     return Finding("light", Severity.POOR, words, None, None, WEAK, "frames without a number", 1.0)
 
 

@@ -29,14 +29,23 @@ def find(sample: Sample) -> Finding | None:
         spread = [float(np.std(shift)) for shift in (ground.across_px, ground.along_px)]
         worst = max(spread)
         cost_px = without(worst, SIGMAS * ground.u_px) if worst > SIGMAS * ground.u_px else 0.0
-        figure = f"The ground shifts by {spread[0]:.3f} px across and {spread[1]:.3f} px along the fingers (RMS)."
+        figure = f"The background shifts by {spread[0]:.3f} px across and {spread[1]:.3f} px along the fingers (RMS)."
         return weighed(sample, "vibration", cost_px, figure, REMEDY, FORMULA)
     found = _common_jitter(sample)
     if found is None:
-        return weighed(sample, "vibration", 0.0, "Too few frames in a row to see the camera shake.", "", FORMULA)
+        return weighed(
+            sample,
+            "vibration",
+            0.0,
+            "There are too few successive frames to see whether the camera shakes.",
+            "",
+            FORMULA,
+        )
     jitter, u_px = found
     cost_px = without(jitter, SIGMAS * u_px) if jitter > SIGMAS * u_px else 0.0
-    figure = f"The ground is too plain to be followed; both fingers jitter together by {jitter:.3f} px (RMS)."
+    figure = (
+        f"The background has too little texture to be followed; both fingers jitter together by {jitter:.3f} px (RMS)."
+    )
     return weighed(sample, "vibration", cost_px, figure, REMEDY, FORMULA)
 
 

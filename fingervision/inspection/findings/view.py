@@ -8,8 +8,8 @@ from fingervision.inspection.sample import Sample
 NAMED_ELSEWHERE = (Status.OK, Status.BLURRED, Status.SATURATED, Status.LOW_CONTRAST, Status.DUPLICATE)
 WITHOUT_FINGERS = tuple(status for status in Status if status not in NAMED_ELSEWHERE)
 REMEDY = (
-    "Bring both fingers with their tips into view, with nothing else beside them; else say where they are with --roi "
-    "and where they point with --tips. `fingervision measure --steps 0` shows what was seen."
+    "Bring both fingers with their tips into view, with nothing else beside them; otherwise state where they are with "
+    "--roi and where they point with --tips. `fingervision measure --steps 0` shows what was found."
 )
 
 

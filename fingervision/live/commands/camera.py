@@ -49,7 +49,7 @@ def _changed(view: View, name: str, value: float) -> Answer:
     view.say("camera", said)
     scale = view.choices.scale
     if name in MOVES_SCALE and scale is not None:
-        view.say("camera", f"The {name} moves the scale: calibrate anew before you trust a gap.")
+        view.say("camera", f"The {name} changes the scale: calibrate again before you use a gap.")
     elif note := other_camera(scale, view.capture.source.description.camera):
         view.say("camera", note)
     return Answer(said, more={"name": name, "value": after.value})

@@ -79,7 +79,7 @@ def _zero(view: View, request: Request) -> Answer:
     if row is None or row.gap_mm is None:
         raise StateError("Setting the zero needs a measured gap, but this frame has none: bring the fingers into view.")
     view.choose(zero_mm=row.gap_mm)
-    return Answer(f"Gaps are shown less {row.gap_mm:.4f} mm; files hold them whole.")
+    return Answer(f"The page shows gaps minus {row.gap_mm:.4f} mm; files contain the measured gaps.")
 
 
 def _limits(view: View, request: Request) -> Answer:

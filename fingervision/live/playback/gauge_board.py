@@ -141,8 +141,8 @@ class GaugeBoard:
                 raise DataError("A gauge file must hold at least one gauge, but there is none: add one.")
             if not over and self._now() != self._before:
                 raise ChangedMeanwhileError(
-                    f"{self.path} was changed by another program since it was read here: load the changed file and "
-                    "lose the changes made here, or save over it."
+                    f"{self.path} was changed by another program after it was read here: load the changed file and "
+                    f"lose the changes made here, or save over the file."
                 )
             text = gauges_text([(entry.table, entry.place) for entry in self._entries], self._before, SCHEMA)
             write_gauges_text(self.path, text)

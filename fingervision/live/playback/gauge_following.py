@@ -26,7 +26,7 @@ from fingervision.storage.lost_frames import lost_frames
 LOOK_EVERY_S = 0.02
 # So many frames beyond the one that is shown are followed already, so that stepping on waits for nothing.
 AHEAD_FRAMES = 25
-NO_SCALE = "The scale is not known: gauges can be drawn, and are read once it is given."
+NO_SCALE = "The scale is not known: gauges can be drawn, but are measured only when the scale is given."
 
 
 class GaugeFollowing:

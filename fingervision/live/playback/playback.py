@@ -125,8 +125,8 @@ class Playback:
             return
         if not 0 <= first <= last < self.frame_count:
             raise LimitError(
-                f"The range must lie within frames 0 to {self.frame_count - 1} and begin no later than it ends, "
-                f"but is {first} to {last}."
+                f"The range must lie within frames 0 to {self.frame_count - 1} and must not begin after its end, but "
+                f"is {first} to {last}."
             )
         self.range = (first, last)
 
@@ -289,7 +289,7 @@ class Playback:
             self.trouble = ""
         except (FingervisionError, OSError) as error:
             self.is_playing = False
-            self.trouble = f"The recording cannot be read any more: {error} Put it back, and go on."
+            self.trouble = f"The recording cannot be read any more: {error} Put the file back, and continue."
             self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:

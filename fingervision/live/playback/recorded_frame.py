@@ -13,7 +13,7 @@ from fingervision.storage.gaps_csv import GapRow
 
 # A picture that could not be decoded is shown as an even grey.
 NO_PICTURE_LEVEL = 90
-IN_THE_TABLE = "As the table has it; judged by the frames before."
+IN_THE_TABLE = "Status taken from the table, which also considers the frames before."
 
 
 def recorded_frame(item: Frame | LostFrame, row: GapRow | None, choices: Choices, description: Description) -> Seen:

@@ -240,7 +240,7 @@ def simulations() -> list[Case]:
         Case("prescribed_verschiebung", "Vorgegebene Verschiebung [m];Spalt [mm]\n" + rows(x_m, g_mm, between=";"), "simulation", {"input_mm": in_mm, "gap_mm": g_true}),
         Case("position_and_disp", "disp (mm),stage position (mm),gap (mm)\n" + rows(x_mm, x_mm, g_mm), "simulation", truth,
              asks="columns.input", states=("columns.input=stage position (mm)",)),
-        Case("measured_u_is_no_input", "time_s,gap_mm,u (mm)\n" + rows([f"{0.1 * k:.1f}" for k in range(len(g_mm))], g_mm, ["0.0012"] * len(g_mm)), "measured", {}, refused="no column is called as the input is"),
+        Case("measured_u_is_no_input", "time_s,gap_mm,u (mm)\n" + rows([f"{0.1 * k:.1f}" for k in range(len(g_mm))], g_mm, ["0.0012"] * len(g_mm)), "measured", {}, refused="no column has a usual name for the input"),
         Case("ansys_workbench", "Displacement Stage [mm]\tGap [mm]\n" + rows(x_mm, g_mm, between="\t"), "simulation", truth),
         Case("simulink_sides", "input_mm;left (mm);right (mm)\n" + rows(x_mm, [f"-{h}" for h in half], half, between=";"), "simulation", truth),
         Case("several_models", "input_mm,simmechanics_mm,comsol_mm\n" + rows(x_mm, [f"{float(g) * 1.1:.5f}" for g in g_mm], g_mm), "simulation", truth,
