@@ -22,7 +22,7 @@ _SINH_UNDERFLOWS_ABOVE = 30.0
 
 @dataclass(frozen=True, slots=True)
 class ModalDamping:
-    """The same damping ratio in every mode."""
+    """Damping law with the same damping ratio in every mode."""
 
     ratio: float = 0.025
 
@@ -77,11 +77,11 @@ class RayleighDamping:
 class PaperDamping:
     """Equation (4) of Hricko & Havlik (2015), evaluated mode by mode: 2 zeta w = gamma w0 c(w / w0).
 
-    The equation is an illustrative example of a theory (S. Adhikari, J. Sound Vib. 293 (2006) 156), not a material law.
-    It adds powers of w that have different units, so that its result would depend on the unit of time; frequencies are
-    therefore taken relative to w0. Below w0 the damping would be negative, and above a few times w0 it would be more
-    than critical. Hence w0 must not exceed the lowest mode, the result is multiplied by one factor gamma, and ratios
-    outside (0, 0.3) are refused.
+    The equation is an illustrative example of a theory (Adhikari, 2006, Journal of Sound and Vibration 293, 156), not a
+    material law. The equation adds powers of the angular frequency w that have different units, so that its result
+    would depend on the unit of time; frequencies are therefore divided by a reference w0. Below w0 the damping would be
+    negative, and above a few times w0 it would be more than critical. Hence w0 must not exceed the lowest mode, the
+    result is multiplied by one factor gamma, and ratios outside (0, 0.3) are refused.
 
     Parameters
     ----------

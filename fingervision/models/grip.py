@@ -2,8 +2,8 @@
 
 The part is a block with flat sides, of given width and stiffness, centred between the fingers. Each finger meets an
 elastic plane at half the part's width. The plane is displaced by the finger's force divided by twice the part's
-stiffness. This is Signorini's contact problem with the part's compliance added to that of every pair of points on the
-finger's face.
+stiffness. The method is Signorini's contact problem, with the compliance of the part added to the compliance between
+every pair of points on the finger's face.
 """
 
 from dataclasses import dataclass

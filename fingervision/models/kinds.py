@@ -1,4 +1,4 @@
-"""Registry of the parametric models: modules of this package that define KIND, and those of other distributions."""
+"""Registry of the parametric models: modules of this package that define KIND, and models from other distributions."""
 
 import importlib
 from collections.abc import Iterable

@@ -1,7 +1,7 @@
 """Effects of weight, temperature and a part between two probes on a mechanism, for small displacements.
 
 All effects are computed by finite elements. A frame of bars would give wrong results, because its bars end where their
-axes meet, unlike those of the drawing.
+axes meet, unlike the bars of the drawing.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """A driven elastic body reduced to its static shape and its natural modes: the basis of all dynamic responses.
 
 The motion u(t) of the drive is prescribed. The body follows u by its static shape s; each mode r of the body with fixed
-drive is excited by the inertia of the static shape (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface
+drive is excited by the inertia of the static shape (Craig and Bampton, 1968, AIAA Journal 6, 1313, with one interface
 unknown):
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = -L_r u''
@@ -107,8 +107,8 @@ class FreeModes:
 def described(damping: Damping, rad_s: Array) -> Array:
     """Damping ratios of the lowest modes, as far as a damping law is valid for them.
 
-    If the ratio leaves the range that is possible for solids, as that of equation (4) does at a few times its reference
-    frequency, the law is used for the modes below that frequency only.
+    A damping law may give ratios that are impossible for solids, as equation (4) of Hricko & Havlik (2015) does at a
+    few times its reference frequency. Such a law is used only for the modes below the frequency at which this happens.
 
     Raises
     ------

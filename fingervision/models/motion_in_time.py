@@ -74,8 +74,9 @@ def gripper_motion(
     """Compute the motion over a drive history; each run begins at rest at its first input.
 
     With small displacements the modes' equations are solved exactly. With large rotation or contact, a frame of bars is
-    integrated in time steps if at most 20 000 steps are needed. Otherwise the gripper follows its equilibria, and the
-    modes at rest vibrate about them while the fingers do not touch, which is valid for small vibrations.
+    integrated in time steps if at most 20 000 steps are needed. If more steps are needed, or the model is no frame of
+    bars, the modes of the gripper at rest are superposed on its equilibria while the fingers do not touch. This
+    superposition is valid for small vibrations.
 
     Parameters
     ----------

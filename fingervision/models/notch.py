@@ -70,8 +70,8 @@ class Notch:
     def stations_mm(self, pieces: int) -> Array:
         """Ends of pieces along the notch, more densely where it bends; shape (pieces + 1,), symmetric about the middle.
 
-        Each piece contributes the same amount to the mean of two fractions: that of the bending compliance (the
-        integral of 1 / h^3) and that of the length.
+        Each piece contributes the same amount to the mean of two fractions: the fraction of the bending compliance (the
+        integral of 1 / h^3 for the height h) and the fraction of the length.
         """
         # Space the points by a sinh, closest at the neck: the part that bends is sqrt(t R) long and must be sampled
         # finely.

@@ -35,9 +35,9 @@ MODERATE, SURELY = 75.0, 0.8
 class ExpectedGain:
     """Predicted chi-square gain of a run: its most probable value, an interval, and the probability of that value.
 
-    Either of two explanations may be true, and the two cases often lead to different gains; the median over both cases
-    would lie between these gains, where hardly any gain occurs. `modest` is the most probable gain (chi-square) below
-    `MODERATE`.
+    If one explanation is true, the gain often differs from the gain if the other explanation is true. The median over
+    both cases would lie between these two gains, where hardly any gain occurs. `modest` is the most probable gain
+    (chi-square) below `MODERATE`.
     """
 
     gain: float

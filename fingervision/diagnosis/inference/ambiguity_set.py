@@ -98,7 +98,7 @@ def _net(nothing: Explanation, explanation: Explanation) -> float:
 
 
 def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
-    """Whether the best explanation may fit better only because its richer formula includes the other's prediction.
+    """Whether the best explanation may fit better only because its richer formula includes the other explanation.
 
     An example is a delay and a well-damped resonance, both of which round corners: the formula of a delay is inexact
     where the stage reverses between two samples. A difference of this size is attributed to the inexact formula; a
@@ -116,9 +116,9 @@ def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, oth
 def _least_refuted(distance: float) -> float:
     """Difference in chi-square above which an explanation counts as refuted in favour of another.
 
-    If an explanation is true, the other's chi-square is larger by `distance` on average, with a standard deviation of 2
-    sqrt(distance) (Cox 1961). Two explanations that such data could distinguish are both kept if the present data
-    favour neither.
+    If an explanation is true, the chi-square of the other explanation is larger by `distance` on average, with a
+    standard deviation of 2 sqrt(distance) (Cox 1961). Two explanations are both kept if the present data favour
+    neither, even if data of this kind could distinguish them.
     """
     return -distance + SURELY * 2.0 * float(np.sqrt(max(0.0, distance))) + SPARE
 
@@ -136,8 +136,8 @@ def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_m
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
     """Drop explanations that only imitate an effect that the drawing predicts and that is found as predicted.
 
-    Without this effect, the agreement with the drawing's prediction would be a coincidence. For example, an end stop at
-    exactly the input at which the drawn fingers meet is the contact of these fingers.
+    Otherwise, the agreement of the fitted effect with the drawing's prediction would be a coincidence. For example, an
+    end stop at exactly the input at which the drawn fingers meet is the contact of these fingers.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:

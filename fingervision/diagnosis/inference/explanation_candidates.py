@@ -207,9 +207,9 @@ def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explan
     """Keep the explanations whose change of the prediction exceeds the error of the recorded input.
 
     The explanations that are dropped only follow the rounding errors of an encoder. For example, a delay within one
-    step of an encoder gained 225 in chi-square in this way, and hid an offset beside a play that changed the prediction
-    by twenty times as much. If even the best explanation only follows the rounding errors, explanations with other
-    effects may do so as well: then only additions to the smaller explanation are kept.
+    step of an encoder gained 225 in chi-square, and hid an offset and a play that changed the prediction by twenty
+    times as much. If even the best explanation only follows the rounding errors, explanations with other effects may do
+    so as well: then only additions to the smaller explanation are kept.
     """
     beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
     if beyond[:1] == larger[:1]:

@@ -1,7 +1,7 @@
 """Effects that a map of position errors can represent: functions of position alone, except a straight line.
 
-If a map is fitted too, no data can distinguish such an effect from the map, however large the effect is. Effects with
-reversal, memory or dependence on time can be distinguished from a map.
+If a map is fitted too, no data can distinguish an effect that is a function of position from the map, however large the
+effect is. Effects with reversal, memory or dependence on time can be distinguished from a map.
 """
 
 from dataclasses import replace

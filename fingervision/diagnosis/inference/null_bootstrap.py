@@ -65,9 +65,10 @@ def linear_thresholds(
     """Significance threshold of each effect: the gain that its best signature seldom exceeds in noise alone.
 
     The signatures of one effect, one for each starting value of its parameters, form a family. The best of many
-    signatures gains more from noise than a single signature does; a common threshold for all families would be that of
-    the largest family. Therefore each family is compared with its own upper quantile, and the probability of an excess
-    in any family is limited: all families contribute equally to the false positives (Beran 1988).
+    signatures gains more from noise than a single signature does; a common threshold for all families would be
+    determined by the largest family. Therefore each family of signatures is compared with its own upper quantile, and
+    the probability that any family exceeds its quantile is limited: all families contribute equally to the false
+    positives (Beran 1988).
 
     Parameters
     ----------
@@ -176,7 +177,7 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
 def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
     """Smallest gain required of the effects that are added to those of `base`.
 
-    This gain is infinite for an effect that run offsets can imitate completely.
+    The required gain is infinite for an effect that run offsets can imitate completely.
     """
     return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
 

@@ -34,8 +34,8 @@ def beside_gains(state: Searched, look: Look) -> Searched:
     """Search with run-to-run gains included, and keep the result if it is much more probable.
 
     If a named effect changes the prediction more than the gains do, the gains are nuisance parameters; if there is no
-    such effect, they are structure without a name. If further effects are not much more probable than such gains, the
-    gains are kept, because naming an effect claims more than stating a scatter.
+    such effect, they are structure without a name. If further effects are not much more probable than gains that differ
+    between runs, the gains are kept, because naming an effect claims more than stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:

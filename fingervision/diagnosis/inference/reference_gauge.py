@@ -1,7 +1,7 @@
 """Reference slots measured during a run: a camera error affects slot and gap, a gripper error only the gap.
 
 The gap alone cannot distinguish a wrong scale from a wrong lever ratio, nor an edge bias from a wrong rest gap; a
-measured slot of known width can.
+measured slot of known width can distinguish them.
 """
 
 from collections.abc import Mapping

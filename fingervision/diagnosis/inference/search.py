@@ -234,7 +234,7 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     """Choose the best explanation that contains every effect that the user requires.
 
     The required effects are also added to the best explanation that was found without them, because an effect that is
-    small beside two others is in none of the pairs that fit.
+    much smaller than two other effects is in none of the pairs that fit.
     """
     problem = state.problem
     able = forced & set(problem.effects)

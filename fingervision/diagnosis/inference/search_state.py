@@ -52,8 +52,8 @@ def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -
     The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
     added to the smaller explanation fits part of that inexactness, however large the residual is. If the larger
     explanation has other effects instead, and leaves only noise, no more than the typical inexactness of formulas is
-    allowed for the smaller one. For example, a creep whose residual was 70 times the noise (3.6 % of what it explained)
-    imitated a ratio and an offset, which together leave only noise.
+    allowed for the smaller one. For example, a creep whose residual was 70 times the noise (3.6 % of the explained
+    change) imitated a ratio and an offset, which together leave only noise.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows

@@ -190,7 +190,7 @@ class Observations:
     def with_overshoots(self) -> "Observations":
         """Return the observations with an overshoot wherever two readings at one target indicate a reversal.
 
-        Without such pairs of readings, the observations are returned unchanged.
+        Without two readings at one target, the observations are returned unchanged.
         """
         if not turning_readings(self.table).size:
             return self

@@ -168,7 +168,7 @@ def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
     """Whether each run follows a re-zeroing, recognised by its name.
 
-    The result is empty if every run follows a re-zeroing, because then no run shows the earlier zero.
+    Nothing is returned if every run follows a re-zeroing, because then no run shows the earlier zero.
     """
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()

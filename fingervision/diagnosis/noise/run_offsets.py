@@ -52,7 +52,8 @@ class RunOffsets:
     def __post_init__(self) -> None:
         """Tabulate, for each channel and each spread, the quantities that do not depend on the residual.
 
-        These are the runs' weights, the part of each run's squared mean that an offset absorbs, and the penalty.
+        The tables contain the weights of the runs, the part of each run's squared mean that an offset absorbs, and the
+        penalty.
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
@@ -80,7 +81,7 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads fitted."""
+        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of given spreads fitted."""
         known = self._metrics.get(sigma_mm)
         if known is not None:
             return known

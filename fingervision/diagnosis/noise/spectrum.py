@@ -89,7 +89,7 @@ def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float)
 def _shape(angle: Array, share: float, phi: float) -> Array:
     """Noise spectrum of unit variance, of which a share `share` has the correlation `phi` between neighbouring samples.
 
-    The result has shape (m,).
+    The spectrum has shape (m,).
     """
     correlated = (1.0 - phi**2) / (1.0 + phi**2 - 2.0 * phi * np.cos(angle))
     return np.asarray(1.0 - share + share * correlated, dtype=np.float64)

@@ -2,8 +2,9 @@
 
 Published reports deviate from the standard in three ways, which the tests check with readings of real stages. `forward`
 may mean the approach from above, so that the reversal has the opposite sign. The stated R may be max(R_up, R_down),
-whereas the standard's R is bidirectional and includes the reversal. The stated E may be that of one direction only. All
-of these quantities are computed here: compare R with R_up and R_down, E with E_up and E_down.
+whereas the standard's R is bidirectional and includes the reversal. The stated accuracy E may be the accuracy in one
+direction only. The functions of this module compute all quantities of the standard: compare a published R with R_up and
+R_down, and a published E with E_up and E_down.
 """
 
 from collections.abc import Callable, Sequence

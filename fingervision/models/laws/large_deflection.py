@@ -27,7 +27,7 @@ _AS_DRAWN = 0.05
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Use the drawing's equilibria; the effect's parameters are those of the best-fitting circular arc.
+    """Use the drawing's equilibria; the parameters of the effect describe the best-fitting circular arc.
 
     Multiplying `reach_mm` by n multiplies the whole curve by n, as for a body n times as large. Changing `cross` by an
     amount c adds c times the height of the arc. The parameters of the best-fitting arc therefore reproduce the

@@ -34,8 +34,7 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
     """
     if not 0.0 <= speed_mm_s <= limits.speed_mm_s:
         raise LimitError(
-            f"The speed must be at most {limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: the stage has not "
-            "moved."
+            f"The speed must be at most {limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: nothing was moved."
         )
 
 

@@ -51,9 +51,9 @@ def in_the_picture(name: str) -> bool:
     """Whether a camera effect is applied to the rendered picture itself.
 
     All other camera effects are applied by moving the scene in front of the camera, which is equivalent for drifts and
-    scale errors. An edge bias in the picture would change the gap of round tips by less than that of two straight edges
-    (because the tip moves down as well), which is not `edge_bias` as defined in the catalogue; therefore this effect is
-    also applied by moving the fingers.
+    scale errors. An edge bias in the picture would change the gap of round tips by less than the gap of straight edges,
+    because the tips move down as well. The effect `edge_bias` of the catalogue does not depend on the tips, and is
+    therefore also applied by moving the fingers.
     """
     return catalogue()[name].in_picture is not None
 
