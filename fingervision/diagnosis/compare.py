@@ -63,7 +63,7 @@ class Comparison:
         """Return disagreement and noise as a part of a sentence."""
         of = EDGES if self.data.chain.history.both_edges else ""
         rows = f"{len(self.left_out)} of {self.data.table.gap_mm.size} rows"
-        without = f" ({self.counted_rms_mm:.3g} mm without {rows} set aside as outliers)" if self.left_out else ""
+        without = f" ({self.counted_rms_mm:.3g} mm without {rows} left out as outliers)" if self.left_out else ""
         return f"RMS disagreement {self.rms_mm:.3g} mm{of}{without}, noise of the gap at most {self.noise_mm:.2g} mm"
 
     def document(self) -> dict[str, object]:

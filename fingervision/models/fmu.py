@@ -51,7 +51,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
             "is an FMU, which is read by the library FMPy: install that with `pip install fingervision[fmu]`."
         ) from None
     if not path.is_file():
-        raise ValueError("must be an existing file, but does not exist.")
+        raise ValueError("must be a file, but does not exist.")
     try:
         description = read_model_description(str(path))
         platforms = supported_platforms(str(path))

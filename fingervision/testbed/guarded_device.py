@@ -98,7 +98,7 @@ class _Guarded:
             except FingervisionError:
                 raise
             except Exception as error:
-                _say(self._who, f"answer to {name}", error, self._origin)
+                _say(self._who, f"return a result from {name}", error, self._origin)
             if name == "readings":
                 _check_readings(answer, self._who, self._origin)
             return answer

@@ -89,5 +89,5 @@ def _promised(
     also = ["+".join(e.names) for e in apart if separated != (0, listed.index(e))]
     left = ["+".join(e.names) for e in members[1:] if all(e is not one for one in apart)]
     words += f", and {leading} from {', '.join(also)}" if also else ""
-    words += f"; no protocol tried separates {leading} from {', '.join(left)}." if left else "."
+    words += f"; none of the candidate protocols separates {leading} from {', '.join(left)}." if left else "."
     return NextRun(plan.name, tuple(plan.steps), promised.stated, promised.interval, pair, words)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binom
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
@@ -42,8 +43,12 @@ STRETCH_SIGMAS = 3.0
 """Significance, in standard deviations of 1 / sqrt(n), of the correlation of neighbouring rows above which rows lie in
 stretches. A servo, for example, repeats far better at rest than in motion; such rows are not wrong."""
 FEWEST_VALUES = 30
-"""Least number of values with which such a share can be distinguished from 20 %: 40 % of 30 values is 2.8 standard
-deviations more."""
+"""Least number of values with which such a share can be distinguished from that of normal noise (`BY_CHANCE`)."""
+NORMAL_SHARE = 0.2
+"""Share of normal values within `NARROW` standard deviations."""
+BY_CHANCE = 1e-3
+"""Probability of such an extreme count under normal noise above which the count is attributed to chance: in 42 rows of
+one noise, rounded to a quarter of the noise, 40 % agreed by chance (probability 0.002)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,11 +116,12 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     together = min(_share_near(values, float(np.median(values))) for values in both)
     if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
         return None
-    if between < SHARES[0]:
+    count = residual_mm.size
+    if between < SHARES[0] and binom.cdf(round(between * count), count, NORMAL_SHARE) < BY_CHANCE:
         above = residual_mm > np.mean(residual_mm)
         apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
         words = f"the residual consists of two groups about {apart_mm:.2g} mm apart"
-    elif together > SHARES[1]:
+    elif together > SHARES[1] and binom.sf(round(together * count) - 1, count, NORMAL_SHARE) < BY_CHANCE:
         words = (
             f"{100.0 * together:.0f} % of the rows agree, and the remaining rows differ from them by {sigma:.2g} mm or "
             "more"

@@ -55,7 +55,7 @@ def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Finding
     best = min(left, key=lambda e: e.score + costs[members.index(e)])
     others = [e for e in left if e is not best]
     told = replace(found, best=best, alternatives=(best, *others))
-    return told, (*said, f"that rules out {dropped}.")
+    return told, (*said, f"the measured width of the reference slot rules out {dropped}.")
 
 
 def seen_mm(data: Observations, values: Values, size_mm: float) -> float:

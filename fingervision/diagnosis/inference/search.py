@@ -71,7 +71,7 @@ def search(
     known : Explanation or None
         Explanation found by an earlier search of the same measurement, from whose residual the noise is estimated.
     """
-    state = _one_effect(noise_known(problem_beside, known), rng, forced)
+    state = _one_effect(replace(noise_known(problem_beside, known), known=known), rng, forced)
     progress(0.3)
     state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
     state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
@@ -85,7 +85,8 @@ def search(
 def _one_effect(state: SearchState, rng: np.random.Generator, forced: frozenset[str]) -> SearchState:
     """Fit every effect alone; keep the simplest that is as good as the best, if its gain is significant."""
     problem = state.problem
-    singles = [e for e in single_effects(problem, state.atoms, 20) if not within_a_step(problem, e)]
+    alone = state.with_known(single_effects(problem, state.atoms, 20), 1)
+    singles = [e for e in alone if not within_a_step(problem, e)]
     evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
     state = replace(state, singles=singles, evidence=evidence)
     if not singles:
@@ -104,7 +105,7 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     if not state.best.names:
         return state
     problem, singles = state.problem, state.singles
-    pairs = extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress)
+    pairs = state.with_known(extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress), 2)
     pairs = [e for e in swapped(problem, state.atoms, pairs) if not within_a_step(problem, e)]
     state = replace(state, pairs=pairs)
     # Pairs are compared with the best single effect: compared with a simpler formula, a second effect would gain what a
@@ -147,7 +148,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     bases = different(problem, pairs, PAIRS_EXTENDED)
     asked = None if state.evidence is None else state.evidence.thresholds
     tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH, asked=asked)
-    triples = [e for e in tried if not within_a_step(problem, e)]
+    triples = [e for e in state.with_known(tried, 3) if not within_a_step(problem, e)]
     state = replace(state, triples=triples)
     if not triples:
         return state

@@ -8,6 +8,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     single_effects,
 )
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.model_adequacy import shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, signatures
@@ -82,6 +83,8 @@ class SearchState:
         All explanations with one effect, and the most probable ones with two and three, best first.
     evidence : Evidence or None
         Criterion for the significance of gains.
+    known : Explanation or None
+        Explanation found by an earlier search of the same measurement.
     imitation, unknown, left_over : str or None
         Description of a probe that effects only imitate; of structure that no effect explains; of remaining structure
         that is small.
@@ -97,6 +100,7 @@ class SearchState:
     pairs: list[Explanation] = field(default_factory=list)
     triples: list[Explanation] = field(default_factory=list)
     evidence: Evidence | None = None
+    known: Explanation | None = None
     imitation: str | None = None
     unknown: str | None = None
     left_over: str | None = None
@@ -105,6 +109,20 @@ class SearchState:
     def values(self) -> int:
         """Number of measured values, at least 2."""
         return max(2, int(self.problem.measured.size))
+
+    def with_known(self, found: list[Explanation], count: int) -> list[Explanation]:
+        """Add what an earlier search found, if it has so many effects, refitted beside the present noise; best first.
+
+        Beside a smaller noise the valleys are narrower, and a search from signatures may miss the one found before: a
+        delay and a limit of speed that left noise alone gave way to a resonance that left ten times as much.
+        """
+        known = self.known
+        if known is None or len(known.names) != count or not set(known.names) <= set(self.problem.effects):
+            return found
+        again = fit(self.problem, known.names, known.values, iterations=MANY_STEPS)
+        rest = [e for e in found if e.names != again.names or e.score <= again.score]
+        kept = rest if any(e.names == again.names for e in rest) else [*rest, again]
+        return sorted(kept, key=lambda explanation: explanation.score)
 
     def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
         """Whether the best of some explanations gains more over `base` than noise alone would."""

@@ -13,6 +13,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
 from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
+from fingervision.stage_record.window_blending import blended
 
 HELD_SAMPLES, SLOW_SAMPLES = 15, 5
 """Number of samples for which the input stays within one or two encoder steps: for a stage at rest, and for a stage
@@ -83,6 +84,7 @@ class RecordedInput:
         if sigma == 0.0:
             return cls.exact(table)
         smooth, leverage = smoothed(snapped_mm, time_s, runs, sigma, step)
+        smooth = blended(smooth, time_s, runs, leverage)
         if _is_motion(table, model, smooth[rows]):
             return cls.exact(table, is_motion=True)
         samples, stays = 1.0 / float(np.median(leverage)), leverage < STAYING

@@ -25,6 +25,8 @@ are accepted as its cause: such drifts have many coefficients for a few dozen re
 overestimated by at most a factor of 2."""
 OFF_GRID = 0.02
 """Distance, in grid steps, of a difference from a multiple of the smallest one that is attributed to rounding."""
+MOST_DECIMALS = 10
+"""Number of decimals, in mm, beyond which a digit is that of floating point and not of a reading."""
 BY_ACCIDENT = 1e-3
 """Probability of so close multiples by chance, below which the differences are assumed to lie on a grid."""
 FEWEST_STEPS = 8
@@ -192,8 +194,18 @@ def resolution(values: Array) -> float:
         return 0.0
     least = float(np.min(steps))
     multiples = steps / least
-    on_grid = bool(np.all(np.abs(multiples - np.round(multiples)) < OFF_GRID))
+    off = np.abs(multiples - np.round(multiples))
+    # Readings at evenly spaced targets are nearly multiples too, but differ by more than their last written digit.
+    on_grid = bool(np.all(off < OFF_GRID) and np.all(off * least <= (1.0 + multiples) * _last_digit(values)))
     further = int(np.sum(multiples > 1.5))
     if steps.size < FEWEST_STEPS and not (on_grid and (2.0 * OFF_GRID) ** further < BY_ACCIDENT):
         return float(np.ptp(values)) / LEVELS
     return least if on_grid else 0.0
+
+
+def _last_digit(values: Array) -> float:
+    """Unit of the last decimal digit with which the values are written (mm)."""
+    for decimals in range(MOST_DECIMALS):
+        if np.all(np.abs(values - np.round(values, decimals)) < 10.0**-MOST_DECIMALS):
+            return float(10.0**-decimals)
+    return float(10.0**-MOST_DECIMALS)

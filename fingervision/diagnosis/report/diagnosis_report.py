@@ -121,14 +121,12 @@ def _disagreement(answered: Answer) -> Disagreement:
         }
         for (name, a), b in zip(by_channel(data, before).items(), by_channel(data, after).values(), strict=True)
     }
-    noises = [noise.total_mm for noise in found.problem.whitener.noises]
-    noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
     unseen = left_out_rms_mm(data, found.problem, found.best)
     stands = answered.stands
     return Disagreement(
         rms_mm(before, n, edges),
         rms_mm(after, n, edges),
-        noise_rms,
+        stands.noise_mm,
         *unseen,
         channels,
         counted_before_rms_mm=stands.before_mm,

@@ -57,9 +57,9 @@ def strip_html(table: Path) -> str:
     recording = _recording_of(table)
     if recording is None:
         return (
-            "<p>No frames: they are shown where the measured table is a gaps.csv with its summary.json, and the "
-            "recording lies where summary.json says, in the same folder, the one above, or the one in which the "
-            "command runs.</p>"
+            "<p>No video frames are shown. They need a gaps.csv with its summary.json as the measured table. The "
+            "recording must be at the path that summary.json states, or in the folder of gaps.csv, the folder above, "
+            "or the current folder.</p>"
         )
     turns = _decoded(recording, turning_rows(table))
     shown = "".join(

@@ -97,7 +97,7 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
     if unseen:
         said += f" Not measured: {', '.join(unseen)}."
     if partly:
-        said += f" Measured in part, the rest as predicted: {', '.join(partly)}."
+        said += f" Measured in part, otherwise drawn as predicted: {', '.join(partly)}."
     return (
         f"<style>{_STYLE}</style>"
         f'<svg id="mechanism" viewBox="{box}" role="img" aria-label="The mechanism as predicted and as measured">'

@@ -238,5 +238,7 @@ def _notes(targets: Sequence[Target]) -> tuple[str, ...]:
     single = [t.target_mm for t in targets if t.up is None or t.down is None]
     if single:
         places = ", ".join(f"{place:g}" for place in single[:8]) + (" and others" if len(single) > 8 else "")
-        notes.append(f"Approached from one side only, and not in the bidirectional figures: {places} mm.")
+        notes.append(
+            f"Approached from one side only, and therefore not included in the bidirectional values: {places} mm."
+        )
     return tuple(notes)

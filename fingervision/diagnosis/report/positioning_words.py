@@ -72,7 +72,7 @@ def positioning_document(report: PositioningReport) -> dict[str, object]:
 def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the table in report.html; lengths in mm, with their full values for programs."""
     effects = list(report.without)
-    after = [] if report.after is None else ["after the answer, mm"]
+    after = [] if report.after is None else ["after correction, mm"]
     head = ["figure", "measured, mm", *after, *(f"share of {effect}, mm" for effect in effects), "definition"]
     rows = []
     for symbol, figure in report.measured.figures.items():
@@ -120,14 +120,14 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
         if share is None or abs(share) <= TOLD * abs(value):
             continue
         if 0.0 < share * value <= (1.0 + TOLD) * value**2:
-            causes.append(f"{_mm(abs(share))} mm of it is {effect}")
+            causes.append(f"{_mm(abs(share))} mm are caused by {effect}")
         else:
             # The effect hides a part of the quantity, or other effects hide a part of the effect: state the quantity
             # without the effect, which is always true.
             causes.append(f"without {effect} it would be {_mm(value - share)} mm")
     words += f"; {', '.join(causes)}" if causes else ""
     rest = None if report.after is None else report.after.figures[symbol].value_mm
-    return words + (f"; {_mm(rest)} mm remain." if rest is not None else ".")
+    return words + (f"; {_mm(rest)} mm remain after correction." if rest is not None else ".")
 
 
 def _side_words(figure: Figure, slope_sign: int) -> str:

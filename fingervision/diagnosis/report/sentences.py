@@ -68,7 +68,7 @@ def answer(
     if verdict is Verdict.AMBIGUOUS:
         names = "; ".join(" + ".join(names) for names in alternatives)
         which = f": {names}" if len(alternatives) <= FEW_NAMES else ""
-        return f"These data cannot tell {len(alternatives)} explanations apart{which}. With the best fit, {fall}."
+        return f"These data cannot distinguish {len(alternatives)} explanations{which}. With the best fit, {fall}."
     part = f" {what} explain{'s' if len(effects) == 1 else ''} a part; {fall}." if effects else ""
     return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
 
@@ -107,7 +107,7 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
             f"disagreement; {stands.noise_mm:.2g} mm of it would be random noise"
         )
     if left_over is not None:
-        words += f"; its largest part is {left_over}, small beside what was explained"
+        words += f"; the largest part of it is {left_over}, small compared with the explained part"
     if max(scatter_mm, default=0.0) > 0.0:
         words += f"; the runs are offset against each other by {scatter_mm[0]:.2g} mm (standard deviation) in the gap"
     return words + "."
@@ -139,5 +139,7 @@ def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
     """Sentence for a table whose noise comes mainly from the error of the recorded input."""
     error = float(np.median(data.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
-        return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)
+        return (
+            f"the error of the recorded input ({error:.2g} mm of gap) is larger than the error of the measured gap.",
+        )
     return ()

@@ -141,7 +141,7 @@ class LibraryAxis(ABC):
             raise self._silent(error) from error
 
     def _silent(self, error: Exception) -> DeviceError:
-        return DeviceError(f"{self.name} must answer, but did not ({in_a_line(error)}): check its cable.")
+        return DeviceError(f"{self.name} must answer a request, but did not ({in_a_line(error)}): check its cable.")
 
 
 def in_a_line(error: Exception) -> str:

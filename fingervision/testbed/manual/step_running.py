@@ -40,7 +40,7 @@ def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> No
         say(f"homed: {manual_control.home(bed):.3f} mm")
         for motion in motions:
             at_mm = _run(bed, motion)
-            say(f"step {motion.number}: {motion.from_mm:.3f} to {motion.to_mm:.3f} mm, stands at {at_mm:.3f} mm")
+            say(f"step {motion.number}: {motion.from_mm:.3f} to {motion.to_mm:.3f} mm, at rest at {at_mm:.3f} mm")
     finally:
         bed.close()
 
