@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _python_function(path: Path) -> Function:
-    """Load `simulate` from a Python file; its folder is searched for what it imports."""
+    """Load `simulate` from a Python file; modules that the file imports are searched in the file's folder."""
     sys.path.insert(0, str(path.parent))
     spec = spec_from_file_location("model_of_ones_own", path)
     if spec is None or spec.loader is None:
@@ -55,7 +55,7 @@ def _python_function(path: Path) -> Function:
         try:
             found = simulate(time_s.copy(), input_mm.copy())
         except (Exception, SystemExit) as error:
-            raise ValueError(f"failed in simulate: {type(error).__name__}: {error}") from error
+            raise ValueError(f"failed in its function simulate: {type(error).__name__}: {error}") from error
         return found if isinstance(found, Mapping) else {"gap_mm": found}
 
     return function
