@@ -55,7 +55,7 @@ def _python_function(path: Path) -> Function:
         try:
             found = simulate(time_s.copy(), input_mm.copy())
         except (Exception, SystemExit) as error:
-            raise ValueError(f"failed in its function simulate: {type(error).__name__}: {error}") from error
+            raise ValueError(f"failed in simulate: {type(error).__name__}: {error}") from error
         return found if isinstance(found, Mapping) else {"gap_mm": found}
 
     return function
