@@ -117,8 +117,8 @@ def gripper_motion(
         raise ModelError(
             f"With large rotation or contact this drive must be shorter than {_MOST_STEPS * step_s:.3g} s (with --kind "
             f"lumped, a frame of bars), or make the gap vibrate by at most {_FAST:g} of its travel of {travel:.3g} mm, "
-            f"but the drive takes {sum(spans_s):.3g} s and the gap vibrates by {small.vibration_mm(GAP):.3g} mm; shorten "
-            "the drive, slow it down or leave --large-rotation and --contact off."
+            f"but the drive takes {sum(spans_s):.3g} s and the gap vibrates by {small.vibration_mm(GAP):.3g} mm; "
+            "shorten the drive, slow it down or leave --large-rotation and --contact off."
         )
     onset_mm = contact_onset_mm(model.half, model.physics) if model.physics.contact else None
     apart = np.ones_like(force, dtype=bool) if onset_mm is None else drive.input_mm > onset_mm
