@@ -84,7 +84,8 @@ def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
 def mechanical_advantage(body: DrivenBody) -> float | None:
     """Increase of each finger's gripping force per increase of drive force, once the fingers touch each other.
 
-    The remaining work of the drive bends hinges and fingers. The function returns None for fingers that do not close.
+    The part of the drive's work that does not increase the grip bends hinges and fingers. The function returns None for
+    fingers that do not close.
     """
     touch = body.first_touch_mm()
     if touch is None:

@@ -87,8 +87,8 @@ def bar_compliance(length_mm: float, width_mm: float, plate_mm: float, material:
 def torsion_constant_mm4(height_mm: Array, plate_mm: float) -> Array:
     """Saint-Venant torsion constant of a rectangle.
 
-    J = p q^3 (1/3 - 0.21 q/p (1 - q^4 / (12 p^4))), p the longer side: Young and Budynas, Roark's Formulas for Stress
-    and Strain, table 10.1.
+    J = p q^3 (1/3 - 0.21 q/p (1 - q^4 / (12 p^4))), with p the longer and q the shorter side: Young and Budynas,
+    Roark's Formulas for Stress and Strain, table 10.1.
     """
     p, q = np.maximum(height_mm, plate_mm), np.minimum(height_mm, plate_mm)
     return np.asarray(p * q**3 * (1.0 / 3.0 - 0.21 * q / p * (1.0 - q**4 / (12.0 * p**4))))

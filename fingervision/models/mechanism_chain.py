@@ -2,9 +2,9 @@
 
 The model applies equations (5) to (15) of Hricko & Havlik (2015), in the plane, to any chain from a fixed body to the
 driven one: the compliance at the drive is C = sum T C_i T', where T transforms the compliance C_i of flexure i to the
-drive. The stiffness is its inverse in the directions that the drive and its guides constrain. Several drives act as
-loads at several bodies of a tree of bodies. A drawing with a closed loop of bodies is refused, because the sum exists
-only for chains and trees.
+drive. The stiffness is the inverse of the compliance in the directions that the drive and its guides constrain. Several
+drives act as loads at several bodies of a tree of bodies. A drawing with a closed loop of bodies is refused, because
+the sum exists only for chains and trees.
 """
 
 from dataclasses import replace
@@ -160,7 +160,7 @@ class MechanismChain:
         self._load = self._by_drive @ per_input_of(mechanism)
 
     def _held_by(self, face: Face, components: tuple[str, ...]) -> set[int]:
-        """Motions (0 x, 1 y, 2 rotation) of a body that a face fixes; rotation if the face is wide across one."""
+        """Motions (0 x, 1 y, 2 rotation) of a body that a face fixes; rotation only if the face is wide enough."""
         x0, x1, y0, y1 = face.box_mm
         wide = {"x": y1 - y0, "y": x1 - x0}
         turns = {2} if any(wide[component] > _ON * self._size_mm for component in components) else set()

@@ -1,4 +1,4 @@
-"""Characteristic numbers of a mechanism drawn by bodies, for any kind of model."""
+"""Characteristic numbers of a mechanism that is described by its bodies, for any kind of model."""
 
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_frame import MechanismFrame

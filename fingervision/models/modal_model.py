@@ -7,9 +7,10 @@ unknown):
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = -L_r u''
     force at the drive = k u + m u'' + sum_r L_r q_r''
 
-with L_r = phi_r' M s, k = s' K s and m = s' M s. Damping acts on the motion relative to the static shape. If the drive
-is free to move and pushed by a force f, the modes with free drive vibrate instead; with d_r the motion of the drive in
-mode r:
+with L_r = phi_r' M s, k = s' K s and m = s' M s, where mode r has the coordinate q_r, the shape phi_r, the angular
+frequency w_r and the damping ratio zeta_r, and the body has the mass matrix M and the stiffness matrix K. Damping acts
+on the motion relative to the static shape. If the drive is free to move and pushed by a force f, the modes with free
+drive vibrate instead; with d_r the motion of the drive in mode r:
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = d_r f
 """
@@ -108,7 +109,8 @@ def described(damping: Damping, rad_s: Array) -> Array:
     """Damping ratios of the lowest modes, as far as a damping law is valid for them.
 
     A damping law may give ratios that are impossible for solids, as equation (4) of Hricko & Havlik (2015) does at a
-    few times its reference frequency. Such a law is used only for the modes below the frequency at which this happens.
+    few times its reference frequency. A damping law is used only for the modes below the frequency at which its ratios
+    become impossible.
 
     Raises
     ------

@@ -75,8 +75,8 @@ def gripper_motion(
 
     With small displacements the modes' equations are solved exactly. With large rotation or contact, a frame of bars is
     integrated in time steps if at most 20 000 steps are needed. If more steps are needed, or the model is no frame of
-    bars, the modes of the gripper at rest are superposed on its equilibria while the fingers do not touch. This
-    superposition is valid for small vibrations.
+    bars, the modes of the gripper at rest are superposed on its equilibria while the fingers do not touch. The
+    superposition of modes on equilibria is valid for small vibrations.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ class Notch:
         return min(sqrt(self.thickness_mm / self.depth_mm), 1.0)
 
     def height_mm(self, x_mm: Array) -> Array:
-        """Height h(x) = t + 2 c (1 - sqrt(1 - x^2 / a^2))."""
+        """Height t + 2 c (1 - sqrt(1 - x^2 / a^2)), with thickness t and half axes a (along) and c (across)."""
         along = np.clip(1.0 - (x_mm / self.half_length_mm) ** 2, 0.0, 1.0)
         return np.asarray(self.thickness_mm + 2.0 * self.depth_mm * (1.0 - np.sqrt(along)))
 

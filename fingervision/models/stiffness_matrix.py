@@ -2,14 +2,18 @@
 
 The published equations are corrected for these reasons:
 
-* Equation (6) transforms six components, but equation (3) is a planar compliance with three components; in this module,
+* Equation (6) of the paper transforms six components, but its equation (3) is a planar compliance with three
+  components; in this module,
   all compliances are 6 by 6.
-* Equation (10) uses 135.15 degrees and equation (13) 135 degrees for the same angle; in this module, the angles come
+* Equation (10) of the paper uses 135.15 degrees and equation (13) 135 degrees for the same angle; in this module, the
+  angles come
   from the drawing.
-* Equation (12) uses T_12, which the paper does not define; T_12 must transfer the compliance from O1 to O2, as T_O2
+* Equation (12) of the paper uses T_12, which is not defined there; T_12 must transfer the compliance from O1 to O2, as
+  T_O2
   does.
-* Equation (14) has C_2A on both sides; on the right-hand side it must be C_12.
-* Equation (15), K = 2 C^-1, gives the stiffness along the drive only if the shuttle cannot move sideways or rotate. The
+* Equation (14) of the paper has C_2A on both sides; on the right-hand side it must be C_12.
+* Equation (15) of the paper, K = 2 C^-1, gives the stiffness along the drive only if the shuttle cannot move sideways
+  or rotate. The
   other half of the gripper prevents these motions of the shuttle, so that the stiffness is 2 (C^-1)_yy; for a free
   shuttle, the stiffness would be 2 / C_yy.
 

@@ -128,7 +128,7 @@ def test_a_sine_needs_an_actuator_that_goes_anywhere(tmp_path: Path) -> None:
     assert str(raised.value) == (
         f"kind in line 4 of {recipe} cannot be executed: a sine consists of many short moves to intermediate positions"
         ", but this actuator can only move to the target positions of its step data. Use a triangle or a staircase "
-        "between two of these positions. Nothing was moved."
+        "between two target positions of the step data. Nothing was moved."
     )
     assert not (tmp_path / "run").exists()
 

@@ -122,7 +122,8 @@ class PlaceNuisances:
 
         The returned array has shape (n, channels).
 
-        Possible model errors are fitted too, but stay in the residual, because they may be the sought disagreement.
+        Possible model errors are fitted too, but stay in the residual, because they may be the disagreement to be
+        found.
         """
         padded = np.concatenate([self._noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
         shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit

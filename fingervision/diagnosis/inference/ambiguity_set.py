@@ -101,8 +101,8 @@ def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, oth
     """Whether the best explanation may fit better only because its richer formula includes the other explanation.
 
     An example is a delay and a well-damped resonance, both of which round corners: the formula of a delay is inexact
-    where the stage reverses between two samples. A difference of this size is attributed to the inexact formula; a
-    larger difference is evidence for the richer formula.
+    where the stage reverses between two samples. A difference in chi-square that the inexactness of formulas can cause
+    is attributed to it; a larger difference is evidence for the richer formula.
     """
     worse = other.score - best.score
     return (
@@ -124,7 +124,7 @@ def _least_refuted(distance: float) -> float:
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
-    """Fit one explanation to another's prediction; its score is D_jk, the squared whitened distance that remains.
+    """Fit one explanation to another's prediction; the score is the squared whitened distance that remains.
 
     In both directions the run offsets have the spread found for the best explanation, because a worse explanation would
     hide its misfit in a larger spread.
@@ -137,7 +137,7 @@ def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explan
     """Drop explanations that only imitate an effect that the drawing predicts and that is found as predicted.
 
     Otherwise, the agreement of the fitted effect with the drawing's prediction would be a coincidence. For example, an
-    end stop at exactly the input at which the drawn fingers meet is the contact of these fingers.
+    apparent end stop at exactly the input at which the fingers meet in the drawing is the contact of the fingers.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:

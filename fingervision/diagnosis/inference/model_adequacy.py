@@ -86,8 +86,8 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     """Name the generic shapes that effects only imitate, in a sentence; None if the effects themselves are the cause.
 
     Three effects can fit almost any shape, and must therefore explain the data much better than generic shapes do. One
-    or two effects count as imitations only if the shapes fit much better, by more than the inexactness of the effects'
-    formulas.
+    or two effects count as imitations only if generic shapes fit much better, by more than the inexactness of the
+    effects' formulas.
 
     Parameters
     ----------
@@ -125,11 +125,11 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
 
 
 def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation, shapes: Array) -> bool:
-    """Whether an explanation with added shapes differs from that of the effects by less than the input's error.
+    """Whether an explanation with added shapes differs from the explanation by effects by less than the input's error.
 
-    For example, a step over the input at the first line of an encoder is an offset: beyond this line, where the strokes
-    reverse, the mean position of the stage is not that of the line. Differences in the constants of the runs are
-    ignored.
+    For example, a step over the input at the first line of an encoder is only an offset, because strokes reverse beyond
+    this line, and the mean position of the stage is then not the position of the line. Differences between explanations
+    in the constants of the runs are ignored.
 
     Parameters
     ----------

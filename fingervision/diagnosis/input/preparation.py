@@ -86,7 +86,7 @@ def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None
 
 
 def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:
-    """Collect what effects may use: input, times and runs."""
+    """Collect the data that effects may use: input, times and runs."""
     rest = model.base.respond(np.zeros(1))
     zero_mm = float(rest.gap_mm[0])
     opening_mm = model.base.respond(table.input_mm).gap_mm - zero_mm

@@ -65,7 +65,7 @@ class NoRepeatedTargets:
 class _Visit:
     """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after the visit.
 
-    `places` contains all of these rows, including those without a reading.
+    `places` contains all rows of the visit, including rows without a reading.
     """
 
     target: int
@@ -83,8 +83,8 @@ def repeated_targets(
 
     The direction of approach of a visit follows from the last earlier row at another position, with or without a
     reading (such as an overshoot or an approach). If the table lacks rows without a reading, two assumptions are made
-    and reported. First, if a target at an end of the range has two successive readings where all other targets have
-    one, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range came
+    and reported. First, if a target at an end of the range has two successive readings where all other targets have one
+    reading, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range came
     from beyond this end, if the table has pairs of readings at its ends, or if all its runs have the same direction.
 
     Parameters

@@ -41,7 +41,7 @@ def _lens(optics: Optics, k_per_mm2: float) -> Optics:
 
 
 def _tilt(optics: Optics, k_per_mm: float) -> Optics:
-    """Convert x / (1 + k x) in mm to a plane tilted about the vertical axis: k = sin(tilt) / distance."""
+    """Convert the keystone distortion x / (1 + k x) in mm to a tilted plane: k = sin(tilt) / distance."""
     sine = TILT_SINE if k_per_mm > 0.0 else -TILT_SINE
     tilt = Tilt(about_y_deg=degrees(asin(sine)), distance_px=sine / k_per_mm * optics.px_per_mm)
     return replace(optics, camera=replace(optics.camera, tilt=tilt))
