@@ -111,7 +111,7 @@ class SearchState:
         return max(2, int(self.problem.measured.size))
 
     def with_known(self, found: list[Explanation], count: int) -> list[Explanation]:
-        """Add the explanation of an earlier search, refitted with the present noise, if of equal size; best first.
+        """Add the explanation of an earlier search, refitted with the present noise, if it has `count` effects.
 
         With a smaller noise, minima of chi-square are narrower, and a search from signatures may miss the minimum that
         was found before. For example, a delay with a speed limit that left only noise was replaced by a resonance that
