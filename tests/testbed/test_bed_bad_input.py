@@ -196,7 +196,7 @@ def test_an_alarm_stops_the_run_and_is_said(tmp_path: Path) -> None:
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.tex").write_text("mine")
-    with pytest.raises(OutputError, match=r"must be a new or empty folder, but .* holds thesis\.tex"):
+    with pytest.raises(OutputError, match=r"must be a new or empty folder, but .* contains thesis\.tex"):
         run(tmp_path, steps(MOVE))
     assert (tmp_path / "run" / "thesis.tex").read_text() == "mine"
 
