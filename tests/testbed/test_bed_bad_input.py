@@ -90,7 +90,7 @@ gap_mm = {gap_mm}
         ),
         (
             'kind = "hold"\nat_mm = 0.2\nseconds = 1\nframes = "many"',
-            "frames in line 7 of {path} must be \"continuous\" or a number for each point, but is 'many'.",
+            "frames in line 7 of {path} must be \"continuous\" or a number of frames for each point, but is 'many'.",
         ),
     ],
 )
