@@ -153,7 +153,7 @@ class StageDevice:
         if not limits.lower_mm <= float(to_mm) <= limits.upper_mm:
             raise LimitError(
                 f"{self.name} must stay between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but {float(to_mm):g} "
-                "mm is requested: the stage has not moved."
+                "mm is requested: nothing was moved."
             )
 
     def _until_rest(self) -> None:
@@ -266,7 +266,7 @@ class GapDevice:
     def _begin(self) -> float:
         """Read the stage position before the first frame to be used, and return the time from which frames are used.
 
-        That time is in seconds, on the test bed's clock.
+        The returned time is in seconds, on the test bed's clock.
         """
         instruments = [one for one in (self._sight.position, self._sight.force) if one is not None]
         until_s = self._clock.now_s() + JOINED_WITHIN_S

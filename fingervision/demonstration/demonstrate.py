@@ -78,8 +78,8 @@ def drawn(seed: int) -> Hidden:
     """Choose, by a seed, an effect and its size for the demonstration, among the effects declared suitable.
 
     A random number is drawn for each effect from the seed and the effect's name, and the effect with the highest number
-    is chosen (rendezvous hashing: Thaler & Ravishankar 1998, doi:10.1109/90.663936). A new effect therefore changes
-    only the choice for seeds by which the new effect itself is chosen.
+    is chosen (rendezvous hashing: Thaler & Ravishankar 1998, doi:10.1109/90.663936). If an effect is added to the
+    catalogue, the choice changes only for those seeds that choose the new effect.
     """
     rng = np.random.default_rng([seed, 7])
     name = max(demonstrated(), key=lambda name: float(np.random.default_rng([seed, crc32(name.encode())]).random()))

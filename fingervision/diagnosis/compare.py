@@ -94,7 +94,7 @@ class Comparison:
 
 
 def rough(residual_mm: Array, history: History) -> Array:
-    """Residual minus straight segments that extend from reversal to reversal in each run; same shape as the residual.
+    """Residual minus straight segments from reversal to reversal in each run; same shape as the residual.
 
     A jump at a reversal contains all frequencies, so that a spectrum would count it as noise.
     """

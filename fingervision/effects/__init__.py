@@ -47,7 +47,7 @@ def origin_of(name: str) -> Origin:
 
 
 def that_show(check: FurtherCheck) -> tuple[str, ...]:
-    """Names of the effects that are visible in a given check, in the order of the catalogue."""
+    """Names of the effects that are visible in a given check of the set-up, in the order of the catalogue."""
     return tuple(name for name, effect in catalogue().items() if effect.checks.get(check) is True)
 
 

@@ -58,7 +58,7 @@ def curve_points(values: Values) -> tuple[Array, Array]:
 def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float) -> tuple[Array, Array]:
     """Return a representative curve for a map of which only RMS and correlation length are known.
 
-    The same arguments always give the same curve.
+    The curve is random, but the same for the same arguments.
     """
     at = np.linspace(low_mm, high_mm, TYPICAL_NODES)
     root = np.linalg.cholesky(covariance(at, length_mm) + 1e-9 * np.eye(at.size))

@@ -26,7 +26,7 @@ _follow = loop("slew_limit_follow")
 def follow(input_mm: Array, time_s: Array, speed_mm_s: float) -> Array:
     """Output of a stage that follows the input of one run at a speed of at most `speed_mm_s`; shape (n,).
 
-    The result is exact for an input that is linear between its samples.
+    The computed output is exact for an input that is linear between its samples.
     """
     return filled(_follow, input_mm, np.ascontiguousarray(time_s), speed_mm_s)
 

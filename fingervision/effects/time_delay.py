@@ -47,8 +47,7 @@ def late(signal: Array, history: History, delay_s: float, *, curved: bool = Fals
 def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of a delay to what the data can show; delays shorter than the stage's rests are invisible.
 
-    With step commands, the prediction changes in jumps as a function of the delay, whenever the delay passes a sample
-    time.
+    With step commands, the prediction jumps as a function of the delay, whenever the delay passes a sample time.
     """
     if history.dwell_s <= delay.upper:
         return (replace(delay, rugged=True, starts=COMMANDED_STARTS) if history.commanded else delay,)

@@ -62,8 +62,8 @@ def nodes_of(plate: PlaneStressPlate, frame: Frame) -> Indices:
 def section_frame(plate: PlaneStressPlate, at_mm: Array, axis: Array, height_mm: float, near_mm: float) -> Frame:
     """Coordinate frame of a section cut perpendicular to an axis.
 
-    The motion of this coordinate frame is the mean of the section's displacements, weighted by the stresses of a beam:
-    uniform for tension, linear for bending and parabolic for shear over the height.
+    The motion of a section's coordinate frame is the mean of the section's displacements, weighted by the stresses of a
+    beam: uniform for tension, linear for bending and parabolic for shear over the height.
 
     Parameters
     ----------

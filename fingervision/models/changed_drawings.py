@@ -1,8 +1,9 @@
 """Approximate a model's figures for drawings with changed dimensions, from the faster bar model.
 
-Each figure of the bar model is multiplied by a ratio: the figure of the accurate model over that of the bar model, both
-for the unchanged drawing. A model with a meshed finger takes half a second to compute, a bar model a few milliseconds.
-If a figure is not finite, or the ratio is not between 1/2 and 2, the bar model's figure is used without a ratio.
+Each figure of the bar model is multiplied by a ratio: the figure of the accurate model over the figure of the bar
+model, for the unchanged drawing. A model with a meshed finger takes half a second to compute, a bar model a few
+milliseconds. If a figure is not finite, or the ratio is not between 1/2 and 2, the bar model's figure is used without a
+ratio.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,7 +29,7 @@ def _ratio(own: float | None, bars: float | None) -> float:
 
 
 def scaled(figures: Figures, by: Mapping[str, float]) -> dict[str, float | None]:
-    """Multiply figures by the ratios of the same names; a figure without a ratio stays as it is."""
+    """Multiply figures by the ratios of the same names; a figure without a ratio is not changed."""
     return {name: None if value is None else by.get(name, 1.0) * value for name, value in figures.items()}
 
 

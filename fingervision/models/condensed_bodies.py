@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _ITERATIONS = 8
-"""Number of iterations. With 2 n + 2 iterated vectors, the first n modes have then converged to 1e-4, because each
-iteration reduces the error by a factor of at least (w_n / w_(2n+2))^4, where w_n is the n-th angular frequency."""
+"""Number of iterations of the search for modes. With 2 n + 2 iterated vectors, the first n modes have then converged to
+1e-4, because each iteration reduces the error by a factor of at least (w_n / w_(2n+2))^4, where w_n is the n-th angular
+frequency."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

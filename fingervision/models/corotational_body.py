@@ -1,9 +1,9 @@
 """A condensed body in large rotation: linear elasticity in axes that rotate with its first coordinate frame.
 
-This is the corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures, volume
-1, section 7.3), for an element with any number of nodes: the energy is d' K d / 2, with K the stiffness matrix and d
-the motions of the coordinate frames relative to the first one. Each coordinate frame is a connection point of the body,
-with two displacements and a rotation.
+The method is the corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures,
+volume 1, section 7.3), for an element with any number of nodes: the energy is d' K d / 2, with K the stiffness matrix
+and d the motions of the coordinate frames relative to the first one. Each coordinate frame is a connection point of the
+body, with two displacements and a rotation.
 """
 
 from dataclasses import dataclass

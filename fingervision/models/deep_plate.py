@@ -2,10 +2,10 @@
 
 Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with shape functions N_a, depth b, unknowns q and
 Legendre polynomials P_k: odd polynomials for the in-plane components, even polynomials for the out-of-plane component.
-This choice describes bending, torsion and shear of a plate that is symmetric about its middle plane. The solution
-converges to three-dimensional elasticity as the order grows (hierarchic plate models: Babuska and Li, Comput. Methods
-Appl. Mech. Eng. 100 (1992) 249), without the assumptions of plate or beam theory. Torsion of a deep neck therefore
-includes restrained warping, and bodies bend right up to their junctions.
+Odd and even polynomials together describe bending, torsion and shear of a plate that is symmetric about its middle
+plane. The solution converges to three-dimensional elasticity as the order grows (hierarchic plate models: Babuska and
+Li, 1992, Computer Methods in Applied Mechanics and Engineering 100, 249), without the assumptions of plate or beam
+theory. Torsion of a deep neck therefore includes restrained warping, and bodies bend right up to their junctions.
 """
 
 from functools import cached_property
@@ -79,7 +79,7 @@ class DeepPlate:
 
     @cached_property
     def _plane(self) -> dict[tuple[int, int], csr_matrix]:
-        """Integrals of products of two shape functions, each differentiated by x (0), y (1) or neither (2)."""
+        """Integrals of products of two shape functions, each differentiated by x (0), by y (1) or not at all (2)."""
 
         def part(shape: Any, way: int) -> Any:
             return shape if way == 2 else shape.grad[way]

@@ -47,7 +47,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class DrivenBody:
-    """The right half with its supports; the gripper is two such halves in parallel.
+    """The right half of a gripper with its supports; the whole gripper consists of two halves in parallel.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class DrivenBody:
     def face_displacement_mm(self) -> Array:
         """Small displacements of the body with fixed drive under a unit force on one face point, for each face point.
 
-        The result has one column for each face point.
+        Each column of the returned array belongs to one face point.
         """
         loads = np.zeros((self.unknowns, self.face.size))
         loads[self.face, np.arange(self.face.size)] = 1.0

@@ -3,8 +3,9 @@
 The values come from plane finite elements (`tests/benchmarks/models_fillet_table.py`), because the usual charts
 (Pilkey, Peterson's Stress Concentration Factors, charts 3.1 and 3.7) end where the shoulders are three times as high as
 the neck. Between the table's nodes, the excess of the stress concentration factors over 1 is interpolated over the
-logarithms of radius / thickness and depth / radius. Beyond the table's ends the excess is extrapolated as a power of
-the radius, because the stress at a sharp corner is unbounded; over the depth, it is held constant.
+logarithms of radius / thickness and depth / radius. Beyond the table's ends, the excess of the factors over 1 is
+extrapolated as a power of the radius, because the stress at a sharp corner is unbounded; over the depth, the excess is
+held constant.
 """
 
 import numpy as np

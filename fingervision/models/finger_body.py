@@ -1,10 +1,11 @@
 """The gripper's finger, from both hinges to the tip, as one elastic body condensed from plane finite elements.
 
 Slender bars would model the junction of root, cross bar, shuttle and finger badly, because the pieces between the
-points where the axes meet are as wide as they are long. The force on a gripped part would be up to a third too low. The
-body is cut from the drawing at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965)
-380) to the motions of the cuts, of the tip's inner face, and of a few patches in between, which carry the body's mass.
-The remaining nodes of the bar model follow the body's motion; they are used for pictures and poses.
+points where the axes meet are as wide as they are long. With slender bars, the force on a gripped part would be up to a
+third too low. The body is cut from the drawing at the ends of the notches, meshed, and condensed statically (Guyan,
+AIAA Journal 3 (1965) 380) to the motions of the cuts, of the tip's inner face, and of a few patches in between, which
+carry the body's mass. The remaining nodes of the bar model follow the body's motion; they are used for pictures and
+poses.
 """
 
 from dataclasses import dataclass, replace
@@ -124,7 +125,7 @@ def finger_ends_mm(gripper: Gripper) -> tuple[float, float]:
 
 
 def is_of_finger(name: str) -> bool:
-    """Whether a member of the half, by its name, is part of the finger."""
+    """Whether a member of the half gripper, given by its name, is part of the finger."""
     return name not in _OTHERS
 
 

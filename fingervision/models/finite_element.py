@@ -5,8 +5,8 @@ cannot move perpendicular to it, and the drive face moves by the input. The plat
 between plane stress and plane strain, depending on their width (`width_effect`). For the published gripper in plane
 stress, a converged mesh gives 7.7212 mm of gap per millimetre of input, a stiffness of 2.0014 N/mm and a stress of
 19.07 MPa/mm; including the width of the hinges the stiffness is 2.06 N/mm, as with three-dimensional brick elements.
-The link length of that gripper is not published and was chosen so that the slope equals the one published for Comsol;
-the agreement of the two slopes is therefore no validation.
+The link length of the published gripper is unknown and was chosen so that the slope equals the published slope of the
+Comsol model; the agreement of the two slopes is therefore no validation.
 """
 
 from collections.abc import Sequence

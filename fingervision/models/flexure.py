@@ -121,9 +121,9 @@ class Flexure:
     def width_share(self, plate_mm: float) -> float:
         """Degree to which the plate's width constrains the bending: 0 for plane stress, 1 for plane strain.
 
-        For a leaf or a straight neck, the degree is a mean of two cases, ends that rotate and ends that keep their
-        direction. The cases are weighted by their shares of the strain energy, or equally where these shares are
-        unknown.
+        For a leaf or a straight neck, the degree of constraint is a mean of two cases, ends that rotate and ends that
+        keep their direction. Rotating and parallel ends are weighted by their shares of the strain energy, or equally
+        where these shares are unknown.
         """
         if self.is_notch:
             return plane_strain_share(self.notch(plate_mm))

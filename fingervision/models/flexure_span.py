@@ -2,7 +2,7 @@
 
 A notch is a beam between the points where it meets the bodies that it joins, corrected by the tables for hinges. For a
 leaf and for a straight neck, the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle the
-stress there is that of a beam, and the compliance of the roots is included in the elastic bodies.
+beam theory is valid up to these ends, and the compliance of the roots is included in the elastic bodies.
 """
 
 from dataclasses import dataclass, replace

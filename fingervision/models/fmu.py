@@ -128,8 +128,8 @@ def _drive_between_steps() -> None:
     """Let FMPy's integrator read the input at each time that it evaluates, instead of the input at the last step.
 
     FMPy 0.3 sets inputs only before a step of the integrator and in the root function. During a step of the integrator
-    CVode a moving input then lags, and the integrator's error test fails where the input jumps. The change applies to
-    the whole worker process, which runs only the model.
+    CVode a moving input then lags, and the integrator's error test fails where the input jumps. The change of FMPy
+    applies to the whole worker process, which runs only the model.
     """
     from fmpy import sundials
 
@@ -157,7 +157,7 @@ def _outputs(variables: list[Any], names: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _choose(variables: list[Any], causality: str, stated: str | None, usual: tuple[str, ...]) -> Any:
-    """Choose the variable with the stated name, else one with a usual name, else the only variable there is."""
+    """Choose the variable with the stated name, else a variable with a usual name, else the only variable."""
     word = "input" if causality == "input" else "gap"
     real = [one for one in variables if one.causality == causality and one.type in ("Real", "Float64", "Float32")]
     if stated is not None:

@@ -94,7 +94,7 @@ class FunctionModel:
         return TableModel(self.path.name, up, mean(last.left_mm), mean(last.right_mm), force)
 
     def simulate(self, runs: Sequence[tuple[Array, Array]]) -> list[Response]:
-        """Simulate the runs, each from its own initial state, in a process of its own.
+        """Simulate the runs in a separate process, each run from its own initial state.
 
         Parameters
         ----------

@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _python_function(path: Path) -> Function:
-    """Load `simulate` from a Python file; its folder is searched for what it imports."""
+    """Load `simulate` from a Python file; modules that the file imports are searched in the file's folder."""
     sys.path.insert(0, str(path.parent))
     spec = spec_from_file_location("model_of_ones_own", path)
     if spec is None or spec.loader is None:

@@ -1,7 +1,7 @@
 """Time integration of a body in large rotation and contact: the generalised-alpha method.
 
 The method is second-order accurate in the time step, with adjustable damping of frequencies that the step does not
-resolve. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371.
+resolve. Source: Chung and Hulbert, 1993, Journal of Applied Mechanics 60, 371.
 """
 
 from collections.abc import Callable

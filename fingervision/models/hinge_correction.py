@@ -1,13 +1,14 @@
 """Beam theory of the notch hinge corrected by finite elements: the default of the models.
 
 The compliance in each direction is multiplied by ratios that `tests/benchmarks/models_hinge_table.py` prints for nu =
-0.34. The first ratio is that of the compliance in plane stress, between rigid end planes, to that by beam theory. The
-second ratio is the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third ratio,
-for a hinge in a body, is that of the compliance between elastic blocks to that between rigid planes, because the blocks
-deform where the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam
-theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of
-the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant,
-except in torsion, where the ratio continues to fall with (t / b)^2.
+0.34. The first ratio is the compliance in plane stress, between rigid end planes, over the compliance by beam theory.
+The second ratio is the restraint of a hinge by the plate's width, from quadratic brick elements; the restraint scales
+with nu^2 (nu: Poisson's ratio). The third ratio, for a hinge in a body, is the compliance between elastic blocks over
+the compliance between rigid planes, because the blocks deform where the notch joins them. For a neck of thickness t in
+a notch of radius R and a plate of width b, with t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant
+as beam theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the
+nodes of the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are
+constant, except in torsion, where the ratio continues to fall with (t / b)^2.
 """
 
 from enum import StrEnum
@@ -158,7 +159,7 @@ def _sway_ratio(t_over_r: float) -> float:
 
 @lru_cache(maxsize=1)
 def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpolator]:
-    """Curves over log(t / R): ratios that depend on b / t, plane stress to beam theory, blocks to planes."""
+    """Curves over log(t / R) of three ratios: by b / t, plane stress over beam theory, blocks over planes."""
     table = np.array(_BRICKS_OVER_BEAM)
     shares = (1.0 - table / table[:, :1, :]) / _POISSON**2
     mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
@@ -210,7 +211,7 @@ def blocks_over_planes(notch: Notch) -> Array:
 
 
 def hinge_ratio(notch: Notch, material: Material, theory: HingeTheory) -> Array:
-    """Ratio of the compliance of a notch in a body to that by beam theory, shape (6,); ones for `BEAM`."""
+    """Ratio of the compliance of a notch in a body to that by beam theory, shape (6,); all ratios are 1 for `BEAM`."""
     if theory is HingeTheory.BEAM:
         return np.ones(6)
     ratio = planes_ratio(notch, material) * blocks_over_planes(notch)

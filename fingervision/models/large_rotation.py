@@ -132,7 +132,7 @@ def _next(tangent: _Tangent, input_mm: float, path: list[Equilibrium]) -> Equili
 
 
 def _followed(tangent: _Tangent, input_mm: float, last: Equilibrium, parts: int) -> Equilibrium:
-    """Follow the equilibria from the last one to an input in equal steps, each predicted by the tangent."""
+    """Follow the equilibria from the last equilibrium to an input in equal steps, each predicted by the tangent."""
     state = last
     for at_mm in np.linspace(last.input_mm, input_mm, parts + 1)[1:].tolist():
         state = _settled(tangent, at_mm, *tangent.ahead(state, at_mm))
@@ -192,7 +192,7 @@ def _predicted(body: DrivenBody, input_mm: float, path: list[Equilibrium]) -> Ar
 def large_path(
     body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False, least: int = 3
 ) -> list[Equilibrium]:
-    """Follow the equilibria from a given one, or from rest, to an input, in steps of at most half a millimetre.
+    """Follow the equilibria from a given equilibrium, or from rest, to an input, in steps of at most 0.5 mm.
 
     `least` is the least number of steps: three for a curve through the equilibria, one if only the last equilibrium is
     needed.

@@ -140,7 +140,7 @@ class LumpedGripper:
 
     @property
     def _errors(self) -> tuple[float, float, float, float]:
-        """Relative model errors of slope, force, modes and grip; with beam theory those of a finger made of bars."""
+        """Relative model errors of slope, force, modes and grip; larger with beam theory (finger made of bars)."""
         if not isinstance(self.frame, JoinedFrame):
             return _SLOPE_OF_BARS, _FORCE_OF_BARS, _MODE_OF_BARS, _GRIP_OF_BARS
         force = _FORCE_ERROR + 2.0 * force_uncertainty(self.gripper.material)

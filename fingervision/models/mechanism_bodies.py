@@ -135,8 +135,8 @@ def column_name(name: str) -> str:
 def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
     """Name every piece by the first named shape that contains more than half of the piece's area.
 
-    A piece without such a shape takes the name of a shape that has no larger part in another piece, such as a bar that
-    a notch divides in two. All other pieces are numbered.
+    A piece of which no shape covers more than half takes the name of a shape that has no larger part in another piece,
+    such as a bar that a notch divides in two. All other pieces are numbered.
     """
     names: dict[int, str] = {}
     halved: dict[int, str] = {}

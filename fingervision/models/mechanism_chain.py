@@ -2,8 +2,9 @@
 
 The model applies equations (5) to (15) of Hricko & Havlik (2015), in the plane, to any chain from a fixed body to the
 driven one: the compliance at the drive is C = sum T C_i T', where T transforms the compliance C_i of flexure i to the
-drive. The stiffness is its inverse in the directions that the drive and its guides constrain. Several drives act as
-loads at several bodies of a tree of bodies. For a closed loop of bodies no such sum exists, and the drawing is refused.
+drive. The stiffness is the inverse of the compliance in the directions that the drive and its guides constrain. Several
+drives act as loads at several bodies of a tree of bodies. A drawing with a closed loop of bodies is refused, because
+the sum exists only for chains and trees.
 """
 
 from dataclasses import replace
@@ -131,7 +132,7 @@ class MechanismChain:
         return reached[driven]
 
     def _support(self, bodies: list[int]) -> None:
-        """Find the motions (x, y, rotation) that drives and guides fix, and the loads there per 1 mm of each drive."""
+        """Find the motions (x, y, rotation) fixed by drives and guides, and reaction loads per 1 mm of each drive."""
         mechanism = self.mechanism
         drives = mechanism.drives
         held = [self._held_by(drive.face, driven_components(drive)) for drive in drives]
@@ -159,7 +160,7 @@ class MechanismChain:
         self._load = self._by_drive @ per_input_of(mechanism)
 
     def _held_by(self, face: Face, components: tuple[str, ...]) -> set[int]:
-        """Motions (0 x, 1 y, 2 rotation) of a body that a face fixes; rotation if the face is wide across one."""
+        """Motions (0 x, 1 y, 2 rotation) of a body that a face fixes; rotation only if the face is wide enough."""
         x0, x1, y0, y1 = face.box_mm
         wide = {"x": y1 - y0, "y": x1 - x0}
         turns = {2} if any(wide[component] > _ON * self._size_mm for component in components) else set()
@@ -238,7 +239,7 @@ class MechanismChain:
         return self._seen(input_mm, input_mm * self._load, per_input_of(self.mechanism))
 
     def drive_states(self) -> tuple[MechanismState, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        """Small displacements per 1 mm of one driven face after another, with all other driven faces at rest."""
         alone = np.eye(len(self.mechanism.drives))
         return tuple(self._seen(1.0, load, own) for load, own in zip(self._by_drive.T, alone, strict=True))
 

@@ -125,7 +125,7 @@ class DrivenMechanism:
 
     @cached_property
     def unit_by_drive(self) -> Array:
-        """Small displacements per 1 mm of one driven face after another, the others at rest, shape (unknowns, drives).
+        """Small displacements per 1 mm of each driven face, other faces at rest; shape (unknowns, drives).
 
         Raises
         ------
@@ -153,7 +153,7 @@ class DrivenMechanism:
         return float(moved @ (self.stiffness_n_mm @ moved))
 
     def by_one_drive(self) -> tuple[MechanismEquilibrium, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest, without contact."""
+        """Small displacements per 1 mm of each driven face, with the other driven faces at rest, without contact."""
         pairs = zip(self.unit_by_drive.T, self.drive_stiffness_n_mm.T, strict=True)
         return tuple(
             MechanismEquilibrium(moved, float(forces[i]), forces, ()) for i, (moved, forces) in enumerate(pairs)

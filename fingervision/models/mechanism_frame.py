@@ -1,6 +1,6 @@
 """A planar mechanism of lumped flexures between elastic bodies: any topology, loops included.
 
-This is the lumped model of Hricko & Havlik (2015), extended to any drawing. Flexures are chains of beam segments,
+The model is the lumped model of Hricko & Havlik (2015), extended to any drawing. Flexures are chains of beam segments,
 corrected by the hinge tables; the bodies that they join are cut from the drawing and condensed to a few coordinate
 frames (`condensed_bodies`). Flexures and bodies may rotate by any angle.
 """
@@ -207,7 +207,7 @@ class MechanismFrame:
 
     @cached_property
     def _errors(self) -> tuple[float, float]:
-        """Relative errors of force and stress: those of flexures in bending, larger for other loads on flexures."""
+        """Relative errors of force and stress: as for flexures in bending, and larger for other loads on flexures."""
         loads, plate_mm = self._end_loads(self.driven.unit_displacement, large=False), self.mechanism.plate_mm
         misused, every, stress = 0.0, 0.0, 0.0
         for span, own in zip(self.spans, self.segments, strict=True):
@@ -244,7 +244,7 @@ class MechanismFrame:
         return self._seen(input_mm, found, large_rotation=large_rotation)
 
     def drive_states(self) -> tuple[MechanismState, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        """Small displacements per 1 mm of one driven face after another, with all other driven faces at rest."""
         return tuple(self._seen(1.0, found, large_rotation=False) for found in self.driven.by_one_drive())
 
     def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:

@@ -1,7 +1,7 @@
 """Effects of weight, temperature and a part between two probes on a mechanism, for small displacements.
 
-All effects are computed by finite elements. A frame of bars would give wrong results, because its bars end where their
-axes meet, unlike those of the drawing.
+The effects of weight, temperature and a gripped part are computed by finite elements. A frame of bars would give wrong
+results, because its bars end where their axes meet, unlike the bars of the drawing.
 """
 
 from dataclasses import dataclass
@@ -110,7 +110,7 @@ class GrippedPair:
 
     @property
     def mechanical_advantage(self) -> float:
-        """Gripping force on a rigid part per force at the drive, after first touch; the rest of it bends the flexures.
+        """Gripping force on a rigid part per drive force, after first touch; the remaining drive force bends flexures.
 
         By Betti's theorem, the gripping force N acts on the drive with N times the motion of the pair per unit of
         input.

@@ -186,7 +186,7 @@ class MechanismPlate:
         return self._seen(input_mm, found, large_rotation=large_rotation)
 
     def drive_states(self) -> tuple[MechanismState, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        """Small displacements per 1 mm of one driven face after another, with all other driven faces at rest."""
         return tuple(self._seen(1.0, found, large_rotation=False) for found in self.driven.by_one_drive())
 
     def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:

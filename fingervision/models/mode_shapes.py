@@ -58,7 +58,7 @@ class ModeShape:
 
 
 class MovingMechanism(Protocol):
-    """Protocol of a mechanism drawn by bodies whose vibration can be computed, because it has masses."""
+    """Protocol of a mechanism, described by its bodies, whose vibration can be computed because it has masses."""
 
     def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
         """First natural modes in the plane: angular frequencies (rad/s), and mode shapes by column."""
@@ -128,7 +128,7 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
 
 
 def mechanism_mode_shapes(model: MovingMechanism, wanted: ModesWanted) -> list[ModeShape]:
-    """Modes of a mechanism drawn by bodies, with the drive free or fixed."""
+    """Modes of a mechanism that is described by its bodies, with the drive free or fixed."""
     lines, points = model.mode_lines()
     found = []
     for family, held in (("drive free", False), ("drive held", True)):

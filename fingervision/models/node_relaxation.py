@@ -1,7 +1,7 @@
 """Place the nodes inside a body: seeded by the size field, moved by forces along the edges, settled at circumcentres.
 
 Sources: Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329; Alliez et al., Variational
-tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane.
+tetrahedral meshing, ACM Transactions on Graphics 24 (2005) 617, in the plane.
 """
 
 import numpy as np

@@ -82,7 +82,7 @@ class Curve:
     def level(self, points: Array) -> Array:
         """Signed distance of points from the extended curve (line or whole ellipse), zero on the curve; shape (n,).
 
-        For a line this is the distance in mm; for an ellipse, the squared relative radius minus 1.
+        For a line, the value is the distance in mm; for an ellipse, it is the squared relative radius minus 1.
         """
         apart = points - self.origin[:, None]
         if self.v is None:

@@ -146,7 +146,7 @@ def _figures(model: LumpedGripper) -> dict[str, float]:
 def mechanism_sweep_answers(
     redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
 ) -> tuple[Array, tuple[str, ...], Array]:
-    """Compute the responses for every combination of the varied dimensions of a mechanism drawn by bodies.
+    """Compute the responses for every combination of the varied dimensions of a mechanism.
 
     Parameters
     ----------

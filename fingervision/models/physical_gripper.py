@@ -1,4 +1,4 @@
-"""A drawn gripper for the diagnosis: its small-displacement response, and the laws for effects of the catalogue.
+"""A drawn gripper for the diagnosis: its small-displacement response, and its own formulas for effects.
 
 Expensive parts (large rotation, contact, changed links) are computed once and interpolated, so that a search may
 evaluate them thousands of times.
@@ -65,7 +65,7 @@ class PhysicalGripper:
 
     @cached_property
     def laws(self) -> Mapping[str, PhysicalLaw]:
-        """Laws of the catalogue's effects that this drawing determines, by the name of the effect."""
+        """Formulas for those effects of the catalogue that the drawing determines, by the name of the effect."""
         body = getattr(self._model, "half", None)
         if not isinstance(
             body, DrivenBody
@@ -87,7 +87,7 @@ class PhysicalGripper:
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may change them within it."""
+        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may change them."""
         return {
             name: Estimate(attrgetter(name)(self.gripper), u)
             for name, u in self.gripper.uncertainties.items()

@@ -104,7 +104,7 @@ class PlaceAnswers:
         return (*bodies, *hinges, *probes, *(f"{name}_mm" for name in self.mechanism.pairs), "force_n")
 
     def _make_observers(self) -> None:
-        """Express the outputs as linear functionals of the frames' motions; hinge angles are derived from these."""
+        """Express the outputs as linear functionals of the frames' motions; hinge angles from body rotations."""
         model, plate = self.model, self.model.plate
         self._weights = body_weights(plate, model.bodies)
         size = model.frame.unknowns
@@ -168,8 +168,8 @@ class PlaceAnswers:
     def by_edges(self) -> Array:
         """Extra change of each channel per 1 mm of input if the poses are measured from edges, shape (channels,).
 
-        If a body bends, the mean motion of its outline differs from that of its area. In a picture only the edges are
-        seen: their pose is the rigid motion nearest to the displacements of the edges along their normals.
+        If a body bends, the mean motion of its outline differs from that of its area. A picture shows only the edges of
+        a body: the pose of the edges is the rigid motion nearest to their displacements along their normals.
         """
         model, plate = self.model, self.model.plate
         moved = model.driven.equilibrium(1.0, large_rotation=False, contact=False).displacement

@@ -149,7 +149,7 @@ class PlaneStressPlate:
         return csr_matrix(skfem.BilinearForm(inertia).assemble(self._basis))
 
     def internal_force_n(self, displacement_mm: Array) -> tuple[csr_matrix, Array]:
-        """Tangent stiffness and nodal forces of the deformed plate (total Lagrangian, St. Venant-Kirchhoff).
+        """Tangent stiffness and nodal forces of the deformed plate (total Lagrangian, Saint Venant-Kirchhoff).
 
         Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, chapters 6 and 9.
         """

@@ -1,16 +1,21 @@
 """Stiffness-matrix model of the gripper: equations (5) to (15) of Hricko & Havlik (2015) in six dimensions, corrected.
 
-Corrections of the published equations, each with its reason:
+The published equations are corrected for these reasons:
 
-* Equation (6) transforms six components, but equation (3) is a planar compliance with three components; here all
-  compliances are 6 by 6.
-* Equation (10) uses 135.15 degrees and equation (13) 135 degrees for the same angle; here the angles come from the
-  drawing.
-* Equation (12) uses T_12, which the paper does not define; T_12 must transfer the compliance from O1 to O2, as T_O2
+* Equation (6) of the paper transforms six components, but its equation (3) is a planar compliance with three
+  components; in this module,
+  all compliances are 6 by 6.
+* Equation (10) of the paper uses 135.15 degrees and equation (13) 135 degrees for the same angle; in this module, the
+  angles come
+  from the drawing.
+* Equation (12) of the paper uses T_12, which is not defined there; T_12 must transfer the compliance from O1 to O2, as
+  T_O2
   does.
-* Equation (14) has C_2A on both sides; on the right-hand side it must be C_12.
-* Equation (15), K = 2 C^-1, gives the stiffness along the drive only if the shuttle cannot move sideways or rotate. The
-  other half prevents these motions, so that the stiffness is 2 (C^-1)_yy; for a free shuttle it would be 2 / C_yy.
+* Equation (14) of the paper has C_2A on both sides; on the right-hand side it must be C_12.
+* Equation (15) of the paper, K = 2 C^-1, gives the stiffness along the drive only if the shuttle cannot move sideways
+  or rotate. The
+  other half of the gripper prevents these motions of the shuttle, so that the stiffness is 2 (C^-1)_yy; for a free
+  shuttle, the stiffness would be 2 / C_yy.
 
 The links are elastic too, as Timoshenko bars; `rigid_links` gives the published model with elastic hinges only, which
 for the published gripper has a 0.9 % larger slope and about 10 % more force.
@@ -85,14 +90,14 @@ class StiffnessMatrixGripper:
 
     @cached_property
     def drive_compliance(self) -> Array:
-        """Compliance C_2A of one half at O_A, equation (14), shape (6, 6)."""
+        """Compliance C_2A of one half at the drive point O_A: equation (14) of Hricko & Havlik (2015), (6, 6)."""
         return self._chain.flexibility(self.skeleton.drive, self.skeleton.drive)
 
     @cached_property
     def drive_stiffness(self) -> Array:
-        """Stiffness K_2A of both halves at O_A with every direction fixed, equation (15), shape (6, 6).
+        """Stiffness K_2A of both halves at the drive point: equation (15) of Hricko & Havlik (2015), shape (6, 6).
 
-        Entries that change sign under reflection cancel between the halves.
+        Every direction is fixed. Entries that change sign under reflection cancel between the halves.
         """
         mirror = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
         half = np.linalg.inv(self.drive_compliance)

@@ -1,9 +1,9 @@
-"""Load on a leaf or straight neck: bent by ends that rotate against each other, by ends that sway, or stretched.
+"""Load on a leaf or straight neck: bending with ends that rotate against each other or that sway, and stretching.
 
-The plate's width restrains these three deformations differently (`strip_width`). The strain energies of a bar follow
-from the rotations of its ends, the rotation of its chord and its elongation (Timoshenko, Strength of Materials): each
-is E I / (2 L) times a square, see `used_in_plate`. Only the fractions of these energies are needed, and restraint of
-the bar hardly changes them.
+The plate's width restrains rotation of the ends, sway and stretching differently (`strip_width`). The strain energies
+of a bar follow from the rotations of its ends, the rotation of its chord and its elongation (Timoshenko, Strength of
+Materials): each is E I / (2 L) times a square, see `used_in_plate`. The models need only the fractions of the three
+strain energies, and restraint of the bar hardly changes these fractions.
 """
 
 from dataclasses import replace

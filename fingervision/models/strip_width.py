@@ -1,9 +1,9 @@
 """Effect of its width on the bending stiffness of a flat strip: a plate with two clamped and two free sides.
 
 A bar in bending becomes narrower on the stretched side and wider on the compressed side, and so also curves across its
-length (anticlastic bending). The bodies at its ends prevent this over a length of about its width. The plate's energy
-(Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, article 22) is minimised by Ritz's method for a unit
-rotation of one end.
+length (anticlastic bending). The bodies at the ends of a strip prevent anticlastic bending over a length of about the
+strip's width. The plate's energy (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, article 22) is
+minimised by Ritz's method for a unit rotation of one end.
 """
 
 from functools import lru_cache
@@ -25,7 +25,7 @@ _DIGITS = 3
 
 
 def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]:
-    """Weight w of plane strain in a strip's bending, 0 if narrow and 1 if wide: E' = E / (1 - w nu^2).
+    """Weight w of plane strain in a strip's bending, 0 if narrow, 1 if wide; the modulus is E / (1 - w nu^2).
 
     Parameters
     ----------

@@ -160,7 +160,7 @@ class Registry(Generic[T]):
         return watched(who, origin, lambda: self._parts_of(held))
 
     def remove(self, name: str) -> None:
-        """Remove an added part; nothing happens if no such part was added."""
+        """Remove an added part; nothing happens if no part of that name was added."""
         self._added = [entry for entry in self._added if entry.name != name]
         self._version += 1
 

@@ -50,8 +50,8 @@ def within(seconds: float, act: Callable[[], T]) -> T:
     """Run a function in a separate thread under a time limit, and return the function's result.
 
     Code that still runs at its time limit is ended by an exception that is raised inside this code. Code that waits
-    inside a compiled function cannot be ended in this way; it continues in the background and does not prevent the
-    program from ending.
+    inside a compiled function cannot be ended by an exception; the code continues in the background, and does not
+    prevent the program from ending.
 
     Parameters
     ----------

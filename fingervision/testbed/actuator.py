@@ -51,7 +51,7 @@ class Alarm:
 class MoveCheck(Protocol):
     """Limits of an actuator as stated in its configuration: sufficient to check a plan without opening the test bed.
 
-    A kind of actuator whose `build` opens hardware provides such an object by `without_hardware(section, folder)`.
+    A kind of actuator whose `build` opens hardware returns a `MoveCheck` from `without_hardware(section, folder)`.
     """
 
     @property
@@ -113,7 +113,7 @@ class Actuator(MoveCheck, Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop at once, from any thread, whatever command is executed; never raises while the connection lasts."""
+        """Stop at once, from any thread, during any command; no exception is raised as long as the connection lasts."""
         ...
 
     def readings(self) -> tuple[Reading, ...]:

@@ -38,7 +38,7 @@ class Kind(Protocol):
 
 
 class PluggedKind:
-    """A kind of device from outside the package: its device is checked, and its exceptions become sentences.
+    """A kind of device from outside the package: its device is checked, and exceptions become errors of one sentence.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ def _check_readings(readings: Any, who: str, origin: Origin) -> None:
 
 
 class _Guarded:
-    """A proxy of a device that turns its exceptions into errors that name it."""
+    """A proxy of a device that turns exceptions of the device into errors that name the device."""
 
     def __init__(self, device: Any, who: str, origin: Origin) -> None:
         self._device, self._who, self._origin = device, who, origin

@@ -15,9 +15,9 @@ LOOK_EVERY_S = 0.2
 class Terminal:
     """Keyboard and screen of the person at the test bed.
 
-    If two parts of the program read from the keyboard, each would take lines that are meant for the other. Therefore
-    all lines are read here: a line is the response to a question if one was asked, and otherwise a command of a single
-    letter.
+    If two parts of the program read from the keyboard, each part would take lines that are meant for the other part.
+    Therefore the terminal reads all lines: a line is the response to a question if one was asked, and otherwise a
+    command of a single letter.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def bench() -> History:
 
 
 def neutral_values(effect: Effect, history: History) -> dict[str, float]:
-    """Parameter values at which the effect must change nothing; parameters of shape get their starting values."""
+    """Parameter values at which the effect must change nothing; shape parameters get their starting values."""
     return {
         p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) if p.neutral is None else p.neutral
         for p in _searched(effect, history)

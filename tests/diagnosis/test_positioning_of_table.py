@@ -92,7 +92,7 @@ def test_a_gripper_is_compared_with_its_model() -> None:
     assert found.after.value_mm("E") == pytest.approx(0.0, abs=1e-12)
     document = positioning_document(found)
     assert document["reference"] == "model"
-    assert "not of the axis alone" in document["notes"][0]
+    assert "not the axis alone" in document["notes"][0]
     assert "as play causes them" in positioning_words(found)[0]
 
 

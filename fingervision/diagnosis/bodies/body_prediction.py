@@ -68,7 +68,7 @@ class BodyPrediction:
     def bent(self) -> Array:
         """Change of the prediction if equilibrium is computed in the deformed shape, shape (n, channels).
 
-        The change is interpolated by a polynomial of order 2 to 4 in the input.
+        The change by large rotation is interpolated by a polynomial of order 2 to 4 in the input.
         """
         model, names = self.answers.model, self.answers.channels
         reach = float(np.abs(self.input_mm).max())
@@ -134,11 +134,11 @@ class BodyPrediction:
 def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float) -> Array:
     """Displacement of a pin in a pivot with play, along x and y, without friction; shape (n, 2).
 
-    The pin takes the position in its hole with the least elastic energy: with the force F on it per unit of input u,
-    and the stiffness S against a displacement s, the energy s S s / 2 - u F s is minimised over the disc of half the
+    The pin takes the position in its hole with the least elastic energy: with the force F on the pin per unit of input
+    u, and the stiffness S against a displacement s, the energy s S s / 2 - u F s is minimised over the disc of half the
     play (a trust-region problem: More and Sorensen (1983), SIAM Journal on Scientific and Statistical Computing 4, 553,
-    DOI 10.1137/0904038). Near zero load the pin follows the load; under larger loads it lies against the hole, on the
-    side to which the load points.
+    DOI 10.1137/0904038). Near zero load the pin follows the load; under larger loads the pin lies against the hole, on
+    the side to which the load points.
 
     Parameters
     ----------

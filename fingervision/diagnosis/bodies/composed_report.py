@@ -44,7 +44,7 @@ def measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
 def composed(
     first: "Diagnosis", second: "Diagnosis", evidence: BodyEvidence, answers: PlaceAnswers, notes: tuple[str, ...]
 ) -> "Diagnosis":
-    """Combine the diagnosis from the poses and that from the gap into one report."""
+    """Combine the diagnosis from poses and the diagnosis from the gap into one report."""
     members, rest = evidence.findings.members, second.report
     best = members[0]
     keys = list(dict.fromkeys(member.candidate.key for member in members))

@@ -46,10 +46,10 @@ class NextView:
 
 
 def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
-    """Choose the view that best separates the members of an ambiguity set; None if no view separates any.
+    """Choose the view that best separates the members of an ambiguity set; None if no view separates them.
 
     The criterion is the squared whitened distance that a view adds between the best explanation and every other one.
-    The size of the other explanation is refitted to the view and the measured data together, with free constants
+    The size of each other explanation is refitted to the view and the measured data together, with free constants
     (T-optimality: Atkinson and Fedorov (1975), Biometrika 62, 57, DOI 10.1093/biomet/62.1.57).
 
     Parameters
@@ -94,7 +94,7 @@ def _distinct(members: Sequence[Fitted]) -> list[Fitted]:
 
 
 def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
-    """Whitened distance of two explanations in the measured data plus the new view, with the second refitted."""
+    """Whitened distance of two explanations in measured data plus new view, with the second explanation refitted."""
     norm = float(other.signature @ other.signature + two @ two)
     shared = float(best.signature @ other.signature + one @ two)
     total = float(best.signature @ best.signature + one @ one)

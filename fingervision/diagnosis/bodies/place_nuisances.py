@@ -1,4 +1,4 @@
-"""Nuisance parameters beside a faulty place: constants, rotations, bends, and errors of the drawing's own model."""
+"""Nuisance parameters in addition to a faulty place: constants, rotations, bends, and errors of the drawing's model."""
 
 from collections.abc import Sequence
 
@@ -120,9 +120,10 @@ class PlaceNuisances:
     def unknown_part(self, rows: Array) -> Array:
         """Fit of the nuisance parameters to a residual; returns the part of constants, rotation and bend only.
 
-        The result has shape (n, channels).
+        The returned array has shape (n, channels).
 
-        Possible model errors are fitted too, but stay in the residual, because they may be the sought disagreement.
+        Possible model errors are fitted too, but stay in the residual, because they may be the disagreement to be
+        found.
         """
         padded = np.concatenate([self._noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
         shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit

@@ -184,7 +184,7 @@ class PlaceSearch:
         )
 
     def _alike(self, best: Fitted, other: Fitted) -> bool:
-        """Whether these data cannot distinguish two given explanations."""
+        """Whether two given explanations are indistinguishable in the data."""
         if best.gain - other.gain < NOT_REFUTED:
             return True
         return other.gain > best.gain / 3.0 and min(apart(best, other), apart(other, best)) < ALIKE

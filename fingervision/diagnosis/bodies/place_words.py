@@ -42,7 +42,7 @@ def fitted_words(fitted: Fitted) -> str:
 
 
 def set_words(members: Sequence[Fitted]) -> str:
-    """Sentence with the result: one place, or the set of places that these data cannot distinguish."""
+    """Sentence with the result: one place, or the set of places that the data cannot distinguish."""
     keys = list(dict.fromkeys(member.candidate.key for member in members))
     if len(keys) == 1:
         return fitted_words(members[0])

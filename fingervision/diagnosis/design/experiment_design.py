@@ -88,7 +88,7 @@ class RunPlan:
     def uneven(self) -> float:
         """Largest ratio between the two gains of a pair (the first or the second explanation being true).
 
-        The larger this ratio is, the wider is the interval of the predicted gain.
+        The larger the ratio of the two gains is, the wider is the interval of the predicted gain.
         """
         ahead, back = (np.maximum(g, 1.0) for g in (self.gains[0, 1 : self.gains.shape[0]], self.gains[1:, 0]))
         return float(np.max(np.maximum(ahead / back, back / ahead), initial=1.0))
@@ -105,7 +105,7 @@ class RunPlan:
         return sorted(found, key=lambda pair: self.apart(*pair))
 
     def worst(self, floor: float) -> float:
-        """Smallest gain among those that are at least `floor`; 0 if there is none."""
+        """Smallest gain among the gains that are at least `floor`; 0 if there is none."""
         settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
         return float(settled.min()) if settled.size else 0.0
 
@@ -157,8 +157,8 @@ class RunChoice:
     def least(self, run: RunPlan) -> tuple[float, tuple[int, int]] | None:
         """The separated pair of explanations with the smallest gain, and this gain; None if no pair is separated.
 
-        Pairs that are separated within the new run come first; a difference in offset between the new run and the old
-        data could also be due to re-zeroing the stage.
+        Pairs of explanations that are separated within the new run come first; a difference in offset between the new
+        run and the old data could also be due to re-zeroing the stage.
         """
         second = AugmentedDataset.of(self.data, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
         found = [(self.shown(run, second, *pair), pair) for pair in run.pairs()[:COMPARED]]

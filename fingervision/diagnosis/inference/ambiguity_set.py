@@ -98,11 +98,11 @@ def _net(nothing: Explanation, explanation: Explanation) -> float:
 
 
 def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
-    """Whether the best explanation may fit better only because its richer formula includes the other's prediction.
+    """Whether the best explanation may fit better only because its richer formula includes the other explanation.
 
     An example is a delay and a well-damped resonance, both of which round corners: the formula of a delay is inexact
-    where the stage reverses between two samples. A difference of this size is attributed to the inexact formula; a
-    larger difference is evidence for the richer formula.
+    where the stage reverses between two samples. A difference in chi-square that the inexactness of formulas can cause
+    is attributed to it; a larger difference is evidence for the richer formula.
     """
     worse = other.score - best.score
     return (
@@ -116,15 +116,15 @@ def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, oth
 def _least_refuted(distance: float) -> float:
     """Difference in chi-square above which an explanation counts as refuted in favour of another.
 
-    If an explanation is true, the other's chi-square is larger by `distance` on average, with a standard deviation of 2
-    sqrt(distance) (Cox 1961). Two explanations that such data could distinguish are both kept if the present data
-    favour neither.
+    If an explanation is true, the chi-square of the other explanation is larger by `distance` on average, with a
+    standard deviation of 2 sqrt(distance) (Cox 1961). Two explanations are both kept if the present data favour
+    neither, even if data of this kind could distinguish them.
     """
     return -distance + SURELY * 2.0 * float(np.sqrt(max(0.0, distance))) + SPARE
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
-    """Fit one explanation to another's prediction; its score is D_jk, the squared whitened distance that remains.
+    """Fit one explanation to another's prediction; the score is the squared whitened distance that remains.
 
     In both directions the run offsets have the spread found for the best explanation, because a worse explanation would
     hide its misfit in a larger spread.
@@ -136,8 +136,8 @@ def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_m
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
     """Drop explanations that only imitate an effect that the drawing predicts and that is found as predicted.
 
-    Without this effect, the agreement with the drawing's prediction would be a coincidence. For example, an end stop at
-    exactly the input at which the drawn fingers meet is the contact of these fingers.
+    Otherwise, the agreement of the fitted effect with the drawing's prediction would be a coincidence. For example, an
+    apparent end stop at exactly the input at which the fingers meet in the drawing is the contact of the fingers.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:

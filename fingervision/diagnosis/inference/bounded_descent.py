@@ -119,8 +119,9 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
 def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Array:
     """Minimise a quadratic form within bounds, to the accuracy that a search step needs.
 
-    A parameter that would exceed its bound is fixed at the bound, and the other parameters are solved for again. If
-    that parameter were only clipped, the other parameters would keep values that belong to a step that is not taken.
+    A parameter that would exceed its bound is fixed at the bound, and the other parameters are solved for again. If the
+    parameter at its bound were only clipped, the other parameters would keep values that belong to a step that is not
+    taken.
 
     Parameters
     ----------
@@ -164,7 +165,8 @@ def _free(x: Array, pull: Array, normal: Array, lower: Array, upper: Array) -> N
 def _in_own_units(normal: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Scale the free part of the normal matrix so that each parameter is in units of its own standard error.
 
-    Without scaling, a time constant in hours beside micrometres would make the matrix singular.
+    Without scaling, parameters as different as a time constant in hours and a play in micrometres would make the matrix
+    singular.
     """
     part = normal if free.all() else normal[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.maximum(np.diag(part), 1e-300))

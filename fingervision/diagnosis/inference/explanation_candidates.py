@@ -142,8 +142,8 @@ def extended(
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
     """Replace each effect of the best explanation by every other effect; remaining effects start at fitted values.
 
-    An effect that was fitted alone has absorbed the influence of both effects; its parameters are then so far from the
-    joint optimum that a joint search starting there would not find it.
+    An effect that was fitted alone has absorbed the influence of a second effect; its parameters are then so far from
+    the joint optimum that a joint search starting there would not find it.
     """
     if not pairs:
         return pairs
@@ -172,7 +172,7 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of the additional part of the larger explanation, as a share of its total change of the prediction."""
+    """Change of the prediction by the additional part of the larger explanation, as a share of the total change."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
     if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
@@ -206,10 +206,10 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
 def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explanation]) -> list[Explanation]:
     """Keep the explanations whose change of the prediction exceeds the error of the recorded input.
 
-    The explanations that are dropped only follow the rounding errors of an encoder. For example, a delay within one
-    step of an encoder gained 225 in chi-square in this way, and hid an offset beside a play that changed the prediction
-    by twenty times as much. If even the best explanation only follows the rounding errors, explanations with other
-    effects may do so as well: then only additions to the smaller explanation are kept.
+    Explanations with a smaller change are dropped, because they only follow the rounding errors of an encoder. For
+    example, a delay within one step of an encoder gained 225 in chi-square, and hid an offset and a play that changed
+    the prediction by twenty times as much. If even the best explanation only follows rounding errors of an encoder,
+    explanations with other effects may do so as well: only extensions of the smaller explanation are then kept.
     """
     beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
     if beyond[:1] == larger[:1]:
@@ -218,7 +218,7 @@ def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explan
 
 
 def without_roundings(problem: Problem, explanation: Explanation) -> Explanation:
-    """Drop effects without which the refitted rest predicts the same within the error of the recorded input.
+    """Drop effects without which the refitted other effects predict the same within the recorded input's error.
 
     For example, in addition to a play and an offset, a delay by a small part of an encoder step only follows rounding
     errors, whichever of the three effects was found first.

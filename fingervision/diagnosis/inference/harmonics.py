@@ -1,6 +1,6 @@
 """Harmonics of a named cyclic error: a real screw has harmonics that the catalogue's sine does not include.
 
-If the harmonics are small, they are attributed to the named effect.
+Small harmonics are attributed to the named cyclic error.
 """
 
 from dataclasses import dataclass

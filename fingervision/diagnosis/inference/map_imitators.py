@@ -1,7 +1,7 @@
 """Effects that a map of position errors can represent: functions of position alone, except a straight line.
 
-If a map is fitted too, no data can distinguish such an effect from the map, however large the effect is. Effects with
-reversal, memory or dependence on time can be distinguished from a map.
+If a map is fitted too, no data can distinguish an effect that is a function of position from the map, however large the
+effect is. Effects with reversal, memory or dependence on time can be distinguished from a map.
 """
 
 from dataclasses import replace
@@ -52,7 +52,8 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
 def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
     """Find effects of an explanation that act like a map at their fitted parameters.
 
-    An example is a cyclic error with a period of half the range, because a map can follow so smooth a curve.
+    An example of such an effect is a cyclic error with a period of half the range, because a map can follow a curve as
+    smooth as this one.
 
     Parameters
     ----------

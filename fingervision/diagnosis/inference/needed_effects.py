@@ -76,7 +76,7 @@ def with_simpler_parts(data: Observations, found: Findings) -> Findings:
 
 
 def _with_a_line(found: Findings) -> list[Explanation]:
-    """Explanations in which one curved effect of the best one is replaced by a straight line over the input."""
+    """Explanations in which a straight line over the input replaces one curved effect of the best explanation."""
     best, problem = found.best, found.problem
     curved = [n for n, s in zip(best.names, own_shapes(problem, best), strict=True) if not is_a_line(problem, s)]
     out = []

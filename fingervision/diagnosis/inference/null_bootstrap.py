@@ -42,8 +42,8 @@ def noise_doubt(problem: Problem) -> float:
 
     The power at zero frequency is proportional to (1 + rho) / (1 - rho), and an autoregression determines rho with
     standard uncertainty sqrt((1 - rho^2) / n): the relative uncertainty of the power is therefore 2 / sqrt((1 - rho^2)
-    n). If a spectrum is fitted without its lowest frequencies, the noise power there is less well determined
-    (`noise_by_spectrum`).
+    n). If a spectrum is fitted without its lowest frequencies, the noise power at the lowest frequencies is less well
+    determined (`noise_by_spectrum`).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
@@ -65,9 +65,10 @@ def linear_thresholds(
     """Significance threshold of each effect: the gain that its best signature seldom exceeds in noise alone.
 
     The signatures of one effect, one for each starting value of its parameters, form a family. The best of many
-    signatures gains more from noise than a single signature does; a common threshold for all families would be that of
-    the largest family. Therefore each family is compared with its own upper quantile, and the probability of an excess
-    in any family is limited: all families contribute equally to the false positives (Beran 1988).
+    signatures gains more from noise than a single signature does; a common threshold for all families would be
+    determined by the largest family. Therefore each family of signatures is compared with its own upper quantile, and
+    the probability that any family exceeds its quantile is limited: all families contribute equally to the false
+    positives (Beran 1988).
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
 
 
 def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
-    """Whether an explanation contains jumps at poorly known inputs, so that a misplaced jump shifts all later ones."""
+    """Whether an explanation contains jumps at poorly known inputs, so that a misplaced jump shifts all later jumps."""
     unsure = problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()
     return bool(unsure) and any(parameter.rugged for _, parameter in problem.parameters(names))
 
@@ -176,7 +177,7 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
 def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
     """Smallest gain required of the effects that are added to those of `base`.
 
-    This gain is infinite for an effect that run offsets can imitate completely.
+    The required gain is infinite for an effect that run offsets can imitate completely.
     """
     return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
 
@@ -193,10 +194,10 @@ def exceeds_noise(
     """Whether a gain above the thresholds is also larger than the largest gain that one more effect has in noise alone.
 
     The thresholds are computed with nonlinear parameters (such as a period, or the position of an end stop) on a grid.
-    A fit also finds values between the grid points, and therefore reduces chi-square further, even in noise. Each
-    simulated table is therefore fitted like the measurement: first with `base`, then with `base` and each of the most
-    promising effects. `suspects` are the effects, with parameters, that fit the measurement best; they are tried on
-    every simulated table.
+    A fit of the parameters also finds values between the grid points, and therefore reduces chi-square further, even in
+    noise. Each simulated table is therefore fitted like the measurement: first with `base`, then with `base` and each
+    of the most promising effects. `suspects` are the effects, with parameters, that fit the measurement best; they are
+    tried on every simulated table.
     """
     owner = np.array(atoms.names)
     asking = np.array([thresholds.get(name, np.inf) for name in atoms.names])

@@ -99,7 +99,7 @@ class PositionMap:
 
 
 def why_no_map(history: History, path: InputPath | None) -> str | None:
-    """Reason why these data cannot show a repeatable map; None if they can."""
+    """Reason why the data cannot show a repeatable map; None if they can."""
     history = history if path is None else path.history
     narrowed = EFFECT.search(history)
     if isinstance(narrowed, str):

@@ -35,7 +35,7 @@ JUMPS = 0.01
 class _Coordinates:
     """Coordinates of the sampler: reciprocals of radii and periods, logarithms of times, other parameters unchanged.
 
-    In these coordinates, a log likelihood with long, curved contours in the parameters is nearly parabolic.
+    In the sampler's coordinates, a log likelihood with long, curved contours in the parameters is nearly parabolic.
     """
 
     listed: tuple[tuple[str, Parameter], ...]
@@ -123,10 +123,10 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
     """Sample the posterior under flat priors within the bounds (Metropolis et al. 1953; Tierney 1994).
 
     The curvature at the best fit ignores bounds and non-parabolic likelihoods: a fraction estimated as zero is still
-    uncertain, and the prediction has no derivative by the size of a jump. Independent proposals from the curvature
-    alternate with local steps of several sizes, so that both kinds of posterior are explored. The spreads of the runs'
-    offsets, and noise levels within `noise_doubt`, are sampled too, so that the posterior has Student's tails (Box &
-    Tiao 1973).
+    uncertain, and the prediction has no derivative with respect to the size of a jump. Independent proposals from the
+    curvature alternate with local steps of several sizes, so that parabolic and irregular posteriors are both explored.
+    The spreads of the runs' offsets, and noise levels within `noise_doubt`, are sampled too, so that the posterior has
+    Student's tails (Box & Tiao 1973).
 
     Returns
     -------

@@ -31,11 +31,11 @@ Effected = TypeVar("Effected", bound=RunGains | PositionMap)
 
 
 def beside_gains(state: Searched, look: Look) -> Searched:
-    """Search with run-to-run gains included, and keep the result if it is much more probable.
+    """Search with gains that differ between runs, and keep the result if it is much more probable.
 
-    If a named effect changes the prediction more than the gains do, the gains are nuisance parameters; if there is no
-    such effect, they are structure without a name. If further effects are not much more probable than such gains, the
-    gains are kept, because naming an effect claims more than stating a scatter.
+    If a named effect changes the prediction more than the gains of the runs do, the gains are nuisance parameters. If
+    no named effect does, the gains are structure without a name. If further effects are not much more probable than
+    gains that differ between runs, the gains are kept, because naming an effect claims more than stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
@@ -170,7 +170,7 @@ def _line(problem: Problem) -> Explanation:
 
 
 def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """Add the columns of a random effect to those that are refitted for every explanation."""
+    """Add the columns of a random effect to the columns that are refitted for every explanation."""
     drawn = problem.whitener.drawing
     columns = effect.columns_mm if drawn is None else np.hstack([effect.columns_mm, drawn])
     return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=columns)))

@@ -1,7 +1,7 @@
 """Reference slots measured during a run: a camera error affects slot and gap, a gripper error only the gap.
 
 The gap alone cannot distinguish a wrong scale from a wrong lever ratio, nor an edge bias from a wrong rest gap; a
-measured slot of known width can.
+measured slot of known width can distinguish them.
 """
 
 from collections.abc import Mapping
@@ -76,7 +76,7 @@ def _surprise(data: Observations, explanation: Explanation, slot: ReferenceSlot)
 
 
 def _u_mm(data: Observations, explanation: Explanation, slot: ReferenceSlot) -> float:
-    """Standard uncertainty of the difference (mm): from the slot, its picture, and the explanation's parameters."""
+    """Standard uncertainty of measured minus predicted slot width (mm): from slot, picture and parameters."""
     values = {name: dict(given) for name, given in explanation.values.items()}
     listed = [(name, key) for name in explanation.names for key in values[name]]
     slopes = np.zeros(len(listed))

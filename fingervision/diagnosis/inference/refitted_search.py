@@ -61,7 +61,7 @@ def refitted_search(
     without: frozenset[str],
     progress: Progress,
 ) -> Refitted:
-    """Search with interpolation between samples, a position map, gains of runs, and refitted dimensions, in turn.
+    """Search; repeat it with curved interpolation, a position map, gains of runs, and refitted dimensions.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Gains that differ from run to run: a random effect on the ratio of gap to input, added to every explanation.
 
 For example, a part that is clamped again for each run, or a polymer at another temperature, moves by slightly more or
-less in each run. Like the runs' offsets, these gains are zero-mean random effects (Laird & Ware 1982,
+less in each run. Like the offsets of runs, the gains of runs are zero-mean random effects (Laird & Ware 1982,
 doi:10.2307/2529876), because their common mean is a ratio error, which is an effect of the catalogue.
 """
 

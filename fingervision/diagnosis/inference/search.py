@@ -56,7 +56,7 @@ def search(
     """Find the best explanation, the indistinguishable ones, and the remaining structure.
 
     The search fits one, then two, then three effects, tests for the verdict *unknown*, and collects the ambiguity set;
-    each of these functions returns a new state.
+    each step of the search returns a new state.
 
     Parameters
     ----------
@@ -124,9 +124,9 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
 def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:
     """Keep pairs of effects that change the prediction by more than the recorded input's error.
 
-    If the best pair is not among them, its effects only follow the rounding errors of an encoder. Another pair may
-    follow the same rounding errors with a larger amplitude, and is kept only if its effects gain significantly when
-    they are added to the best pair.
+    If the best pair changes the prediction by less, its effects only follow the rounding errors of an encoder. Another
+    pair may follow the same rounding errors with a larger amplitude, and is kept only if its effects gain significantly
+    when they are added to the best pair.
     """
     shown = beyond_the_input(state.problem, state.singles[0], pairs)
     if not shown or shown[0] is pairs[0]:
@@ -171,7 +171,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
 
 
 def _beyond_roundings(state: SearchState) -> SearchState:
-    """Drop effects that only follow the errors of the recorded input; explanations of the rest are the peers then."""
+    """Drop effects that only follow the errors of the recorded input; the remaining explanations are then the peers."""
     best = without_roundings(state.problem, state.best)
     if best is state.best:
         return state
@@ -235,7 +235,7 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     """Choose the best explanation that contains every effect that the user requires.
 
     The required effects are also added to the best explanation that was found without them, because an effect that is
-    small beside two others is in none of the pairs that fit.
+    much smaller than two other effects is in none of the pairs that fit.
     """
     problem = state.problem
     able = forced & set(problem.effects)

@@ -48,13 +48,13 @@ class Findings:
 
 
 def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -> bool:
-    """Whether the larger explanation removes nearly all of the smaller one's residual, as a true one does.
+    """Whether the larger explanation removes nearly all of the residual of the smaller one, as a true explanation does.
 
-    The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
-    added to the smaller explanation fits part of that inexactness, however large the residual is. If the larger
-    explanation has other effects instead, and leaves only noise, no more than the typical inexactness of formulas is
-    allowed for the smaller one. For example, a creep whose residual was 70 times the noise (3.6 % of what it explained)
-    imitated a ratio and an offset, which together leave only noise.
+    The residual of the smaller explanation must clearly exceed the noise and the inexactness of its formula. An effect
+    that is added to the smaller explanation fits part of the inexactness of its formula, however large the residual is.
+    If the larger explanation has other effects instead, and leaves only noise, no more than the typical inexactness of
+    formulas is allowed for the smaller explanation. For example, a creep whose residual was 70 times the noise (3.6 %
+    of the explained change) imitated a ratio and an offset, which together leave only noise.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows
@@ -111,10 +111,11 @@ class SearchState:
         return max(2, int(self.problem.measured.size))
 
     def with_known(self, found: list[Explanation], count: int) -> list[Explanation]:
-        """Add what an earlier search found, if it has so many effects, refitted beside the present noise; best first.
+        """Add the explanation of an earlier search, refitted with the present noise, if it has `count` effects.
 
-        Beside a smaller noise the valleys are narrower, and a search from signatures may miss the one found before: a
-        delay and a limit of speed that left noise alone gave way to a resonance that left ten times as much.
+        With a smaller noise, minima of chi-square are narrower, and a search from signatures may miss the minimum that
+        was found before. For example, a delay with a speed limit that left only noise was replaced by a resonance that
+        left ten times as much.
         """
         known = self.known
         if known is None or len(known.names) != count or not set(known.names) <= set(self.problem.effects):
@@ -130,7 +131,7 @@ class SearchState:
 
 
 def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> SearchState:
-    """Estimate the noise from the residual of the known effects, or of those from a rough first search."""
+    """Estimate the noise from the residual of the known effects, or of effects from a rough first search."""
     if known is not None:
         problem = problem_beside(known)
         nothing = problem.nothing()

@@ -59,8 +59,8 @@ class Look:
 def _noise_is_too_large(found: Findings) -> bool:
     """Whether the result leaves a residual far smaller than the noise by which it was judged.
 
-    The noise is estimated from the residual of a rough first fit. If that first fit is poor, its errors count as
-    correlated noise, and with so large a noise a second effect is never found.
+    The noise is estimated from the residual of a rough first fit. If the first fit is poor, its errors count as
+    correlated noise, and a second effect cannot be found because the assumed noise is too large.
     """
     rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
     return bool(found.best.score < rows - QUIET * rows**0.5)

@@ -63,8 +63,8 @@ class Evidence:
     def _averages(self, one: Explanation, base: Explanation) -> bool:
         """Whether an explanation may gain only because it averages the errors of the recorded input.
 
-        An effect with memory whose change is smaller than these errors does so. In noise alone, a lag by a sixth of a
-        sample gained 120 in chi-square, ten times its linear threshold.
+        An effect with memory averages errors of the recorded input if its change is smaller than these errors. In noise
+        alone, a lag by a sixth of a sample gained 120 in chi-square, ten times its linear threshold.
         """
         if not (self.problem.whitener.passing_mm.any() or self.problem.whitener.input_mm.any()):
             return False

@@ -159,7 +159,7 @@ def isolated(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags
 
 
 def _leans(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
-    """Mark the rows set aside as gross errors that are the peak of something wider, and so part of the disagreement.
+    """Mark the rows set aside as gross errors that are the peak of a wider deviation, and so part of the disagreement.
 
     A gross error is isolated. Next to the peak of a wider deviation, the nearest row that was kept deviates in the same
     direction by more than half as much.
@@ -179,7 +179,8 @@ def _leans(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
     """Subtract each run's deviation from the mean of all runs; a significant offset shared by all runs remains.
 
-    The mean is not significant if random zeroing of the runs, judged by their scatter, would cause as large a mean.
+    A mean offset is not significant if random zeroing of the runs, judged by their scatter, would cause a mean as
+    large.
     """
     means = np.array([values[run].mean() for run in runs])
     common = float(means.mean())

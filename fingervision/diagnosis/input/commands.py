@@ -26,8 +26,8 @@ limit between them."""
 def is_commanded(input_mm: Array, runs: tuple[slice, ...], gap_of_input: Array, gap_mm: Array) -> bool:
     """Whether the input is a command, which stays constant until it jumps.
 
-    The record of a coarse encoder also stays constant and jumps while the stage moves slowly. In that case the gap
-    moves while the record is constant; for a command, the gap is constant too.
+    The record of a coarse encoder also stays constant and jumps while the stage moves slowly. While an encoder's record
+    is constant, the gap moves; while a command is constant, the gap is constant too.
 
     Parameters
     ----------

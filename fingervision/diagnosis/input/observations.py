@@ -190,7 +190,7 @@ class Observations:
     def with_overshoots(self) -> "Observations":
         """Return the observations with an overshoot wherever two readings at one target indicate a reversal.
 
-        Without such pairs of readings, the observations are returned unchanged.
+        Without two readings at one target, the observations are returned unchanged.
         """
         if not turning_readings(self.table).size:
             return self
@@ -214,7 +214,7 @@ class Observations:
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
     def driven_again(self, explanation: Explanation, noise_mm: float) -> "Observations | None":
-        """Recompute a dynamic model along the path that the input takes after an explanation's drive effects.
+        """Recompute a dynamic model along the path of the input after an explanation's drive effects.
 
         The function returns None if the recomputed model does not differ significantly.
         """
@@ -225,14 +225,14 @@ class Observations:
         return replace(self, chain=chain) if float(np.sqrt(np.mean(changed**2))) > OF_NOISE * noise_mm else None
 
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
-        """Whether a prediction linearised at other dimensions agrees with this prediction within the noise."""
+        """Whether a prediction linearised at other dimensions agrees with the present prediction within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
         bent -= drawn.refit.columns @ np.subtract([*self.refit.moved.values()], [*drawn.refit.moved.values()])
         missed = problem.whitener.one(bent)
         return float(missed @ missed) < BENT
 
     def refitted(self) -> tuple[str, ...]:
-        """Sentences that say which dimensions of the drawing were refitted, and to which values."""
+        """Sentences on the dimensions of the drawing that were refitted, with their values."""
         drawn = self.model.base
         if not isinstance(drawn, PhysicalModel):
             return ()

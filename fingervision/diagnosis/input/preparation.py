@@ -86,7 +86,7 @@ def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None
 
 
 def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:
-    """Collect what effects may use: input, times and runs."""
+    """Collect the data that effects may use: input, times and runs."""
     rest = model.base.respond(np.zeros(1))
     zero_mm = float(rest.gap_mm[0])
     opening_mm = model.base.respond(table.input_mm).gap_mm - zero_mm
@@ -168,7 +168,7 @@ def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
     """Whether each run follows a re-zeroing, recognised by its name.
 
-    The result is empty if every run follows a re-zeroing, because then no run shows the earlier zero.
+    Nothing is returned if every run follows a re-zeroing, because then no run shows the earlier zero.
     """
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()

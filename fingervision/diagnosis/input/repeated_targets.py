@@ -65,7 +65,7 @@ class NoRepeatedTargets:
 class _Visit:
     """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after the visit.
 
-    `places` contains all of these rows, including those without a reading.
+    `places` contains all rows of the visit, including rows without a reading.
     """
 
     target: int
@@ -83,9 +83,9 @@ def repeated_targets(
 
     The direction of approach of a visit follows from the last earlier row at another position, with or without a
     reading (such as an overshoot or an approach). If the table lacks rows without a reading, two assumptions are made
-    and reported. First, if a target at an end of the range has two successive readings where all other targets have
-    one, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range, in such
-    a table or in one whose runs all have the same direction, came from beyond that end.
+    and reported. First, if a target at an end of the range has two successive readings where all other targets have one
+    reading, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range came
+    from beyond this end, if the table has pairs of readings at its ends, or if all its runs have the same direction.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwi
 
 
 def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[slice]) -> float | None:
-    """Median time from the first reading of a visit to that of the next one within a run (s)."""
+    """Median time from the first reading of a visit to the first reading of the next visit within a run (s)."""
     first = np.array([visit.rows[0] for visit in visits if visit.rows])
     steps = [np.diff(time_s[first[(first >= run.start) & (first < run.stop)]]) for run in runs]
     together = np.concatenate(steps) if steps else np.empty(0)
@@ -197,7 +197,7 @@ def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[sli
 
 
 def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str, ...]]:
-    """Split pairs of readings at the ends of the range into two visits; give a direction to runs that start there."""
+    """Split pairs of readings at range ends into two visits; give a direction to runs that start at an end."""
     last = centres.size - 1
     inner = [len(visit.places) for visit in visits if 0 < visit.target < last]
     usual = int(np.median(inner)) if inner else 0

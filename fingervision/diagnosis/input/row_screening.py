@@ -22,7 +22,7 @@ MOST_SET = 0.2
 def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
     """Mark the excluded rows, shape (n,), and give the reasons as sentences.
 
-    Only tables without times are screened, because these are small and made by hand.
+    Only tables without times are screened, because tables without times are small and made by hand.
     """
     out = np.zeros(table.input_mm.size, dtype=bool)
     notes: list[str] = []

@@ -65,7 +65,7 @@ def channel_noises(
 def noises_of_repeats(errors: list[PureError], floors: list[float]) -> tuple[Noise, ...]:
     """Use the scatter of repeated readings as white noise, because readings seconds apart have independent errors.
 
-    The variance then has the relative standard uncertainty sqrt(2 / degrees), with `degrees` its degrees of freedom.
+    A variance with n degrees of freedom has the relative standard uncertainty sqrt(2 / n).
     """
     found = []
     for error, floor in zip(errors, floors, strict=True):

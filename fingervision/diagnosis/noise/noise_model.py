@@ -49,8 +49,8 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
     """Mark outliers against a running median; shape (n,), True where a value is to be excluded.
 
     Without times the rows have no order, and the median of all values replaces the running median. `sigmas` is the
-    limit; None excludes nothing, because in a short record an effect that acts on a few samples looks like outliers
-    until it is explained.
+    limit of an outlier in standard deviations. None excludes no value, because in a short record an effect that acts on
+    a few samples looks like outliers until it is explained.
     """
     out = np.zeros(residual.size, dtype=bool)
     if sigmas is None:
@@ -80,7 +80,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
 
 
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
-    """Mark parts of the range with too many deviating samples for gross errors, which occur anywhere in the range."""
+    """Mark parts of the range with more deviating samples than gross errors would cause, which occur anywhere."""
     there = np.zeros(out.size, dtype=bool)
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)

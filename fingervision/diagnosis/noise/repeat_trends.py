@@ -18,8 +18,9 @@ def drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
     """Significance, in standard deviations, of a drift in successive readings; 0 if correlated noise is more probable.
 
     A drift (a smooth curve in time) and correlated reading noise both make successive readings similar, whatever their
-    positions. The more probable of the two, by BIC (Schwarz 1978), is taken as the cause: the log residual variances of
-    the curve, and of predicting each reading from the previous one, are compared with penalties for the parameters.
+    positions. Drift or correlated noise, whichever is more probable by BIC (Schwarz 1978), is assumed to be the cause:
+    the log residual variances of the curve, and of predicting each reading from the previous one, are compared with
+    penalties for the parameters.
     """
     share, sigmas = follows_sigmas(rest, rows)
     if sigmas <= TREND_SIGMAS:

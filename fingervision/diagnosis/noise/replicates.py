@@ -184,7 +184,7 @@ def _without_gross_errors(rest: Array, degrees: int) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Spacing of the grid on which all values lie, as for readings with few digits; 0 without such a grid.
+    """Spacing of the grid on which all values lie, as for readings with few digits; 0 if there is no grid.
 
     If there are too few distinct values to estimate a spacing, a 12-bit reading over their range is assumed.
     """

@@ -75,10 +75,11 @@ def noise_of_short_runs(
 ) -> tuple[Noise, ...]:
     """Fit the noise of channels that share one correlation in time, each channel with its own level.
 
-    The method is for runs with too few samples for a spectrum. If the noise of short runs were treated as white, every
-    slow effect would seem significant. All channels come from the same pictures, so that they share one correlation:
-    its posterior mean under a flat prior is used. Before an effect is found, the channel with the smallest correlation
-    determines the common correlation, because effects can only increase a correlation.
+    Restricted likelihood is used for runs with too few samples for a spectrum. If the noise of short runs were treated
+    as white, every slow effect would seem significant. All channels come from the same pictures, so that they share one
+    correlation: the posterior mean of this correlation under a flat prior is used. Before an effect is found, the
+    channel with the smallest correlation determines the common correlation, because effects can only increase a
+    correlation.
 
     Parameters
     ----------

@@ -52,7 +52,8 @@ class RunOffsets:
     def __post_init__(self) -> None:
         """Tabulate, for each channel and each spread, the quantities that do not depend on the residual.
 
-        These are the runs' weights, the part of each run's squared mean that an offset absorbs, and the penalty.
+        The tables contain the weights of the runs, the part of each run's squared mean that an offset absorbs, and the
+        penalty.
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
@@ -80,7 +81,7 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads fitted."""
+        """Return G such that r' r - (Z' r)' G (Z' r) is the squared length of r after a fit of the offsets Z."""
         known = self._metrics.get(sigma_mm)
         if known is not None:
             return known
@@ -101,8 +102,8 @@ class RunOffsets:
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
         """Estimate the spreads from a whitened residual by marginal likelihood.
 
-        A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) prevents that, for two runs, every common
-        offset is attributed to scatter. With one run the spread is zero.
+        Without a prior, every common offset of two runs would be attributed to scatter; a half-Cauchy prior with the
+        scale of one edge's noise (Gelman 2006) prevents this. For a single run, the spread of the offsets is zero.
 
         Returns
         -------
@@ -118,8 +119,8 @@ class RunOffsets:
     def spread_and_doubt(self, residual: Array) -> tuple[tuple[float, ...], float, float]:
         """Estimate the spreads of the run offsets as `spread` does, with a penalty for their uncertainty.
 
-        A few runs hardly determine the spread of their offsets; with this penalty, parameters that act like an offset
-        have Student's tails.
+        A few runs hardly determine the spread of their offsets; with a penalty for this uncertainty, parameters that
+        act like an offset have Student's tails.
 
         Returns
         -------
@@ -149,7 +150,7 @@ class RunOffsets:
     def drawn_spread(self, residual: Array, rng: np.random.Generator) -> tuple[float, ...]:
         """Draw the spreads from their posterior given a residual; one per channel, in mm.
 
-        A few runs leave the spread very uncertain.
+        With a few runs only, the spread of the offsets is very uncertain.
         """
         width = np.gradient(SPREADS)
         out = []

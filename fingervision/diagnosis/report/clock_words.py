@@ -23,7 +23,7 @@ def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ..
     """Add a remark to regions whose difference between opening and closing a clock offset explains.
 
     A clock that is late by t changes the gap by its speed times t, and so by opposite amounts in the two directions.
-    Both changes must be found, and both must be within the expanded uncertainty of the offset.
+    The changes in both directions must be found, and must require an offset within its expanded uncertainty.
 
     Parameters
     ----------

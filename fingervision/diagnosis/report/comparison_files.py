@@ -38,7 +38,7 @@ def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> di
 def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path) -> dict[str, object]:
     """Write HTML page, plots and compare.json into an existing folder, and return the content of compare.json.
 
-    The recording from which the table `measured` was made is searched for beside it.
+    The recording from which the table `measured` was made is searched for in the folder of the table.
     """
     document = comparison_document(found, made)
     (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

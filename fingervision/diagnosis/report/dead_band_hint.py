@@ -44,7 +44,7 @@ def dead_band_hint(data: Observations, before_mm: Array, verdict: Verdict) -> tu
 
 
 def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> str | None:
-    """Describe where the stage rests after each step of a command; None if this shows no band.
+    """Describe where the stage rests after each step of a command; None if there is no dead band.
 
     A servo with a dead band stops short of its command, on the side from which it came, or does not answer small steps.
     The mean over all holds is subtracted, because an offset is no band.

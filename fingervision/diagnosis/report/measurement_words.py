@@ -9,7 +9,7 @@ from fingervision.storage.summary_json import measurement_beside
 
 
 def measurement_words(table: Path) -> list[str]:
-    """Sentences on clocks and uncertainty of a measured table; none if no summary of a measurement is beside it."""
+    """Sentences on clocks and uncertainty of a measured table; none if its folder has no summary of a measurement."""
     summary = measurement_beside(table)
     try:
         return [*_clock(summary["settings"]), *_uncertainty(summary)] if summary else []

@@ -158,7 +158,7 @@ def _hinges(evidence: BodyEvidence, answers: PlaceAnswers, size: float) -> str:
 def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
     """Mean difference of a body's measured and predicted pose in every part of the range, shape (parts, 3).
 
-    The second result is the largest significance of these differences.
+    The second returned value is the largest significance of the differences.
     """
     means, sigma = np.zeros((len(parts), 3)), np.zeros(len(parts))
     for k, part in enumerate(PARTS):

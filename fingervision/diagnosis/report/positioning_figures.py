@@ -72,7 +72,7 @@ class Figure:
     """A quantity of the axis: value with standard uncertainty if known, or the reason why there is no value.
 
     With five cycles an uncertainty has four degrees of freedom: a 95 % interval extends by 2.8 times the uncertainty to
-    either side, not 2.
+    either side, instead of twice the uncertainty.
     """
 
     symbol: str

@@ -32,9 +32,9 @@ def positioning_of_table(
     """Compute the positioning accuracy, if the table has repeated targets.
 
     If the model's gap follows the input one to one, as on a stage, a deviation is measured gap minus recorded input, as
-    in an ISO 230-2 report. The share of the model's prediction is then reported together with those of the effects. For
-    any other model, a deviation is the measured gap minus the simulated gap. A constant added to all deviations (such
-    as a rest gap) changes none of the quantities.
+    in an ISO 230-2 report. For a stage, the share of the model's prediction is reported together with the shares of the
+    effects. For any other model than that of a stage, a deviation is the measured gap minus the simulated gap. A
+    constant added to all deviations (such as a rest gap) changes none of the quantities.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ def answer(
 ) -> str:
     """The whole result in one or two sentences.
 
-    The sizes of several effects stand in lines of their own (`detail_lines`), so that the sentence stays short.
+    The sizes of several effects are stated in separate lines (`detail_lines`), so that the sentence stays short.
     """
     (before_mm, after_mm), without = _said(d)
     of = EDGES if d.of == "edges" else ""

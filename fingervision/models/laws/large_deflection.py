@@ -27,13 +27,13 @@ _AS_DRAWN = 0.05
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Use the drawing's equilibria; the effect's parameters are those of the best-fitting circular arc.
+    """Use the drawing's equilibria; the parameters of the effect describe the best-fitting circular arc.
 
-    Multiplying `reach_mm` by n multiplies the whole curve by n, as for a body n times as large. Changing `cross` by an
-    amount c adds c times the height of the arc. The parameters of the best-fitting arc therefore reproduce the
-    equilibria of the body in the drawing, and an infinite `reach_mm` gives a straight line. For the published gripper
-    the best fit is `reach_mm` = 126 mm and `cross` = 0.12, and the arc alone deviates from the equilibria by less than
-    0.3 µm.
+    Multiplying the radius `reach_mm` by n multiplies the whole curve of opening over input by n, as for a body n times
+    as large. Changing the parameter `cross` by an amount c adds c times the height of the arc. The parameters of the
+    best-fitting arc therefore reproduce the equilibria of the body in the drawing, and an infinite `reach_mm` gives a
+    straight line. For the published gripper the best fit is `reach_mm` = 126 mm and `cross` = 0.12, and the arc alone
+    deviates from the equilibria by less than 0.3 µm.
     """
     try:
         opening_mm, bent_mm, force_ratio = _equilibria(drawn)

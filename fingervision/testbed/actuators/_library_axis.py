@@ -102,7 +102,7 @@ class LibraryAxis(ABC):
             self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
 
     def run_step(self, number: int) -> None:
-        """Refuse, because such a device stores no step data that a test bed could use."""
+        """Refuse: a stage that is driven through a library has no step data that a test bed could use."""
         raise LimitError(f"Step {number} must be stored in the controller, but {self._device} has none: use move.")
 
     def stop(self) -> None:

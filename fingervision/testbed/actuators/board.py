@@ -111,7 +111,7 @@ class BoardActuator:
         return None
 
     def home(self) -> None:
-        """Return to the reference, by its own code or an absolute step to 0; an earlier stop is then reset."""
+        """Return to the reference, by the controller's homing code or an absolute step to 0; reset an earlier stop."""
         self._stand()
         if wire.Levels.ALARM in self._board.levels:
             raise DeviceError(

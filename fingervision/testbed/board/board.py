@@ -95,7 +95,7 @@ class Board:
     def driven_board_s(self) -> float | None:
         """Time of the drive line's last rising edge on the board's clock (s).
 
-        The result is None if the drive line had no rising edge since the last `run`.
+        The time is None if the drive line had no rising edge since the last `run`.
         """
         return self._driven_board_s
 

@@ -20,7 +20,7 @@ WAIT_S = 0.01
 def _no_collection() -> Iterator[None]:
     """Suspend Python's cyclic garbage collection, which may stop all threads for 0.1 s.
 
-    The board would interpret such a pause of the computer as a lost connection, and stop the motor.
+    The board would interpret a pause of the computer as a lost connection, and stop the motor.
     """
     was_on = gc.isenabled()
     gc.disable()

@@ -2,7 +2,7 @@
 
 A thread of the link reads messages from the board all the time. The thread also requests the state every few
 milliseconds: this shows the board that the computer works, shows the link that the board works, and synchronises the
-two clocks.
+clocks of board and computer.
 """
 
 import random
@@ -148,7 +148,7 @@ class BoardLink:
     def stop(self) -> None:
         """Let the link's thread send a stop to the board, repeatedly until the board confirms the stop.
 
-        This call only sets a flag, so that a signal handler may use it at any time.
+        `stop` only sets a flag, so that a signal handler may call it at any time.
         """
         self._stopping = True
 

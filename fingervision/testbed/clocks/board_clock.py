@@ -1,9 +1,9 @@
 """Synchronisation of the board's clock with the host's: offset and rate, with their uncertainty.
 
 The board records the time at which it receives a command; that time lies between the sending of the command and the
-arrival of the response (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many such
-exchanges narrow the interval: the clock rate is fitted to the midpoints, and the offset is the midpoint of the
-intersection of the intervals.
+arrival of the response (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many exchanges
+of commands and responses narrow the interval: the clock rate is fitted to the midpoints, and the offset is the midpoint
+of the intersection of the intervals.
 """
 
 from collections import deque

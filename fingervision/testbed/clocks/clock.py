@@ -36,8 +36,8 @@ class HostClock:
 class VirtualClock:
     """Clock of a completely simulated test bed: its time advances only while some part waits.
 
-    With a pace, virtual time advances at most at this pace; longer delays, by a pause or a busy computer, are not made
-    up for.
+    With a pace, virtual time advances at most at this pace, and does not make up for long delays (a pause, a busy
+    computer).
 
     Parameters
     ----------

@@ -112,8 +112,8 @@ def run_step(bed: Bed, number: int) -> float:
 def _check_speed(bed: Bed, speed_mm_s: float) -> None:
     if not 0.0 < speed_mm_s <= bed.limits.speed_mm_s:
         raise LimitError(
-            f"The speed must be positive and at most {bed.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g}: the stage "
-            "has not moved."
+            f"The speed must be positive and at most {bed.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g}: nothing "
+            "was moved."
         )
 
 

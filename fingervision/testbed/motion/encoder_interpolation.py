@@ -1,10 +1,11 @@
 """Interpolation of a stage's position between the steps of its encoder, from the times of step transitions.
 
 An encoder resolves the position to one step; at a step transition the stage is exactly at the border of two steps.
-Between two such borders the stage is assumed to move at constant speed; its stopping position follows from its speed
-until the controller reports the end of the motion. Without interpolation, an encoder step of 30 µm causes a standard
-uncertainty of 9 µm (30 / sqrt 12), which is 67 µm of gap, and play would keep that error during a whole stop. With
-transitions time-stamped to 4 µs, the uncertainty is a few nanometres; with 200 readings per second at 0.5 mm/s, 1 µm.
+Between the borders of two steps the stage is assumed to move at constant speed; its stopping position follows from its
+speed until the controller reports the end of the motion. Without interpolation, an encoder step of 30 µm causes a
+standard uncertainty of 9 µm (30 / sqrt 12), which is 67 µm of gap; with play, the error remains the same during a whole
+stop. With transitions time-stamped to 4 µs, the uncertainty is a few nanometres; with 200 readings per second at 0.5
+mm/s, it is 1 µm.
 """
 
 from bisect import bisect_right

@@ -29,8 +29,9 @@ def route(
 ) -> tuple[int, ...]:
     """Numbers of the blocks that lead to a position without exceeding the requested speed.
 
-    A single absolute block is preferred to a repeated relative block, and the latter to an absolute block followed by
-    relative ones; among several possibilities the fastest is chosen, then that with the fewest blocks.
+    A single absolute block is preferred to a repeated relative block, and a repeated relative block to an absolute
+    block followed by relative blocks. Among several possibilities, the fastest is chosen, and among equally fast ones
+    that with the fewest blocks.
 
     Parameters
     ----------

@@ -25,5 +25,5 @@ def acts(section: Section, at_mm: float) -> Iterator[Asked]:
 
 
 def fastest_mm_s(swing: Swing) -> float:
-    """Highest speed, at the mean position: 2 pi f A (mm/s)."""
+    """Highest speed, at the mean position: 2 pi times frequency times amplitude (mm/s)."""
     return 6.283185307179586 * swing.frequency_hz * swing.amplitude_mm

@@ -131,9 +131,8 @@ class Runner:
     def _warn_of_speed(self, moved_s: float, foreseen_s: float) -> None:
         words = (
             f"warning: the recorded motions took {moved_s:.3g} s, but should take {foreseen_s:.3g} s at the speeds of "
-            f"the "
-            "recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract tests; "
-            "`fingervision bed check` prints their command line."
+            "the recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract "
+            "tests; `fingervision bed check` prints their command line."
         )
         self.watch.say(words)
         self.watch.record.event("too_fast", words)

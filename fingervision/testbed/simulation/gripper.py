@@ -96,7 +96,7 @@ class SimulatedGripper:
     def at(self, time_s: float) -> Response:
         """Positions of the measuring points, and the force, at one time of the test bed; arrays of one element.
 
-        Before the first motion, these are the positions at rest.
+        Before the first motion, the positions are those at rest.
         """
         began_s = self._motion.began_s()
         version = (self._motion.version(), len(self._motion.homed_s()), began_s)
