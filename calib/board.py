@@ -107,8 +107,8 @@ def find_corners(grey: Grey, board: Board, name: str) -> BoardCorners:
     if found is None:
         if board.marker_mm is None:
             raise CalibrationError(
-                f"{name} must show a chessboard of {board.columns}x{board.rows} inner corners, the whole of it, but "
-                f"does not: check --squares, which counts inner corners (a board of {board.columns + 1}x"
+                f"{name} must show a chessboard of {board.columns}x{board.rows} inner corners completely, but does "
+                f"not: check --squares, which counts inner corners (a board of {board.columns + 1}x"
                 f"{board.rows + 1} squares), and that the board has a light margin."
             )
         raise CalibrationError(

@@ -124,7 +124,7 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
     inside = (columns - reach >= 0) & (columns + reach < grey.shape[1])
     if np.count_nonzero(inside) < OWN_PARAMETERS or 2 * reach + 1 <= OWN_PARAMETERS + 1:
         raise CalibrationError(
-            "The edge is nearer to the border or to another edge than its own blur: leave more room around it."
+            "The edge is nearer to the border or to another edge than its own blur: leave more space around the edge."
         )
     rows, columns, middle = rows[inside], columns[inside], middle[inside]
     window = columns[:, None] + np.arange(-reach, reach + 1)
@@ -180,7 +180,7 @@ def _mean_profile(grey: Floats, rows: Ints, coarse: CoarseEdge, reach: int) -> _
     columns = np.rint(middle).astype(np.int_)
     inside = (columns - reach >= 0) & (columns + reach < grey.shape[1])
     if reach < 2 or not np.any(inside):
-        raise CalibrationError("The edge has no room: it is nearer to the border or to another edge than its own blur.")
+        raise CalibrationError("The edge is nearer to the border or to another edge than its own blur.")
     window = columns[inside, None] + np.arange(-reach, reach + 1)
     seen = grey[rows[inside, None], window]
     levels = np.median(seen, axis=0).astype(np.float64)

@@ -91,8 +91,8 @@ def find_widths(
     for picture, width in zip(pictures, widths, strict=True):
         if width.clipped:
             raise CalibrationError(
-                f"The flank of an edge in {picture.name} is cut off by the sensor's full scale, so its place is "
-                "unknown: lower the exposure or the light and take the picture again."
+                f"The flank of an edge in {picture.name} is clipped at full scale, so that the position of the edge "
+                f"is unknown: lower the exposure or the light and take the picture again."
             )
     return widths
 
@@ -110,7 +110,8 @@ def _choices(
         if edges:
             raise CalibrationError(
                 f"{picture.name} must show two parallel straight edges, but only {edges} straight edge"
-                f"{'s stand' if edges > 1 else ' stands'} in it and none has a partner in {where}: bring both edges "
+                f"{'s stand' if edges > 1 else ' stands'} in it and no two of them are parallel in {where}: bring "
+                f"both edges "
                 f"of the {picture.kind} into view, away from the border, or give a region with --roi."
             )
         raise CalibrationError(
@@ -129,7 +130,7 @@ def _choices(
     if len(objects) > 1:
         named = ", ".join(found[0].words() for found in objects[:5])
         raise CalibrationError(
-            f"{picture.name} must show one {picture.kind}, but {len(objects)} candidates stand in {where} ({named}): "
+            f"{picture.name} must show one {picture.kind}, but {len(objects)} candidates are in {where} ({named}): "
             "choose one with --roi X,Y,W,H."
         )
     return objects[0][:2]

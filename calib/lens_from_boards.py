@@ -54,7 +54,7 @@ def lens_from_boards(pictures: Sequence[BoardCorners], frame_size_px: tuple[int,
     if len(pictures) < 3:
         raise CalibrationError(
             f"A lens needs at least three pictures of the board at different tilts, but there are {len(pictures)}: "
-            "take more, or give a single one for the plane alone."
+            f"take more pictures, or give a single picture to determine the plane alone."
         )
     board = [np.column_stack([each.board_mm, np.zeros(len(each.board_mm))]).astype(np.float32) for each in pictures]
     seen = [each.points_px.astype(np.float32).reshape(-1, 1, 2) for each in pictures]

@@ -170,7 +170,8 @@ def _found(upright: Floats, slope: float, rows: tuple[int, int], is_turned: bool
     alike &= (middle > reach) & (middle < upright.shape[1] - 1 - reach)
     if np.count_nonzero(alike) < FEWEST_LINES:
         raise CalibrationError(
-            f"A line scale must show at least {FEWEST_LINES} whole lines alike, but {np.count_nonzero(alike)} are in "
+            f"A line scale must show at least {FEWEST_LINES} complete lines of equal width, but "
+            f"{np.count_nonzero(alike)} are in "
             "view: choose them with --roi."
         )
     return CoarseLines(middle[alike].astype(np.float64), width, pitch, is_dark, slope, rows, is_turned)

@@ -266,8 +266,8 @@ class Calibration:
             known = self.camera.get(name)
             if known is not None and known != value:
                 raise CalibrationError(
-                    f"The calibration was made with the camera's {name} = {known}, but it is {value} now: "
-                    "set it back or calibrate again."
+                    f"The calibration was made with the camera's {name} = {known}, but it is {value} now: restore the "
+                    f"earlier setting, or calibrate again."
                 )
 
     def _measured(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> tuple[Floats, Budget]:

@@ -99,7 +99,7 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
     if overshoot > MOST_OVERSHOOT:
         raise CalibrationError(
             f"The edges must pass from one plateau to the other without overshoot, but overshoot by {overshoot:.1%} of "
-            "their step: the camera sharpens. Switch that off, or take an exposure series instead."
+            "their step: the camera sharpens its pictures. Switch sharpening off, or take an exposure series instead."
         )
     # The exponent and the asymmetry of a wide blur can hold each other in a valley of its own.
     tried = [
@@ -116,13 +116,14 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
     u_exponent = exponent * float(np.sqrt(shared * covariance[0, 0])) * max(misfit, 1.0)
     if misfit > LARGEST_MISFIT:
         raise CalibrationError(
-            f"The edges' profiles must be those of a symmetric blur behind a power law, but leave {misfit:.1f} times "
-            "the noise: the camera sharpens, or the edges are bevelled or shaded. Take an exposure series instead."
+            f"The profiles of the edges must be those of a symmetric blur and a power law, but deviate by "
+            f"{misfit:.1f} times the noise: the camera sharpens its pictures, or the edges are bevelled or shaded. "
+            f"Take an exposure series instead."
         )
     if u_exponent > LARGEST_U:
         raise CalibrationError(
             f"The edges must determine the exponent to within {LARGEST_U:g}, but give {exponent:.2f} to "
-            f"+-{u_exponent:.2f} only: take more of them, with more contrast, or an exposure series."
+            f"+-{u_exponent:.2f} only: take more pictures of edges, with more contrast, or an exposure series."
         )
     levels = np.concatenate([profile.level for profile in profiles])
     curve = curve_of(exponent, np.zeros(KNOTS), top_level, name)

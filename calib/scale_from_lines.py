@@ -199,8 +199,8 @@ def _budget(
         ScalePart(
             "edge bias",
             np.diag([0.0, rectangular(limits.edge_bias_px) ** 2]),
-            f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'}); a pitch does not "
-            "know it; a bar and a slot would find it",
+            f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'}); the pitch of "
+            f"lines does not determine it, but a bar and a slot do",
         ),
     ]
 
@@ -235,7 +235,7 @@ def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
         used = again
     if np.count_nonzero(used) < max(3, 0.7 * at_px.size) or len(set(index[used].tolist())) < np.count_nonzero(used):
         raise CalibrationError(
-            f"The lines of a scale must stand at equal distances, but {np.count_nonzero(~used)} of {at_px.size} do "
+            f"The lines of a scale must be equally spaced, but {np.count_nonzero(~used)} of {at_px.size} do "
             "not: choose a part with lines of one kind with --roi."
         )
     return index - index[used].min(), used

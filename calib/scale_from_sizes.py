@@ -118,7 +118,7 @@ def scale_from_sizes(
         by_bias = np.array([-float(line.response[0].sum()), -1.0])
         covariance = np.outer(by_bias, by_bias) * rectangular(limits.edge_bias_px) ** 2
         how = f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'})"
-        parts.append(ScalePart("edge bias", covariance, f"{how}; three sizes, or a bar and a slot, would find it"))
+        parts.append(ScalePart("edge bias", covariance, f"{how}; three sizes, or a bar and a slot, determine it"))
         if response_shift_px:
             shifted = np.outer(by_bias, by_bias) * rectangular(response_shift_px) ** 2
             how = f"0 to {response_shift_px:.2g} px; state or measure it with --response"

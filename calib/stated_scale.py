@@ -62,8 +62,8 @@ class StatedScale(BareScale):
             ScalePart(
                 "edge bias",
                 np.diag([0.0, rectangular(limits.edge_bias_px) ** 2]),
-                f"+-{limits.edge_bias_px:g} px (default); a stated scale does not know it; a bar and a slot would "
-                "find it",
+                f"+-{limits.edge_bias_px:g} px (default); a stated scale does not determine it, but a bar and a slot "
+                f"do",
             ),
         )
         # No picture's edges gave the scale, so that it shares no error of the camera response with the recording.

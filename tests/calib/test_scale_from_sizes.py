@@ -210,5 +210,5 @@ def test_a_saturated_flank_is_refused() -> None:
         light=Light(ground=250.0, exposure=1.4), behind=(Patch(bar(170.0, 640.0, x_px=320.0, y_px=240.0), 40.0),)
     )
     grey = render(scene, Camera(blur_px=1.5, noise_grey=2.0), np.random.default_rng(1))
-    with pytest.raises(ValueError, match=r"over\.png is cut off by the sensor's full scale.*lower the exposure"):
+    with pytest.raises(ValueError, match=r"over\.png is clipped at full scale.*lower the exposure"):
         find_widths([KnownSize("over.png", "bar", 5.0, 0.001, grey)])
