@@ -30,7 +30,7 @@ class Commands(click.Group):
             if argument == "" or (argument.startswith("--") and argument.endswith("=")):
                 raise UsageError(
                     f"A file name, folder name or value must not be empty, but argument {number}"
-                    f"{', ' + argument + ',' if argument else ''} is empty: give a name or value, or leave the option out."
+                    f"{', ' + argument + ',' if argument else ''} is empty: give one, or leave the option out."
                 )
         return super().parse_args(ctx, args)
 
@@ -88,7 +88,7 @@ def main() -> None:
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             click.echo(
-                "fingervision: A file name must not be longer than the operating system allows, but is too long: shorten it.",
+                "fingervision: A file name must fit the limits of the operating system, but is too long: shorten it.",
                 err=True,
             )
             sys.exit(ExitCode.COULD_NOT)
