@@ -67,7 +67,7 @@ def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: add the stage's error at each position; beyond its ends, the curve is constant."""
+    """Apply the effect: add the stage's error at each position; beyond the ends of its curve, the error is constant."""
     at, errors = curve_points(values)
     if not at.size:
         if values["rms_mm"] == 0.0:

@@ -53,6 +53,6 @@ def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...
     if history.dwell_s <= delay.upper:
         return (replace(delay, rugged=True, starts=COMMANDED_STARTS) if history.commanded else delay,)
     return (
-        f"the stage is assumed to have been at rest for {history.dwell_s:.3g} s or longer before each reading, so "
-        f"that a delay of at most {delay.upper:g} s is over"
+        f"the stage is assumed to have rested for {history.dwell_s:.3g} s or longer before each reading, and a delay "
+        f"of at most {delay.upper:g} s is over by then"
     )

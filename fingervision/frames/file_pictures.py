@@ -22,12 +22,12 @@ from fingervision.frames.stream_losses import StreamLosses
 
 MISSING = "Bytes are damaged or missing in the file"
 NO_COUNT = (
-    f"{MISSING} here. AVI files determine times by counting frames, so that the times of the following frames "
-    f"are not known."
+    f"{MISSING} here. AVI files contain no times, only a count of frames, so that the times of the following "
+    "frames are not known."
 )
 NO_CLUSTER = (
-    "The time that the file states for the next frames (a Matroska cluster) is damaged: it contradicts the file's "
-    "index or the frames around it, so that the times of these frames are not known."
+    "The time that the file states for the next frames (a Matroska cluster) is damaged, because it contradicts the "
+    "file's index or the neighbouring frames; the times of these frames are not known."
 )
 
 
@@ -37,7 +37,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     Parameters
     ----------
     container, stream : PyAV's
-        PyAV objects at the start of the file; the decoder is set to strict mode.
+        PyAV's objects for file and video stream, at the start of the file; the decoder is set to strict mode.
     path : Path
         The file.
 
@@ -108,7 +108,7 @@ class _Read:
     end : str
         Reason why there is no next packet, if that is damage.
     at_end : str
-        Message of the container at the end, mostly that the file is truncated.
+        Message of the container reader at the end of the file, mostly that the file is truncated.
     """
 
     packet: "av.Packet[av.VideoStream]"
@@ -133,10 +133,10 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
         try:
             packet = next(demuxed, None)
         except av.FFmpegError as error:
-            end = f"The file cannot be read any further ({error.strerror})."
+            end = f"The rest of the file cannot be read ({error.strerror})."
         except IndexError:
-            # PyAV has no place for a stream that a damaged file invents on the way.
-            end = "The file cannot be read any further (it announces another stream in the middle)."
+            # PyAV raises IndexError if a damaged file seems to begin a further stream.
+            end = "The rest of the file cannot be read (a further stream seems to begin in its middle)."
         hole = heard.of_file()
         missing: tuple[int, ...] = ()
         loses_time = ""
@@ -144,7 +144,7 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
             was_lost = places.is_lost
             number = places.number(packet.pos, packet.size)
             missing, loses_time = places.missing, NO_COUNT if places.is_lost and not was_lost else ""
-            hole = "another chunk was expected" if places.after_hole and not was_lost else ""
+            hole = "a different chunk was expected here" if places.after_hole and not was_lost else ""
             if number is None:
                 packet.pts = packet.dts = None
             else:
@@ -173,7 +173,7 @@ def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
             trail.hole(f"{MISSING} before this frame.")
         yield None, read.loses_time
     for tick in read.missing:
-        trail.lost(tick, f"{MISSING}, which include this frame.")
+        trail.lost(tick, f"{MISSING}, including this frame.")
 
 
 def _first_packets(path: Path, stream: av.VideoStream) -> Iterator[bytes]:

@@ -7,15 +7,16 @@ import av
 
 from fingervision.frames.damage import Picture
 
-# An even row: so many equal steps one after the other. Cameras of uneven rate never make one, to the tick.
+# Number of consecutive equal steps after which times are regarded as equidistant; times of cameras with a variable rate
+# never agree to one tick.
 EVEN_STEPS = 8
-# Containers round a time to their tick, and a step has two ends.
+# Permitted deviation of a step (ticks): containers round both times of a step to a tick.
 TICKS = 1.01
 
 BACKWARDS = (
-    "The time of the frame is not later than the time of the frame before: one of the two times is damaged in the file."
+    "The frame's time is not later than that of the previous frame: one of the two times is damaged in the file."
 )
-OUT_OF_ROW = "The time of the frame does not fit between the times of the frames around it, which are evenly spaced."
+OUT_OF_ROW = "The frame's time does not fit between those of its neighbours, which are equidistant."
 
 
 def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
@@ -29,7 +30,7 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
     Parameters
     ----------
     pictures : iterable of (int or None, VideoFrame or str)
-        Ticks with pictures, or with the reason why there is no picture. One item is held back.
+        Ticks with pictures, or with the reason why there is no picture. One item is read in advance.
 
     Yields
     ------
@@ -50,7 +51,7 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
             continue
         latest = held_tick if latest is None else max(latest, held_tick)
         if tick < latest:
-            # The latest time stays, so that what follows must come after it.
+            # The latest time is kept, so that following pictures must be later than this time.
             yield held if tick >= held_tick else _lost(held, BACKWARDS)
             held, before = _lost(picture, BACKWARDS), None
             steps.clear()

@@ -26,13 +26,13 @@ class GaugeStatus(StrEnum):
 
 
 MEANING = {
-    GaugeStatus.OUT_OF_VIEW: "the measured object, or a part that the fit needs, lies outside the picture",
-    GaugeStatus.NO_EDGE: "there is no straight edge of this polarity and contrast within reach_px",
-    GaugeStatus.NOT_FOUND: "nothing similar to the object lies within reach_px",
-    GaugeStatus.AMBIGUOUS: "several similar objects lie within reach_px: lower reach_px, state the "
+    GaugeStatus.OUT_OF_VIEW: "the measured object, or a necessary part of it, lies outside the picture",
+    GaugeStatus.NO_EDGE: "no straight edge with this polarity and contrast lies in the searched zone",
+    GaugeStatus.NOT_FOUND: "no matching object lies in the searched zone",
+    GaugeStatus.AMBIGUOUS: "more than one matching object lies in the searched zone: reduce reach_px, state the "
     "polarity, or move the gauge",
-    GaugeStatus.LOW_CONTRAST: "too little contrast to measure",
-    GaugeStatus.SATURATED: "the flank of an edge is clipped at full scale",
-    GaugeStatus.BLURRED: "an edge is spread by more than 5 px (standard deviation)",
-    GaugeStatus.TOUCHING: "the two edges are too close together to be distinguished",
+    GaugeStatus.LOW_CONTRAST: "the object has too little contrast or texture to be measured",
+    GaugeStatus.SATURATED: "the flank of the edge is clipped at the end of the scale",
+    GaugeStatus.BLURRED: "the blur of the edge exceeds 5 px (standard deviation)",
+    GaugeStatus.TOUCHING: "the two edges are too near each other to be distinguished",
 }

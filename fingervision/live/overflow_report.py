@@ -30,5 +30,5 @@ class OverflowReport:
             self._told_at_s = now_s
             more, self._told = lost - self._told, lost
             self._tell(
-                "overflowed", f"{more} frames arrived faster than they could be measured, and were not measured."
+                "overflowed", f"{more} frames are lost, because they arrived faster than they could be measured."
             )

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,12 @@ from fingervision.tables.dialect import (
     is_value,
     split,
 )
+from fingervision.tables.exchanged_rows import exchanged
+from fingervision.tables.header_pairs import Header
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
-from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, names_in
+from fingervision.tables.text_header import HEADER_LINES, find_header, first_row, names_in
 
 NUMBER_BEGINS = frozenset("0123456789+-., \t")
 BETWEEN = re.compile(r"[\s,;|]+")
@@ -61,6 +64,10 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
             f"{path} must hold rows of two numbers or more, but has none in its {len(lines)} lines: name another file, "
             "or export the table again."
         )
+    if (turned := exchanged(lines, dialect)) is not None:
+        whole = table_of_lines(path, turned, given, encoding)
+        note = "Each line holds a column, with its name first: rows and columns are exchanged."
+        return replace(whole, lines=(), notes=(note, *whole.notes))
     check_columns(path, dialect.wide)
     first = first_row(lines, dialect, given)
     header = find_header(lines, first, dialect, given)

@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels, channels_in
+from fingervision.tables.cell_units import with_units_of_cells
 from fingervision.tables.cells import to_numbers
-from fingervision.tables.column_choice import DIMENSION, NEEDED, Findings, choose
-from fingervision.tables.column_names import ColumnName, column_name
+from fingervision.tables.column_choice import NEEDED, Findings, choose
+from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
 from fingervision.tables.doubts import doubts
 from fingervision.tables.long_table import refuse_long_table
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable
-from fingervision.tables.times import is_epoch, looks_like_time, seconds_of
+from fingervision.tables.times import counts_days, is_day_number, is_epoch, looks_like_time, seconds_of
 from fingervision.tables.units import factor, known_unit, spelled
 
 DATE = "date"
@@ -119,6 +120,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     """
     refuse_long_table(raw)
     about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))
+    raw = with_units_of_cells(raw)
     names = [column_name(column.name) for column in raw.columns]
     chosen = choose(raw, names, kind, given, about)
     columns: dict[str, Numbers] = {}
@@ -133,8 +135,8 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
             columns[role] = dated
             taken.append(Taken(column.name, role, DATE))
             continue
-        unit = _unit(column, names[place], role, kind, given, about)
         values = _numbers(raw, column, decimal, given, about)
+        unit = _unit(column, names[place], role, kind, given, about, values)
         taken.append(Taken(column.name, role, unit or ""))
         if unit is None:
             continue
@@ -143,7 +145,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
             about.questions.append(_wrong_unit(column, role, unit))
             continue
         if role == "time":
-            values = _from_epoch(values, column, about)
+            values = _from_epoch(values, column, unit, about)
         columns[role] = values if size == 1.0 else Numbers(values.value * size, values.present)
         if column.since and role == "time":
             taken[-1] = Taken(column.name, role, DATE)
@@ -164,7 +166,9 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     )  # fmt: skip
 
 
-def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings) -> str | None:
+def _unit(
+    column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings, values: Numbers
+) -> str | None:
     """Unit of a column as stated by the user, beside the name or in the name; None if unresolved or not needed."""
     if role in given.units:
         return given.units[role]
@@ -182,7 +186,11 @@ def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entr
             f"{column.name} has no unit and is not used; state its unit as units.{role} in columns.toml."
         )
         return None
-    example = {"length": "mm", "time": "s", "force": "N"}[DIMENSION[role]]
+    example = {
+        "length": "mm",
+        "time": "d" if role == "time" and counts_days(values.value[values.present]) else "s",
+        "force": "N",
+    }[DIMENSION[role]]
     about.questions.append(Question(f"the unit of '{column.name}' ({role}) is not stated", f"units.{role}={example}"))
     return None
 
@@ -239,11 +247,16 @@ def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findin
     return read.numbers
 
 
-def _from_epoch(values: Numbers, column: RawColumn, about: Findings) -> Numbers:
-    """Subtract the first time if the clock counts from 1970 or 1904."""
+def _from_epoch(values: Numbers, column: RawColumn, unit: str, about: Findings) -> Numbers:
+    """Subtract the first time if the clock counts from 1900, 1904 or 1970."""
     if not values.present.any():
         return values
     first = float(values.value[int(np.argmax(values.present))])
+    if known_unit(unit) == "day" and is_day_number(first):
+        about.notes.append(
+            f"{column.name} counts days since 1900, as a spreadsheet does: it is taken from its first row."
+        )
+        return Numbers(np.where(values.present, values.value - first, 0.0), values.present)
     for scale, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
         if epoch := is_epoch(first / scale):
             about.notes.append(

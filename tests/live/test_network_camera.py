@@ -32,7 +32,7 @@ def test_every_frame_is_measured_and_a_cut_is_a_gap(
     view.until(lambda seen: time.monotonic() - began_s > WATCHED_S, within_s=6 * WATCHED_S)
     camera.stop()
     before = len(view.lines())
-    view.until(lambda seen: "cut off" in seen.text())
+    view.until(lambda seen: "is interrupted" in seen.text())
     time.sleep(CUT_S)
     camera.start()
     view.until(lambda seen: len(seen.lines()) > before + 25)

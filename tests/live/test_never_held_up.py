@@ -264,7 +264,7 @@ def test_frames_that_nobody_measures_hold_up_no_capture_and_are_counted_and_said
     lost = capture.overflowed
     said: list[tuple[str, str]] = []
     OverflowReport(capture, lambda name, words: said.append((name, words))).say()
-    assert said == [("overflowed", f"{lost} frames arrived faster than they could be measured, and were not measured.")]
+    assert said == [("overflowed", f"{lost} frames are lost, because they arrived faster than they could be measured.")]
 
 
 def test_a_disk_that_stands_still_holds_up_nobody_and_ends_the_recording_with_a_sentence(

@@ -153,11 +153,11 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
         page.locator("#verdict", has_text=verdict).wait_for()
     page.fill("#least", "7")
     page.press("#least", "Enter")
-    says(page, "The lower limit must be below the upper one, but they are 7 and 5 mm.")
+    says(page, "The lower limit must be below the upper limit, but the limits are 7 and 5 mm.")
     page.press("#least", "Escape")
 
     page.locator("body").press("z")
-    says(page, "The page shows gaps minus")
+    says(page, "Displayed gaps are reduced by")
     off_mm = float(re.search(r"less ([\d.]+) mm", page.locator("#log li", has_text="less").inner_text())[1])
     page.locator("#unzero").wait_for()
     page.locator("body").press("p")

@@ -110,5 +110,5 @@ def test_refusals_say_what_must_be(tmp_path: Path) -> None:
         write_clip(tmp_path / "missing" / "clip.mp4", frames, H264())
     with pytest.raises(DataError, match=r"quality must lie between 0 and 100, but is 101"):
         through_jpeg(frames[0].pixels, 101)
-    with pytest.raises(DataError, match=r"JPEG holds 8 bits, but the frame has 16"):
+    with pytest.raises(DataError, match=r"JPEG stores 8 bits, but the frame has 16"):
         through_jpeg(wide[0].pixels, 90)

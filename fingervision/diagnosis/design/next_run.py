@@ -21,8 +21,8 @@ def next_run(
 ) -> NextRun | None:
     """Choose the run that decides most of the open pairs in the least experiment time.
 
-    Runs within the measured range are tried first: outside it an explanation's formula is not verified, so that a
-    predicted gain is not reliable. The stated gain is that of the pair of explanations that the run separates least.
+    Runs within the measured range are tried first: outside this range an explanation's formula is not verified, so that
+    a predicted gain is not reliable. The stated gain is that of the pair of explanations that the run separates least.
 
     Parameters
     ----------

@@ -19,9 +19,10 @@ from fingervision.domain.response import Response
 from fingervision.effects import catalogue, that_show
 
 REFUTED = 9.0
-"""Chi-square per slot by which another explanation foretells it better: three standard uncertainties."""
+"""Difference in chi-square per slot above which an explanation is refuted by another that predicts the slot better:
+three standard uncertainties."""
 STEP = 0.1
-"""Step of a parameter, in its standard uncertainties, for what its uncertainty does to a slot."""
+"""Step of a parameter, in standard uncertainties, for propagating its uncertainty to the width of a slot."""
 
 Values = Mapping[str, Mapping[str, float]]
 
@@ -29,7 +30,7 @@ Values = Mapping[str, Mapping[str, float]]
 def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Findings, tuple[str, ...]]:
     """Drop the explanations that a reference slot contradicts, and report the result of the slots.
 
-    If the slots contradict all explanations, none is dropped: then something else is wrong, which a sentence reports.
+    If the slots contradict all explanations, none is dropped, and a sentence reports that something else is wrong.
 
     Returns
     -------

@@ -24,8 +24,8 @@ from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
 UNIT_SHARES = (0.1, 3.0)
-"""Shares of the model's range, after a change of unit, between which the input was apparently given in that unit: runs
-cover at least a tenth of the range, and in the right unit none covers three hundred times it."""
+"""Smallest and largest share of the model's range that the inputs cover, after a change of unit, if the input was
+apparently given in that unit. Runs cover at least a tenth of the range."""
 
 
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
@@ -135,10 +135,10 @@ def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
 def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str, ...]:
     notes = []
     if table.midline_mm is None:
-        notes.append("only the gap was measured: an effect that moves both fingers together cannot be seen.")
+        notes.append("only the gap was measured: effects that move both fingers together cannot be detected.")
     if recorded.is_motion:
         notes.append(
-            "the small fluctuations of the input also appear in the gap: they are real motion and were not smoothed."
+            "the fluctuations of the input are also visible in the gap: they are real motion and were not smoothed."
         )
     return tuple(notes)
 
@@ -147,9 +147,9 @@ def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
     if table.u_clock_s <= 0.0:
         return ()
     return (
-        "the offset between the clocks of input and camera was determined from this motion (U = "
-        "{2.0 * table.u_clock_s:.2g} s over the frames, k = 2): a constant lag is part of this offset, and is named "
-        "only if it exceeds the uncertainty of the offset.",
+        f"the clocks of input and pictures were synchronised by this motion itself (U = {2.0 * table.u_clock_s:.2g} s "
+        "over the frames, k = 2): a constant lag is part of this offset, so that a lag is named only if it exceeds "
+        "the offset's uncertainty.",
     )
 
 

@@ -23,7 +23,7 @@ LOOKED_AT = 2000
 TURN = 0.02
 """Least return motion of a reversal as a share of the input's range: an encoder's jitter is smaller."""
 WIDTH_PX, JPEG_QUALITY = 480, 80
-"""Width and JPEG quality of a picture in the page: three of them stand side by side on a desk screen."""
+"""Width and JPEG quality of a picture in the page: three pictures fit side by side on a desktop screen."""
 MARK = (64, 255, 96)
 """Colour of a measured edge is bright green, which neither metal nor polymer has."""
 
@@ -112,7 +112,8 @@ def _recording_of(table: Path) -> Path | None:
     if not isinstance(name, str) or not isinstance(sha256, str):
         return None
     beside = [folder / Path(name).name for folder in (table.parent, table.parent.parent, Path())]
-    # Also where the summary says, seen from here or from its folder; only a file with the stated hash is shown.
+    # Also search at the path that the summary states, relative to the present folder or to the folder of the summary;
+    # only a file with the stated hash is used.
     for path in (Path(name), table.parent / name, *beside):
         if path.is_file():
             with path.open("rb") as file:
@@ -136,7 +137,7 @@ def _decoded(recording: Path, turns: tuple[Turn, ...]) -> tuple[Turn, ...]:
             if frame.index >= last:
                 break
     except FingervisionError:
-        # What was measured stands in the table; a recording that cannot be read again costs its pictures only.
+        # The measured values are in the table: if the recording cannot be read again, only its pictures are missing.
         return tuple(found)
     return tuple(found)
 

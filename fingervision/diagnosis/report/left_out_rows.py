@@ -36,7 +36,7 @@ def outlier_rows(
     """
     table, uncounted = data.table, frozenset(left_out)
     n, both = table.input_mm.size, data.chain.history.both_edges
-    # Only where times restart does a time not tell the run; elsewhere the names of runs change nothing.
+    # The name of the run is needed only if times restart in each run.
     restarts = table.time_s is not None and not table.shared_clock
     out: list[OutlierRow] = []
     for run, name in zip(table.runs, table.run_names, strict=True):
@@ -51,7 +51,7 @@ def outlier_rows(
 
 
 def outside_words(residual: Array, low: float, high: float) -> str:
-    """Say how many of the rows left out lie outside a picture from `low` to `high`, and how far; else nothing."""
+    """Number of left-out rows that lie outside a picture from `low` to `high`, and how far; empty if none."""
     outside = residual[(residual < low) | (residual > high)]
     if not outside.size:
         return ""

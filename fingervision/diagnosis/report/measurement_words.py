@@ -1,4 +1,4 @@
-"""What the summary beside a measured table says of the clocks and of the gap's uncertainty, in sentences."""
+"""Sentences on the clocks and the gap's uncertainty, from the summary of a measured table."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ def measurement_words(table: Path) -> list[str]:
     try:
         return [*_clock(summary["settings"]), *_uncertainty(summary)] if summary else []
     except (LookupError, TypeError, ValueError, AttributeError):
-        # A summary of another version, or changed by hand, has no such content.
+        # A summary of another version, or one that was edited, may lack these entries.
         return []
 
 

@@ -19,9 +19,10 @@ from fingervision.models.place_answers import PlaceAnswers
 Array = NDArray[np.float64]
 
 STEPS = 15
-"""Positions of the slider over the input: parts of its range, each the mean of its rows."""
+"""Number of positions of the slider over the input: parts of the input's range, each with the mean of its rows."""
 TIME_STEPS, FEWEST_STEPS = 24, 4
-"""Positions over time, shared by all runs, and the fewest of a run: there and back at either end."""
+"""Number of positions of the slider over time in all runs together, and least number in one run: opening and closing at
+both ends."""
 SHOWN = 0.05
 """Largest displayed difference, as a share of the mechanism's size."""
 CHORDS = 9
@@ -88,10 +89,10 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
     data = json.dumps({"frames": frames, "centres": [body.centroid_mm.tolist() for body in bodies],
                        "names": [body.name for body in bodies]})  # fmt: skip
     said = (
-        f"Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, its difference from the prediction "
-        f"magnified {magnified:.3g} times. Colour: mean deviation of a body in units of its standard uncertainty; "
-        f"grey up to 3, yellow up to 6, red above. Rings: hinges; a heavy ring marks a hinge that the result names. "
-        f"Fixed bodies are not measured."
+        "Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, with the difference from the prediction "
+        f"magnified {magnified:.3g} times. Colour: mean deviation of a body in units of its standard uncertainty u "
+        "from noise: grey up to 3 u, yellow up to 6 u, red above. Rings: hinges; a hinge that the result names has a "
+        "heavy ring. Fixed bodies are not measured."
     )
     if unseen:
         said += f" Not measured: {', '.join(unseen)}."

@@ -141,7 +141,7 @@ def _target(place: float, up: dict[int, float], down: dict[int, float]) -> Targe
         u, freedom = float(paired.std(ddof=1) / np.sqrt(paired.size)), paired.size - 1
     elif above.s_mm is not None and below.s_mm is not None:
         u = float(np.hypot(below.s_mm / np.sqrt(below.n), above.s_mm / np.sqrt(above.n)))
-        # The smaller of the two, on the safe side of Welch and Satterthwaite.
+        # The smaller of the two degrees of freedom is a safe bound of Welch and Satterthwaite's formula.
         freedom = min(below.n, above.n) - 1
     return Target(place, below, above, below.mean_mm - above.mean_mm, u, freedom)
 

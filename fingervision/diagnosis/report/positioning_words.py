@@ -21,12 +21,12 @@ NAMES = {
 }
 REFERENCES = {
     "target": "Deviations are measured gap minus recorded input, less a constant.",
-    "model": "Deviations are measured minus simulated gap: they describe the errors of the model together with those "
-    "of the axis.",
+    "model": "Deviations are measured minus simulated gap: the quantities describe what the model lacks, not "
+    "the axis alone.",
 }
 SHARES = (
-    "The share of an effect is the value minus the value without the change that the best explanation predicts for "
-    "this effect. The values are ranges and maxima, so that the shares need not add up."
+    "Shares are those of the best explanation: each share is the figure minus the figure without the effect's "
+    "predicted change. Figures are ranges and maxima, so that shares need not add up."
 )
 SIDES = {"up": "approached from below", "down": "approached from above"}
 
@@ -122,8 +122,9 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
         if 0.0 < share * value <= (1.0 + TOLD) * value**2:
             causes.append(f"{_mm(abs(share))} mm are caused by {effect}")
         else:
-            # It hides a part of the figure, or others hide a part of it: what would stand without it is true always.
-            causes.append(f"without {effect} the value would be {_mm(value - share)} mm")
+            # The effect hides a part of the quantity, or other effects hide a part of the effect: state the quantity
+            # without the effect, which is always true.
+            causes.append(f"without {effect} it would be {_mm(value - share)} mm")
     words += f"; {', '.join(causes)}" if causes else ""
     rest = None if report.after is None else report.after.figures[symbol].value_mm
     return words + (f"; {_mm(rest)} mm remain after correction." if rest is not None else ".")
@@ -138,8 +139,8 @@ def _side_words(figure: Figure, slope_sign: int) -> str:
     if interval is None:
         return words
     if value * slope_sign < 0.0:
-        return f"{words}, as a play causes"
-    return f"{words}; a play would cause the opposite: are the two directions exchanged?"
+        return f"{words}, as play causes them"
+    return f"{words}; play would cause the opposite: are the directions swapped?"
 
 
 def _visits(visits: Visits | None) -> dict[str, float | None] | None:
@@ -148,7 +149,7 @@ def _visits(visits: Visits | None) -> dict[str, float | None] | None:
 
 def _mm(value_mm: float | None) -> str:
     """Write a length in millimetres, to a hundredth of a micrometre as in published reports."""
-    # Adding zero takes the sign from what rounds to zero.
+    # Adding zero removes the sign of a value that rounds to zero.
     return "-" if value_mm is None else f"{round(value_mm, 5) + 0.0:.5f}"
 
 

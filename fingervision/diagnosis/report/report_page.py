@@ -124,10 +124,11 @@ def _picture(png: bytes, words: str) -> str:
 
 def _how_much(report: DiagnosisReport) -> str:
     d = report.disagreement
+    unseen = ["runs that the fit did not see", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)]
     rows = [
         [_counted(d), *(number(rms_mm) for rms_mm in d.counted_mm)],
         ["all rows", number(d.before_rms_mm), number(d.after_rms_mm)],
-        ["runs left out of the fit", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)],
+        *([] if d.unseen_before_rms_mm is None else [unseen]),
         ["random noise", number(d.noise_rms_mm), ""],
         ["scatter of repeats (pure error)", number(report.pure_error_mm), ""],
     ]
@@ -139,7 +140,7 @@ def _how_much(report: DiagnosisReport) -> str:
 
 
 def _counted(d: Disagreement) -> str:
-    """What the verdict counts, in words."""
+    """Rows and offsets that the verdict counts, in words."""
     offsets = "" if d.unseen_before_rms_mm is None else ", without the runs' own offsets"
     return f"counted: {d.rows - d.rows_left_out} of {d.rows} rows{offsets}"
 

@@ -23,7 +23,7 @@ def stop_bed(name: str) -> str:
     Raises
     ------
     DataError, DeviceError, InputFileError, UsageError
-        The bed cannot be opened, or the other process does not let go of it.
+        The test bed cannot be opened, or the other process does not release it.
     """
     if name == SIMULATED:
         return "The simulated test bed is at rest: its motor moves only while a command runs."
@@ -42,10 +42,10 @@ def stop_bed(name: str) -> str:
                     "not: switch off the motor's power supply."
                 )
             sleep(LOOK_EVERY_S)
-        words = f"Process {process}, which drove the test bed, was ended. "
+        words = f"Process {process}, which operated the test bed, was ended. "
     bed = open_bed(name)
     try:
         bed.actuator.stop()
     finally:
         bed.close()
-    return f"{words}The motor is at rest, and all its lines are off."
+    return f"{words}The motor is at rest, and all lines of its controller are off."

@@ -7,7 +7,7 @@ from fingervision.testbed.recipe_kinds import CONTINUOUS, Asked, frames_of
 from fingervision.testbed.run.motion_segments import Go, Swing
 
 KEYS = ("mean_mm", "amplitude_mm", "frequency_hz", "cycles", "frames")
-# The stage goes to the mean as fast as it swings through it, but no slower than this.
+# The stage moves to the mean position at the highest speed of the sine, but at least at this speed.
 SLOWEST_APPROACH_MM_S = 0.05
 
 

@@ -99,7 +99,7 @@ class Leg:
             case Stand(seconds, _):
                 return f"rest for {seconds:g} s"
             case Swing(mean_mm, amplitude_mm, frequency_hz, _):
-                return f"oscillate about {mean_mm:g} mm by {amplitude_mm:g} mm at {frequency_hz:g} Hz"
+                return f"oscillate about {mean_mm:g} mm with an amplitude of {amplitude_mm:g} mm at {frequency_hz:g} Hz"
             case Close(speed, force_n):
                 return f"close at {speed:g} mm/s below {force_n:g} N"
             case Slot(size_mm, _):
