@@ -8,8 +8,8 @@ from time import monotonic
 
 from fingervision.domain.errors import OutputError
 
-# Longest time (s) for which a line waits in memory, and again in the writing thread; at most one second is lost when
-# the program is killed.
+# Longest time (s) for which a complete line waits in memory. A row may wait as long again before its line is added, so
+# that at most one second is lost when the program is killed.
 FLUSH_EVERY_S = 0.5
 
 

@@ -14,7 +14,7 @@ from fingervision.frames.open_container import open_container
 from fingervision.frames.received import OwnPacket
 from fingervision.vision.grey import to_grey
 
-# Unit of time of the recording (s); all times are multiples of it.
+# All times in the recording are multiples of 1 / TICKS_PER_S seconds.
 TICKS_PER_S = 1_000_000
 TIME_BASE = Fraction(1, TICKS_PER_S)
 # Matroska stores times in milliseconds only; fragmented MP4 stores exact times, and each frame is a fragment of its

@@ -183,7 +183,7 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
     Raises
     ------
     DataError, InputFileError, ModelError, UsageError
-        As `storage.model_toml.read_model` and `read_simulation_table`.
+        For the same reasons as in `storage.model_toml.read_model` and `read_simulation_table`.
     """
     reader: Callable[[Path], TableModel] = partial(_table_or_no_model, columns=columns)
     return model_toml.read_model(path, kind, table=reader)

@@ -56,7 +56,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     DataError
         The lines contain no table, or too many lines do not fit its columns.
     OpenQuestionError
-        A mark may be a decimal comma or set thousands apart.
+        A mark in the numbers may be a decimal sign or a thousands separator.
     """
     dialect = find_dialect(lines, given.words.get("separator", ""), given.words.get("decimal", ""))
     if dialect is None:

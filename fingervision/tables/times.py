@@ -141,7 +141,7 @@ def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
     numbers = [_ordinal(word, order) for word in words]
     if None in numbers:
         return None
-    # Counted from the first: a float holds the microseconds then.
+    # Times are counted from the first time, so that a float holds microseconds exactly enough.
     known = [number for number in numbers if number is not None]
     return np.array([number - known[0] for number in known] or [0], dtype=np.float64)
 

@@ -93,8 +93,7 @@ class Understood:
 
         Raises
         ------
-        OpenQuestionError
-            Something is.
+        OpenQuestionError There is an open question.
         """
         if self.questions:
             raise OpenQuestionError(self.path, self.kind, self.questions)
@@ -116,7 +115,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     Raises
     ------
     DataError
-        What the user has decided does not fit the table.
+        A decision of the user in columns.toml does not fit the table.
     """
     refuse_long_table(raw)
     about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))

@@ -134,7 +134,8 @@ def role_of(name: str) -> str | None:
         return None
     found = set(roles)
     if len(found) > 1:
-        # Words of a place: the left finger's position is not the input; what is about time or date is that.
+        # Priority of roles: the position of the left finger is not the input, and a name with a word for time or date
+        # is a time.
         for role in ("left", "right"):
             if role in found and found <= {role, "input", "gap"}:
                 return role
