@@ -25,8 +25,8 @@ ORDERS = ("dmy", "mdy")
 DAY_NUMBERS = (36526.0, 58500.0)
 """Days since 1899-12-30 of the years 2000 to 2060: a date as a spreadsheet stores it."""
 DAY_STEP = 0.01
-"""Largest median step between such numbers, in days: a log has a row every quarter of an hour at least, and seconds
-that follow one another by less than this began long before."""
+"""Largest median step between day numbers, in days: a log has at least one row per quarter of an hour. Numbers with
+larger steps are taken as seconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -93,7 +93,8 @@ class Understood:
 
         Raises
         ------
-        OpenQuestionError There is an open question.
+        OpenQuestionError
+            There is an open question.
         """
         if self.questions:
             raise OpenQuestionError(self.path, self.kind, self.questions)
