@@ -114,7 +114,7 @@ def iso230_rows(
     if not sided and "direction" not in header:
         raise DataError(
             f"{path} must have a column direction (up or down: the side from which the target was approached), but "
-            f"has {','.join(header)}: add it; or, where the rows stand in the order of travel, name the columns "
+            f"has {','.join(header)}: add it; or, if the rows are in the order of travel, name the columns "
             "input_mm and gap_mm."
         )
     wanted = ("run", *(() if sided else ("direction",)), *(() if blocks else ("cycle", "time_s", "u_random_mm")))

@@ -205,7 +205,7 @@ def _length(
     unit = given.units.get(role) or column.unit or names[place].unit
     size = factor(unit, "length") if unit else None
     if size is None:
-        why = f"is '{unit}', which is no length" if unit else "is not stated"
+        why = f"is '{unit}', which is not a length" if unit else "is not stated"
         questions.append(Question(f"the unit of '{column.name}' ({role}) {why}", f"units.{role}=mm"))
     values = _plain(raw, place)
     return Numbers(values.value * (size or 1.0), values.present)

@@ -163,8 +163,8 @@ def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
         if path.is_dir() or path.suffix.lower() in TABLE_ENDINGS:
             raise
         raise DataError(
-            f"{path} is no model: it must be a simulation table, a gripper.toml, mechanism.toml or model.toml, an FMU, "
-            f"or a Python file with simulate(time_s, input_mm). As a table it cannot be read: {error}"
+            f"{path} is not a model: it must be a simulation table, a gripper.toml, mechanism.toml or model.toml, an "
+            f"FMU, or a Python file with simulate(time_s, input_mm). As a table it cannot be read: {error}"
         ) from error
 
 

@@ -192,7 +192,7 @@ class _Rows:
             prose = sum(_is_prose(text, self._dialect.decimal) for text in told)
             if prose > MOST_PROSE * len(told):
                 raise DataError(
-                    f"{self._path} is no table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
+                    f"{self._path} is not a table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
                     "words, and a table has rows of two numbers or more. Name the file that holds the table."
                 )
             raise DataError(
