@@ -27,7 +27,7 @@ def drive_from_columns(table: Any) -> DriveHistory:
     ArgumentTypeError
         The argument has no columns.
     ArgumentError
-        A column is missing, or holds what is no number.
+        A column is missing, or a cell is not a number.
     DataError
         Times do not increase, or the rows of a run are not contiguous.
     """
@@ -52,7 +52,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     ArgumentTypeError
         The argument has no columns.
     ArgumentError
-        A column is missing, or holds what is no number.
+        A column is missing, or a cell is not a number.
     DataError
         For the same reasons as in `fingervision.read_table`.
     """
@@ -75,7 +75,7 @@ def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
     Raises
     ------
     ArgumentError
-        A column is missing, or holds what is no number.
+        A column is missing, or a cell is not a number.
     DataError
         There are fewer than two rows, an input occurs twice, or the gap does not depend on the input.
     """
