@@ -1,16 +1,13 @@
 """Reasons to refuse a log: no motion, a gap that does not follow the log, or a motion that repeats."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.measuring.clock.clock_offset import NoClockOffset
 from fingervision.measuring.clock.joint_fit import Fit
-from fingervision.measuring.clock.motion_model import WHITE, Motion
-from fingervision.measuring.clock.play_posterior import most_likely
-from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
+from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.set_points import ARRIVED, Jumps
 
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
 """Least number of frames with a gap, and of log rows: the fit has eight parameters."""
@@ -34,8 +31,9 @@ def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffs
     return None
 
 
-def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset | None:
+def many_left_out(every_frame: Motion, motion: Motion, found: Fit) -> NoClockOffset | None:
     """Refuse an offset that explains the frames only if many are left out, as at a wrong step of a staircase."""
+    within_log = every_frame.time_s.size
     left_out = within_log - motion.time_s.size
     if left_out <= MOST_LEFT_OUT * within_log:
         return None
@@ -46,24 +44,14 @@ def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset 
     )
 
 
-def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse a log of target positions instead of actual ones.
-
-    If the gap follows later than the log, the residuals resemble a random walk, and a fit to their differences may
-    explain nothing; the fit to the gap itself shows which share of the jumps the gap completes in time.
-    """
-    share = gap_arrives(motion, found)
-    if share is None:
-        return None
-    even = replace(motion, noise=WHITE)
-    by_gap = gap_arrives(even, most_likely(even, found.at))
-    share = share if by_gap is None else min(share, by_gap)
-    if share >= ARRIVED:
+def only_set_points(jumps: Jumps | None) -> NoClockOffset | None:
+    """Refuse a log of target positions instead of actual ones."""
+    if jumps is None or jumps.arrived >= ARRIVED:
         return None
     return NoClockOffset(
-        f"the drive's rows jump from one place to the next, and the gap makes a share of {max(share, 0.0):.2f} of "
-        "these jumps in their time: the rows are set-points, and when the stage arrived does not stand in them. "
-        "Log the stage's positions, or state --drive-offset-s."
+        "the drive's rows jump from one place to the next, and the gap makes a share of "
+        f"{max(jumps.arrived, 0.0):.2f} of these jumps in their time: the rows are set-points, "
+        "and when the stage arrived does not stand in them. Log the stage's positions, or state --drive-offset-s."
     )
 
 

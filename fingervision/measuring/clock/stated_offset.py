@@ -12,7 +12,7 @@ from fingervision.measuring.clock.offset_covariance import inflation
 from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
 from fingervision.measuring.clock.rivals import RunnerUp
-from fingervision.measuring.clock.set_points import gap_arrives
+from fingervision.measuring.clock.set_points import Jumps
 
 FOLLOWED = 0.95
 """Share of the gap's variance explained by the log below which a note says that something else also moves the gap."""
@@ -38,7 +38,13 @@ def crossed_in_s(path: LogPath) -> float:
 
 
 def stated(
-    motion: Motion, at: Posterior, best: Fit, spread: Spread, frame_s: float, runner_up: RunnerUp | None
+    motion: Motion,
+    at: Posterior,
+    best: Fit,
+    spread: Spread,
+    frame_s: float,
+    runner_up: RunnerUp | None,
+    jumps: Jumps | None,
 ) -> ClockOffset | NoClockOffset:
     """Convert the fitted offset to the time of the log's first row."""
     first_s = float(motion.drive.time_s[0])
@@ -56,8 +62,9 @@ def stated(
     variance += (SYSTEMATIC * np.hypot(frame_s, row_s)) ** 2
     # The frames see at what time within its interval the stage jumped, and the log does not. A programme that drives
     # and logs by one cycle jumps at the same place in each, so that many jumps do not average.
-    jumps = gap_arrives(motion, best) is not None
-    variance += row_s**2 / 12.0 if jumps else 0.0
+    if jumps is not None:
+        # Rows that are set-points come before the gap by up to half of its move, and short moves do not tell.
+        variance += (row_s**2 + jumps.move_s**2) / 12.0
     u_time_s = float(np.sqrt(np.mean(variance[:-1])))
     u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
     if not np.isfinite(u_time_s) or u_time_s > 0.1 * float(np.ptp(motion.time_s)):
@@ -78,7 +85,7 @@ def stated(
         )
     notes = []
     share = explained(motion, best)
-    if jumps:
+    if jumps is not None:
         notes.append(
             "The drive's rows jump from one place to the next: if they are set-points, and no positions, the time that "
             "the stage takes to follow is part of the offset."
