@@ -32,6 +32,10 @@ GUARD, MOST_TIMES = 1.5, 4.0
 TURN_AT = 0.1
 # A patch that is less sure than this (pixels) shows too little to be measured.
 LEAST_SURE_PX = 0.3
+# Texture too fine for the pixels may displace a patch by this (standard deviation in pixels, at its worst phase). With
+# more, lines jump from one column of pixels to the next: intervals covered 96 to 99 % up to here, and 90 % beyond
+# (`python -m tests.benchmarks.gauges --only drawings photographs`, without optics).
+MOST_ALIASED_PX = 0.04
 # Contrast below a grey level a pixel is rounding.
 LEAST_SPREAD = 1.0
 
@@ -104,8 +108,9 @@ class FollowedPatch:
             for k, (number, _, _, _) in enumerate(group):
                 place = (float(found.x_px[k]), float(found.y_px[k]), float(found.turn_rad[k]))
                 readings[number] = own[k].taken(
-                    place, found.covariance[k], float(found.correlation[k]), bool(found.settled[k])
-                )
+                    place, found.covariance[k], float(found.correlation[k]), bool(found.settled[k]),
+                    float(found.aliasing_px[k]),
+                )  # fmt: skip
         return [readings[number] for number in range(len(followers))]
 
     def _zone(self) -> Mark:
@@ -196,7 +201,12 @@ class FollowedPatch:
         return self._template
 
     def taken(
-        self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
+        self,
+        place: tuple[float, float, float],
+        covariance: NDArray[np.float64],
+        correlation: float,
+        settled: bool,
+        aliasing_px: float,
     ) -> Reading:
         """Accept or reject the result of a registration, and store an accepted result."""
         x, y, turn = place
@@ -206,6 +216,9 @@ class FollowedPatch:
             return self._failed(GaugeStatus.NOT_FOUND, "it would have moved farther than it may")
         if not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._failed(GaugeStatus.LOW_CONTRAST)
+        # Where it does not move it is refused too: unresolved lines stay in their pixels until they jump.
+        if aliasing_px > MOST_ALIASED_PX:
+            return self._failed(GaugeStatus.LOW_CONTRAST, "its texture is finer than the pixels: defocus a little")
         self._at, self._times = place, 1.0
         # The point that was drawn need not be the patch's own middle, which is a pixel's.
         (from_x, from_y) = self._spec.middle_px
