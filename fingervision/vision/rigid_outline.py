@@ -190,7 +190,9 @@ def _rigid(
     arm = chunks.middles[:, used] - about[:, None]
     nx, ny = chunks.normals[:, used]
     rigid = np.stack([nx, ny, -nx * arm[1] + ny * arm[0]], axis=1)
-    doubtful = doubtful_offsets(chunks.middles[:, used], chunks.normals[:, used], edges.blur[used], edges.u_blur[used])
+    doubtful = doubtful_offsets(
+        chunks.middles[:, used], chunks.normals[:, used], edges.blur[used], edges.u_blur[used], edges.stretch[used]
+    )
     # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance;
     # a doubtful side has an offset of its own. Of each of these it is known how large it may be.
     shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
