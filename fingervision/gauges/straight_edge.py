@@ -28,7 +28,8 @@ BEYOND_PX = 8
 # Nothing alike may be within so many times the reach of where it was: a motion may exceed what was stated by half, and
 # the neighbour is still not taken for it.
 GUARD = 1.5
-# After a frame without a number the thing may be farther away: so many times the reach at most.
+# After a frame without a number the thing may be farther away: so many times the reach at most, and not so far that
+# something like it, seen in the first frame beside it, could be taken for it.
 MOST_TIMES = 4
 # An edge beside it that has this share of its contrast is part of the model.
 LEAST_BESIDE = 0.1

@@ -27,7 +27,7 @@ SMALLEST_PX, LARGEST_PX = 9.0, 501.0
 # noise, the patch is too small for its texture.
 LEAST_CORRELATION, MOST_BY_CHANCE = 0.7, 0.9
 # Nothing alike may be within so many times the reach (as for edges).
-GUARD, MOST_TIMES = 1.5, 4.0
+GUARD, MOST_TIMES = 1.5, 4
 # The template is turned with the patch once it lags by this (radians, at a rim of 15 px a pixel and a half).
 TURN_AT = 0.1
 # A patch that is less sure than this (pixels) shows too little to be measured.
@@ -75,7 +75,7 @@ class FollowedPatch:
         self._least_correlation = LEAST_CORRELATION
         self._refused: Reading | None = None
         self._at = (*spec.middle_px, 0.0)
-        self._times = 1.0
+        self._times, self._most_times = 1.0, float(MOST_TIMES)
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
@@ -125,7 +125,7 @@ class FollowedPatch:
         return self._refused
 
     def _failed(self, status: GaugeStatus, words: str = "") -> Reading:
-        self._times = min(self._times + 1.0, MOST_TIMES)
+        self._times = min(self._times + 1.0, self._most_times)
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
@@ -152,11 +152,22 @@ class FollowedPatch:
         if chance > MOST_BY_CHANCE:
             return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
         self._least_correlation = max(LEAST_CORRELATION, chance)
+        self._most_times = self._times_alone(picture, template, column, row)
         self.reference = reference
         self._around, self._template = part, template
         self._at = (float(column), float(row), 0.0)
         zero = (Shift((x, y), (x, y), 0.0, 0.0), Shift((x, y), (x, y), 0.5 * np.pi, 0.0), Angle((x, y), 0.0, 0.0, True))
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
+
+    def _times_alone(self, picture: Picture, template: Template, column: int, row: int) -> float:
+        """How many times the reach a search may grow without reaching something like the patch."""
+        a, b = self.half
+        for times in range(2, MOST_TIMES + 1):
+            reach = ceil(GUARD * self._spec.reach_px * times) + BEYOND_PX
+            levels, _ = picture.part(column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1)
+            if not template.best_match(levels.astype(np.float32)).is_alone:
+                return float(times - 1)
+        return float(MOST_TIMES)
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
         """Locate the patch roughly: return the part of the picture for the registration, and an initial estimate."""
