@@ -167,7 +167,7 @@ def best_linear(
     for _ in range(STEPS):
         residual, jacobian, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
         white = whitened(np.column_stack([jacobian, residual]))
-        covariance = np.linalg.inv(white[:, :-1].T @ white[:, :-1] + prior)
+        covariance = np.asarray(np.linalg.inv(white[:, :-1].T @ white[:, :-1] + prior), dtype=np.float64)
         parameters = parameters - covariance @ (white[:, :-1].T @ white[:, -1] + prior @ (parameters - start))
         parameters[[INNER_R, OUTER_R]] = np.maximum(parameters[[INNER_R, OUTER_R]], 0.0)
     residual, _, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
