@@ -160,10 +160,11 @@ class VideoFile:
                 # (libavcodec/h264_slice.c, enable_er), so that parts of older pictures would remain unnoticed.
                 stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
+            tick_s = stream.time_base
             untrusted = unseen_damage(Path(self.name), stream, container.metadata.get("comment"))
             for tick, found in believable(pictures(container, stream, Path(self.name))):
                 index = next(numbers)
-                time_s = None if tick is None or stream.time_base is None else float(tick * stream.time_base)
+                time_s = None if tick is None or tick_s is None else tick * tick_s.numerator / tick_s.denominator
                 if untrusted or isinstance(found, str):
                     words = found if isinstance(found, str) else untrusted
                     yield LostFrame(index, time_s, Status.DAMAGED, words)
