@@ -12,14 +12,14 @@ step that counts is therefore the largest along the outlines of both fingers.
 """
 
 from dataclasses import replace
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
-from fingervision.domain.quantiser import Quantiser
+from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.median import middle
 from fingervision.vision.orientation import Orientation
@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 # Standard uncertainty of one edge's place in units of step over contrast. Measured on drawn recordings, upright and
 # leaning, 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
 DISPLACED = 0.4
+# So much of an outline (pixels) says where a finger's edge is: the rows that are fitted (`profile_lines.INNER`).
+ALONG_PX = 72.0
 # The blocks this far across an outline (standard deviations of the blur, and pixels more) carry the edge.
 ACROSS_SIGMAS, ACROSS_PX = 3.0, 2.0
 # Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
@@ -42,8 +44,8 @@ EVEN_SHIFTS = 2.0
 EIGHT_BITS = 255.0
 
 
-def displaced_px(step: float, contrast: float) -> float:
-    """Standard uncertainty of an edge's position (px) from a codec error that the whole edge shares.
+def displaced_px(step: float, contrast: float, slope: float = 0.0) -> float:
+    """Standard uncertainty of an edge's position along its normal (px) from a codec error that the whole edge shares.
 
     Parameters
     ----------
@@ -51,8 +53,12 @@ def displaced_px(step: float, contrast: float) -> float:
         Quantiser step, in grey levels of an 8-bit scale.
     contrast : float
         Contrast of the edge, in grey levels of an 8-bit scale.
+    slope : float
+        Slope of the edge against the blocks of the codec: an edge that crosses several columns of blocks averages
+        their errors, which are independent.
     """
-    return DISPLACED * step / max(abs(contrast), 1.0)
+    columns = 1.0 + abs(slope) * ALONG_PX / BLOCK_PX
+    return DISPLACED * step / max(abs(contrast), 1.0) / sqrt(columns)
 
 
 def outline_step(edges: EdgePoints, orientation: Orientation, quantiser: Quantiser) -> float:
@@ -120,7 +126,8 @@ def with_coding_error(
         Highest level of the scale.
     """
     left, right = (
-        displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level)) * _by_slope(edge.slope)
+        displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level), edge.slope)
+        * _by_slope(edge.slope)
         for edge, level in zip((found.left, found.right), inside, strict=True)
     )
     return _less_sure(found, left, right)

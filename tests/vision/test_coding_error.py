@@ -23,7 +23,7 @@ def u_gap_px(slope: float) -> float:
 def test_flank_and_tip_are_displaced_along_their_normals(slope: float) -> None:
     """Monte Carlo over a straight flank and a level tip, each moved along its own normal by itself."""
     rng = np.random.default_rng(4)
-    flank, tip = displaced_px(STEP, CONTRAST) * rng.standard_normal((2, 20_000))
+    flank, tip = displaced_px(STEP, CONTRAST, slope) * rng.standard_normal((2, 20_000))
     # The flank is the line across = slope * down; the measuring height goes with the tip.
     across = flank * np.hypot(1.0, slope) + slope * tip
     assert u_gap_px(slope) == pytest.approx(np.sqrt(2.0) * across.std(), rel=0.03)
