@@ -35,8 +35,9 @@ ALONG_PX = 72.0
 # The blocks this far across an outline (standard deviations of the blur, and pixels more) carry the edge.
 ACROSS_SIGMAS, ACROSS_PX = 3.0, 2.0
 # Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
-# coded by itself is displaced by less than one that is copied from its neighbours.
-SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 1.5}
+# coded by itself is displaced by less than one that is copied from its neighbours (the classes of HEVC, AV1 and MJPEG
+# in `compressed_video`).
+SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 2.0}
 # The same for a picture that claims to be as the sensor saw it (saved again, enlarged, interpolated from colours): its
 # rows are looked at as well, and what they share is in every frame alike, as far as anybody knows.
 EVEN_SHIFTS = 2.0
@@ -126,8 +127,7 @@ def with_coding_error(
         Highest level of the scale.
     """
     left, right = (
-        displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level), edge.slope)
-        * _by_slope(edge.slope)
+        displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level), edge.slope) * _by_slope(edge.slope)
         for edge, level in zip((found.left, found.right), inside, strict=True)
     )
     return _less_sure(found, left, right)
