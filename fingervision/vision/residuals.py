@@ -31,6 +31,9 @@ SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # Dust covers less than this share of the outline near the measuring point: what is more is the finger's own shape. A
 # point counts that has at least this weight.
 MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
+# Dust that hides so many points of a corner seldom does so at both fingers: a cut corner does, because it lies on both
+# sides of the fillet that fits it best.
+FEWEST_OF_CORNER = 3
 # Where most of the points within so many pixels above or below the measuring point are rejected, or half of them on
 # both sides, they may be the finger's own edge (a corner that is cut off, a bend) and not dust.
 BESIDE_PX = 4.0
@@ -100,6 +103,25 @@ def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, heigh
     sum (JCGM 100:2008, 4.3.7 and 5.2.2).
     """
     return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
+
+
+def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float) -> float:
+    """Largest residual (px) of several rejected points between the tip and the inner edge, where a cut is no fillet.
+
+    The result is 0 if too few points of the corner were rejected.
+
+    Parameters
+    ----------
+    points, end, found : OutlinePoints, FingerEnd, MeasuringPoint
+        Outline points, fitted end and measuring point of one finger.
+    below_tip_px : float
+        Distance of the measuring point below the tip.
+    """
+    is_corner = (points.x > found.apex) & (points.y < found.tip + below_tip_px + SHAPE_REACH_PX)
+    is_aside = is_corner & (end.robust <= 0.0)
+    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER:
+        return 0.0
+    return float(np.max(np.abs(end.residual * points.u)[is_aside]))
 
 
 def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:
