@@ -63,7 +63,7 @@ _HOMES = {
     "scale_from_sizes": "scale_from_sizes",
     "standard_response": "camera_response",
 }
-"""Where each public name lives, below this package."""
+"""Module of this package that defines each public name."""
 
 __all__ = list(_HOMES)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import hypot
 
-# Expanded uncertainties are stated with this factor, about 95 % (JCGM 100:2008, 6.2).
+# Coverage factor of expanded uncertainties, for a coverage of about 95 % (JCGM 100:2008, 6.2).
 COVERAGE_FACTOR = 2.0
 
 
@@ -31,7 +31,7 @@ class Agreement:
 
     @property
     def e_n(self) -> float:
-        """Ratio E_n of the deviation to its expanded uncertainty (ISO 13528:2022, 9.6); within +-1 the values agree."""
+        """Ratio E_n of deviation to expanded uncertainty (ISO 13528:2022, 9.6); the values agree if |E_n| <= 1."""
         expanded = COVERAGE_FACTOR * hypot(self.u_measured_mm, self.u_certified_mm)
         return self.deviation_mm / expanded if expanded > 0.0 else float("inf")
 

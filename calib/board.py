@@ -13,16 +13,19 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
-# A corner is refined within this part of the distance to its nearest neighbour: as many grey levels as there are
-# without meeting another edge.
+# Half width of the window in which a corner is refined, as a share of the distance to the nearest corner: the largest
+# window that contains no edges of other squares.
 WINDOW_PART = 0.3
-# A marker stands in every light square of a ChArUco board, and the window must end before it begins.
+# Half width of this window on a ChArUco board, as a share of the margin between the corner of a square and its marker,
+# which must lie outside the window.
 MARKER_MARGIN_PART = 0.8
 REFINED_PX, REFINING_STEPS = 1e-4, 100
-# Corners of one board fit a plane seen through an ordinary lens to this part of the board's extent.
+# Largest deviation of the corners from a plane in perspective, as a share of the board's extent; it allows for the
+# distortion of an ordinary lens.
 ONE_BOARD = 0.05
 FEWEST_CORNERS = 6
-# The largest dictionary of each family; a smaller one of the same family has the same markers under the same numbers.
+# The largest dictionary of each family; smaller dictionaries of a family contain the same markers with the same
+# numbers.
 DICTIONARIES = (
     "DICT_4X4_1000",
     "DICT_5X5_1000",
@@ -107,8 +110,8 @@ def find_corners(grey: Grey, board: Board, name: str) -> BoardCorners:
     if found is None:
         if board.marker_mm is None:
             raise CalibrationError(
-                f"{name} must show a chessboard of {board.columns}x{board.rows} inner corners, the whole of it, but "
-                f"does not: check --squares, which counts inner corners (a board of {board.columns + 1}x"
+                f"{name} must show a complete chessboard of {board.columns}x{board.rows} inner corners, but does not: "
+                f"check --squares, which states the number of inner corners (here of {board.columns + 1}x"
                 f"{board.rows + 1} squares), and that the board has a light margin."
             )
         raise CalibrationError(
@@ -123,7 +126,7 @@ def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | 
     size = (board.columns, board.rows)
     seen, corners = cv2.findChessboardCorners(grey, size)
     if not seen:
-        # The second finder sees boards that are blurred or noisy, and is slower.
+        # The second algorithm also finds boards in blurred or noisy pictures, but is slower.
         seen, corners = cv2.findChessboardCornersSB(grey, size, None, cv2.CALIB_CB_NORMALIZE_IMAGE)
     if not seen:
         return None
@@ -177,7 +180,8 @@ def _spacing_px(points_px: NDArray[np.float32]) -> float:
 
 
 def _refined(grey: NDArray[np.uint8], coarse: NDArray[np.float32], reach_px: float) -> Floats:
-    # Where the gradient is at right angles to the line from the corner (Foerstner & Guelch, ISPRS 1987).
+    # The corner is the point for which all gradients are perpendicular to the lines from the corner (Foerstner &
+    # Guelch, ISPRS 1987).
     reach = max(2, round(reach_px))
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, REFINING_STEPS, REFINED_PX)
     corners = cv2.cornerSubPix(grey, coarse.reshape(-1, 1, 2).copy(), (reach, reach), (-1, -1), criteria)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# Steps for differentiating a distance by the lens's parameters, as part of the parameter's standard uncertainty.
+# Step for the numerical derivative of a distance by a lens parameter, as a share of the parameter's standard
+# uncertainty.
 LENS_STEP = 0.1
 
 
@@ -89,7 +90,7 @@ def distance_budget(
     u_random_px : ndarray, shape (n,)
         Random standard uncertainty of each distance, in pixels of `flat_px`.
     polarity : ndarray, shape (n,)
-        +1 for a light gap, -1 for a dark one.
+        +1 for a light gap, -1 for a dark gap.
     """
     limits, s = scale.limits, scale.px_per_mm
     said = scale.how_stated
@@ -129,7 +130,8 @@ def distance_budget(
 
 
 def _through_scale(scale: "Calibration", change_px: Floats, of_scale: Floats, value_mm: Floats, sign: Floats) -> Floats:
-    # The same imperfection moved the reference's edges, and with them scale and bias: the two changes partly cancel.
+    # The same imperfection has displaced the edges of the reference, and so changed scale and edge bias; the two
+    # changes partly cancel.
     return np.asarray((change_px + sign * of_scale[1] - value_mm * of_scale[0]) / scale.px_per_mm)
 
 

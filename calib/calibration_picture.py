@@ -11,9 +11,9 @@ Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 GREEN, ORANGE, BLUE, WHITE = (60, 220, 60), (255, 150, 0), (90, 170, 255), (255, 255, 255)
-# OpenCV draws sub-pixel points as whole numbers of 1/16 px.
+# OpenCV draws sub-pixel points as multiples of 1/16 px.
 SHIFT = 4
-# The largest residuals are drawn about this long (pixels of the picture).
+# Approximate length with which the largest residual is drawn (pixels of the picture).
 DRAWN_PX = 14.0
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
 # Small pictures are enlarged so that lines and words can be read.
@@ -127,7 +127,7 @@ def _canvas(grey: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[Picture, int]
 
 
 def _zoomed(points: Floats, zoom: int) -> Floats:
-    # The centre of the first pixel is (0, 0), before and after every pixel became zoom x zoom of them.
+    # The centre of the first pixel is (0, 0) in the original and in the enlarged picture.
     return np.asarray((points + 0.5) * zoom - 0.5)
 
 

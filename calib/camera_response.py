@@ -17,12 +17,14 @@ from calib.errors import CalibrationError
 Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Lossy codecs return a white that was cut off within this share of full scale; it is one level of 8 bits.
+# Largest deviation (share of full scale) of a clipped white from its nominal level after a lossy codec: one level of 8
+# bits.
 WHITE_SLACK = 1.0 / 255.0
-# Pixels brighter than white, relative to those at white, above which a video uses the levels beyond white: an uncut
-# plateau at white with noise of 3 levels has 0.8, rings of a codec about a white that was cut off below 0.1.
+# Ratio of the number of pixels brighter than white to the number at white, above which a video uses the levels beyond
+# white. An unclipped white plateau with noise of 3 levels has the ratio 0.8; ringing of a codec around a clipped white
+# gives less than 0.1.
 MOST_BRIGHTER = 0.25
-# A curve through fewer measured points than this is a guess.
+# Smallest number of points of a measured curve.
 FEWEST_POINTS = 8
 
 
@@ -64,7 +66,9 @@ class CameraResponse:
                 f"{level.size}: measure it with `fingervision calibrate response`."
             )
         if not (np.isfinite(level).all() and np.isfinite(light).all()):
-            raise CalibrationError(f"Levels and light of the camera response {self.name} must all be numbers.")
+            raise CalibrationError(
+                f"All levels and light values of the camera response {self.name} must be finite numbers."
+            )
         for what, values in (("level", level), ("light", light)):
             falls = np.flatnonzero(np.diff(values) <= 0.0)
             if falls.size:
@@ -74,8 +78,8 @@ class CameraResponse:
                 )
         if abs(level[0]) > 1e-9 or abs(level[-1] - 1.0) > 1e-9:
             raise CalibrationError(
-                f"The levels of the camera response {self.name} must reach from 0 to full scale, but reach from "
-                f"{level[0]:.3g} to {level[-1]:.3g} of it."
+                f"The levels of the camera response {self.name} must extend from 0 to full scale, but extend from "
+                f"{level[0]:.3g} to {level[-1]:.3g} of full scale."
             )
 
     def table(self, top_level: int, size: int, highest: int | None = None) -> Floats:
@@ -88,7 +92,7 @@ class CameraResponse:
         size : int
             Length of the table; levels beyond full scale are assigned the light of full scale.
         highest : int or None
-            Level at which the pictures are cut off, and beyond which all levels have the same light; None for full
+            Level at which the pictures are clipped, and beyond which all levels have the same light; None for full
             scale.
 
         Raises
@@ -99,15 +103,16 @@ class CameraResponse:
         if self.top_level is not None and self.top_level != top_level:
             raise CalibrationError(
                 f"The camera response {self.name} was measured on levels up to {self.top_level}, but these pictures "
-                f"have levels up to {top_level}: measure it on pictures of this depth, or state --bits."
+                f"have levels up to {top_level}: measure it on pictures of this bit depth, or state the bit depth by "
+                "--bits."
             )
         share = np.minimum(np.arange(size), top_level if highest is None else highest) / top_level
         return np.asarray(top_level * np.interp(share, self.level, self.light))
 
     def cut_off_at(self, grey: Grey, top_level: int) -> int:
-        """Level at which a picture is cut off: full scale, or white if hardly any pixel of a video is brighter.
+        """Level at which a picture is clipped: full scale, or white if hardly any pixel of a video is brighter.
 
-        Many cameras use the levels above the white of studio range as well; their pictures are cut off at full scale.
+        Many cameras use the levels above the white of studio range as well; their pictures are clipped at full scale.
 
         Parameters
         ----------
@@ -124,7 +129,7 @@ class CameraResponse:
         return top_level if brighter > MOST_BRIGHTER * at_white else white - slack
 
     def linearised(self, grey: Grey, top_level: int) -> NDArray[np.uint16]:
-        """Convert a picture to values proportional to light, in 16 bits; where it is cut off, to full scale."""
+        """Convert a picture to 16-bit values proportional to light; clipped levels become full scale."""
         table = self.table(top_level, int(np.iinfo(grey.dtype).max) + 1, self.cut_off_at(grey, top_level))
         return np.asarray(np.rint(table * (65535.0 / table[top_level])).astype(np.uint16)[grey])
 
@@ -181,7 +186,7 @@ def _pq(level: Floats) -> Floats:
     m1, m2, c1, c2, c3 = 2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
     root = level ** (1.0 / m2)
     display_cd_m2 = 10_000.0 * (np.maximum(root - c1, 0.0) / (c2 - c3 * root)) ** (1.0 / m1)
-    # The OOTF is the curve of BT.709, continued to 59.5208 times its white, and the display's exponent of 2.4.
+    # The OOTF consists of the curve of BT.709, continued to 59.5208 times its white, and the display's exponent of 2.4.
     return _bt709((display_cd_m2 / 100.0) ** (1.0 / 2.4))
 
 

@@ -1,7 +1,8 @@
 """Sources of a distance's uncertainty, one function each; only `calib.budget` combines them.
 
 Every function returns a standard uncertainty in millimetres, shape (n,), for n distances. The formula is
-gap_mm = (gap_px + p b) / s, with p = +1 for a light gap and -1 for a dark one (JCGM 100:2008, equation 13).
+gap_mm = (gap_px + p b) / s, where gap_px is the measured width, s the scale, b the edge bias, and p = +1 for a light
+gap and -1 for a dark gap (JCGM 100:2008, equation 13).
 """
 
 from math import cos, sqrt
@@ -37,7 +38,7 @@ def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, cova
 
 
 def plane_mm(value_mm: Floats, limits: Limits) -> Floats:
-    """Contribution of a gripper plane nearer to the camera, or farther, than the reference: dg / g = dz / Z."""
+    """Contribution of a plane that is not at the distance Z of the reference from the camera: dg / g = dz / Z."""
     return np.asarray(np.abs(value_mm) * rectangular(limits.plane_mm) / limits.camera_distance_mm)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-# Correlation is looked for over at most this part of the rows.
+# Largest lag of the correlation, as a share of the number of rows.
 LONGEST_PART = 0.25
 
 

@@ -12,19 +12,20 @@ from calib.straight_edges import FINDING_SIDES_PX, StraightEdge, find_straight_e
 Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Two edges are parallel when found within so many degrees; a taper that is measured then must be below the second.
+# Largest angle between two candidate edges (degrees), and largest change of the width per length after the measurement.
 PARALLEL_DEG, LARGEST_TAPER = 5.0, 0.02
-# They face each other over at least this part of the longer edge of the two, and this part of their distance.
+# Smallest length over which two edges face each other, as a share of the longer edge, and as a share of their distance.
 LEAST_FACING, LEAST_FACING_OF_WIDTH = 0.3, 0.12
-# An edge between the two that is at least this part as long means that they are not neighbours.
+# Two edges are not neighbours if an edge between them extends over this share of the length over which they face each
+# other.
 BETWEEN = 0.3
-# Pairs whose step is below this part of the strongest are shadows and reflections.
+# Smallest contrast of a pair as a share of the strongest pair's; weaker pairs are shadows and reflections.
 LEAST_OF_STRONGEST = 0.4
-# Pairs that are found twice agree to this (pixels).
+# Pairs that agree within this distance (pixels) are the same pair.
 SAME_PAIR_PX = 3.0
-# An edge across a pair joins it where it reaches from one to the other, to this part of their distance.
+# Tolerance for an edge that joins the two edges of a pair, as a share of their distance.
 ACROSS = 0.15
-# The longest edges are looked at; what is shorter than the hundredth is texture.
+# Largest number of edges that are examined; shorter edges beyond this number are regarded as texture.
 MOST_EDGES = 100
 
 

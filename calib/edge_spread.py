@@ -18,19 +18,22 @@ from calib.errors import CalibrationError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# The first look reaches so far from the coarse edge (pixels); enough for the strongest blur that is still measured.
+# Half width of the first window about the coarse edge (pixels), which suffices for the largest blur that can be
+# measured.
 FIRST_REACH_PX = 20
-# The fit reaches so many standard deviations, and so many pixels more, to either side. Uneven light over that reach
-# moves both edges of a pair the same way: their distance stays right to 0.002 px for 40 % across the picture.
+# Half width of the fit's window: this multiple of the blur plus these pixels. Uneven light within the window displaces
+# both edges of a pair in the same direction; the error of their distance is 0.002 px for a change of light of 40 %
+# across the picture.
 REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 4.0
-# Blur of an edge is looked for within these limits (pixels).
+# Limits of the fitted blur (pixels).
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.15, 8.0
-# Gauss-Newton steps; they end when nearly all rows have settled. A row without an edge never does.
+# Largest number of Gauss-Newton steps. The iteration ends when this share of the rows changes by less than the
+# tolerance (pixels); rows without an edge do not converge.
 STEPS, SETTLED_PX, SETTLED_ROWS = 12, 1e-6, 0.9
-# Parameters of a row's own: two levels and the position.
+# Number of parameters of each row: two levels and the position.
 OWN_PARAMETERS = 3
-# A clipped flank bends the spread: (2 t50 - t10 - t90) / (t90 - t10) is 0 for a Gaussian, and 0.09 where the sensor
-# cuts off the upper tenth of the step.
+# Asymmetry above which a flank counts as clipped. With the positions t10, t50 and t90 at 10, 50 and 90 % of the step,
+# (2 t50 - t10 - t90) / (t90 - t10) is 0 for a Gaussian, and 0.09 if the sensor clips the upper tenth of the step.
 CLIPPED_ASYMMETRY = 0.08
 
 
@@ -68,7 +71,7 @@ class EdgeRows:
     x_px : ndarray
         Column at which the edge crosses the middle of the row.
     u_x_px : ndarray
-        Standard uncertainty from the noise that all rows share.
+        Standard uncertainty from the noise, whose variance is the same in all rows.
     contrast : ndarray
         Step in grey levels; positive if it has the expected sign.
     unexplained : ndarray
@@ -124,7 +127,8 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
     inside = (columns - reach >= 0) & (columns + reach < grey.shape[1])
     if np.count_nonzero(inside) < OWN_PARAMETERS or 2 * reach + 1 <= OWN_PARAMETERS + 1:
         raise CalibrationError(
-            "The edge is nearer to the border or to another edge than its own blur: leave more room around it."
+            "The distance of the edge from the picture's border or from another edge is smaller than its blur: leave "
+            "more space around the edge."
         )
     rows, columns, middle = rows[inside], columns[inside], middle[inside]
     window = columns[:, None] + np.arange(-reach, reach + 1)
@@ -136,7 +140,7 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
         normal[:, 2, 2] += np.finfo(float).eps
         right = np.einsum("nwi,nwk->nik", jacobian, np.stack([left, by_sigma], axis=2))
         solved = np.linalg.solve(normal, right)
-        # What is left of the blur's derivative once every row has used its own parameters (Schur complement).
+        # Part of the derivative by the blur that the rows' own parameters cannot reproduce (Schur complement).
         own = np.einsum("nwi,ni->nw", jacobian, solved[:, :, 1])
         free = by_sigma - own
         step = float(np.sum(free * left) / max(float(np.sum(free * by_sigma)), np.finfo(float).tiny))
@@ -153,7 +157,7 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
     normal = np.einsum("nwi,nwj->nij", jacobian, jacobian)
     normal[:, 2, 2] += np.finfo(float).eps
     row_variance = np.sum(left**2, axis=1) / (window.shape[1] - OWN_PARAMETERS)
-    # 8-bit rounding alone leaves 1/12 of a grey level squared.
+    # Rounding to 8 bits causes a variance of 1/12 grey level squared, which is the least variance.
     variance = max(float(np.median(row_variance)), 1.0 / 12.0)
     return EdgeRows(
         rows=rows,
@@ -175,12 +179,16 @@ class _Profile:
 
 
 def _mean_profile(grey: Floats, rows: Ints, coarse: CoarseEdge, reach: int) -> _Profile:
-    # Rows cross a slanted edge at many sub-pixel places: sorted by their distance from it they are one fine profile.
+    # Rows cross a slanted edge at many sub-pixel positions; all pixels, sorted by their distance from the edge, form
+    # one finely sampled profile.
     middle = coarse.x_px(rows)
     columns = np.rint(middle).astype(np.int_)
     inside = (columns - reach >= 0) & (columns + reach < grey.shape[1])
     if reach < 2 or not np.any(inside):
-        raise CalibrationError("The edge has no room: it is nearer to the border or to another edge than its own blur.")
+        raise CalibrationError(
+            "The distance of the edge from the picture's border or from another edge is smaller "
+            "than its blur: leave more space around the edge."
+        )
     window = columns[inside, None] + np.arange(-reach, reach + 1)
     seen = grey[rows[inside, None], window]
     levels = np.median(seen, axis=0).astype(np.float64)
@@ -190,12 +198,15 @@ def _mean_profile(grey: Floats, rows: Ints, coarse: CoarseEdge, reach: int) -> _
     ends = max(1, reach // 3)
     low, high = float(np.mean(levels[:ends])), float(np.mean(levels[-ends:]))
     if not high > low:
-        raise CalibrationError("There is no step in grey level where the edge should be.")
+        raise CalibrationError(
+            "There is no step of the grey level at the expected position of the edge: check the "
+            "picture, its light and its focus."
+        )
     share = np.asarray((levels - low) / (high - low), dtype=np.float64)
     t10, t16, t50, t84, t90 = (_crossing(away, share, level) for level in (0.1, 0.1587, 0.5, 0.8413, 0.9))
     cosine = 1.0 / np.hypot(1.0, coarse.slope)
     sigma = float(np.clip((t84 - t16) / 2.0 * cosine, 0.5, LARGEST_BLUR_PX / 1.5))
-    # Positive where the upper end of the step is the sharper one; a plateau that is cut off has one level throughout.
+    # The asymmetry is positive if the upper end of the step is sharper; a clipped plateau has a single level.
     asymmetry = (t50 - t10 - (t90 - t50)) / max(t90 - t10, 1e-9)
     flat = [bool(np.mean(seen[:, columns] == limit) > 0.5) for columns, limit in _ends(ends, coarse.rising, grey)]
     to_light = asymmetry if coarse.rising else -asymmetry
@@ -210,7 +221,7 @@ def _ends(width: int, rising: bool, grey: Floats) -> tuple[tuple[slice, float], 
 
 
 def _crossing(away: Floats, share: Floats, level: float) -> float:
-    # The crossing nearest to the coarse edge: something farther out must not be taken for it.
+    # Of several crossings, the one nearest to the coarse edge is used.
     above = share >= level
     at = np.flatnonzero(~above[:-1] & above[1:])
     if at.size == 0:
@@ -224,7 +235,7 @@ def _normal(x: Floats) -> Floats:
 
 
 def _linearised(levels: Floats, away: Floats, cosine: float, sigma_px: float) -> tuple[Floats, Floats, Floats, Floats]:
-    # Share of the right-hand level in a pixel whose width across the edge is `cosine`: the integral of ndtr over it.
+    # Share of the right-hand level in a pixel: integral of ndtr over the pixel's width across the edge, `cosine`.
     upper, lower = (away * cosine + cosine / 2) / sigma_px, (away * cosine - cosine / 2) / sigma_px
     n_upper, n_lower, p_upper, p_lower = ndtr(upper), ndtr(lower), _normal(upper), _normal(lower)
     share = sigma_px / cosine * (upper * n_upper + p_upper - lower * n_lower - p_lower)

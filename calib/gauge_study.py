@@ -11,8 +11,8 @@ from calib.errors import CalibrationError
 
 Floats = NDArray[np.float64]
 
-# A gauge is said to take up this many standard deviations (AIAG, Measurement Systems Analysis, 4th ed.
-# 2010, chapter III).
+# Number of standard deviations that count as the spread of a gauge (AIAG, Measurement Systems Analysis, 4th ed. 2010,
+# chapter III).
 SPREAD = 6.0
 # Verdicts of the same manual: good below 10 %, doubtful up to 30 %.
 GOOD_PERCENT, DOUBTFUL_PERCENT = 10.0, 30.0
@@ -23,7 +23,7 @@ readings are not repeats of one value. The ratio is 1 +- 1 / sqrt(n) for indepen
 doi:10.1214/aoms/1177731677) and 0.41 n for n readings of a steady motion; a drift that triples the noise makes a gauge
 study equally meaningless."""
 FEWEST_TO_TELL = 12
-"""Least number of readings for this test; with fewer, neither of the two standard deviations is known well enough."""
+"""Least number of readings for the test of motion; from fewer readings, standard deviations are too uncertain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,9 @@ class GaugeStudy:
             If the tolerance is not positive.
         """
         if not (isfinite(tolerance_mm) and tolerance_mm > 0.0):
-            raise CalibrationError(f"The tolerance must be positive, but is {tolerance_mm} mm: give its whole width.")
+            raise CalibrationError(
+                f"The tolerance must be positive, but is {tolerance_mm} mm: give the full width of the tolerance."
+            )
         return 100.0 * SPREAD * self.grr_mm / tolerance_mm
 
     @property
@@ -87,7 +89,8 @@ def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
     Raises
     ------
     CalibrationError
-        The spread of the readings is much larger than their scatter from one to the next: the gap moved.
+        The standard deviation of the readings is much larger than that of successive differences, because the gap
+        moved.
     """
     values = np.asarray(readings_mm, dtype=np.float64)
     if values.size < FEWEST_TO_TELL:
@@ -98,7 +101,7 @@ def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
         raise CalibrationError(
             f"The readings of {name} must repeat one gap, but they move from {values.min():.4f} to {values.max():.4f} "
             f"mm (standard deviation {1e3 * spread:.3g} um, from reading to reading {1e3 * from_one_to_next:.3g} um): "
-            "record a gap that is held; or, where a staircase was driven, add --by-input."
+            "record a gap that does not move, or, if the stage moved in steps, add --by-input."
         )
 
 
@@ -122,7 +125,9 @@ def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
     """
     lengths = {len(cell) for recording in readings_mm for cell in recording}
     if len(lengths) != 1 or len({len(recording) for recording in readings_mm}) != 1:
-        raise CalibrationError("Every recording must hold the same parts, and every part the same number of readings.")
+        raise CalibrationError(
+            "Every recording must contain the same parts, and every part must have the same number of readings."
+        )
     values = np.array(readings_mm, dtype=np.float64)
     recordings, parts, trials = values.shape
     if recordings < 2:

@@ -15,17 +15,21 @@ from calib.parallel_edges import ParallelEdges
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
 KINDS = ("bar", "slot")
-# Objects whose edges are shorter than this part of the longest's are chips and shadows.
+# Smallest length of an object's edges as a share of the longest edge; shorter edges belong to chips and shadows.
 SHORTEST_OF_LONGEST = 0.2
-# A rectangle seen whole has two widths. Alone, that of its longer edges is taken if they are so much longer.
+# Ratio of edge lengths above which the distance between the longer edges is used, if a completely visible rectangle has
+# two possible widths and other pictures do not decide.
 CLEARLY_LONGER = 1.3
-# Pictures of one scene agree on the scale to this part: more than any blooming, far less than a wrong unit.
+# Largest relative difference between the scales of pictures of one scene: more than blooming causes, and much less than
+# a wrong unit.
 SAME_SCALE = 0.06
-# What a size is multiplied by where it was stated in another unit.
+# Factors between a size in a wrong unit and the size in millimetres, with their words.
 WRONG_UNITS = {0.1: "ten", 10.0: "ten", 25.4: "25.4", 1.0 / 25.4: "25.4", 0.001: "a thousand", 1000.0: "a thousand"}
-# One combination is taken without asking where the next one disagrees by more than noise, and so much more.
+# The best combination of widths is used if the second best disagrees by more than the first value, which noise does not
+# cause, and the best disagrees by less than this share of it.
 NOT_NOISE, CLEARLY_BETTER = 0.01, 0.3
-# With more pictures than this, combinations are not tried; the longer edges are taken.
+# Largest number of pictures for which combinations are tried; with more pictures, the distances between the longer
+# edges are used.
 MOST_COMBINED = 12
 
 
@@ -91,8 +95,8 @@ def find_widths(
     for picture, width in zip(pictures, widths, strict=True):
         if width.clipped:
             raise CalibrationError(
-                f"The flank of an edge in {picture.name} is cut off by the sensor's full scale, so its place is "
-                "unknown: lower the exposure or the light and take the picture again."
+                f"The flank of an edge in {picture.name} is clipped at the sensor's full scale, so that its position "
+                "is unknown: reduce the exposure or the light, and take the picture again."
             )
     return widths
 
@@ -109,9 +113,9 @@ def _choices(
         edges = straight_edges_in_view(picture.grey, region)
         if edges:
             raise CalibrationError(
-                f"{picture.name} must show two parallel straight edges, but only {edges} straight edge"
-                f"{'s stand' if edges > 1 else ' stands'} in it and none has a partner in {where}: bring both edges "
-                f"of the {picture.kind} into view, away from the border, or give a region with --roi."
+                f"{picture.name} must show two parallel straight edges in {where}, but shows {edges} straight edge"
+                f"{'s' if edges > 1 else ''} without a parallel edge: bring both edges of the {picture.kind} into "
+                "view, away from the border, or give a region with --roi."
             )
         raise CalibrationError(
             f"{picture.name} must show a {picture.kind} with two parallel straight edges, but there is no straight "
@@ -129,8 +133,8 @@ def _choices(
     if len(objects) > 1:
         named = ", ".join(found[0].words() for found in objects[:5])
         raise CalibrationError(
-            f"{picture.name} must show one {picture.kind}, but {len(objects)} candidates stand in {where} ({named}): "
-            "choose one with --roi X,Y,W,H."
+            f"{picture.name} must show one {picture.kind}, but there are {len(objects)} candidates in {where} "
+            f"({named}): choose one of them by --roi X,Y,W,H."
         )
     return objects[0][:2]
 
@@ -158,9 +162,10 @@ def _refuse_cut(picture: KnownSize, width: ParallelEdges, region: tuple[int, int
     """Refuse a rectangle with three visible sides, because the certified width may include the fourth."""
     if width.length_px < CLEARLY_LONGER * width.width_px and has_square_end(picture.grey, region, width):
         raise CalibrationError(
-            f"{picture.name} shows three sides of a rectangle, and the border may cut off an edge of the "
-            f"{picture.size_mm:g} mm: bring the whole width into view, or, if it is the {width.width_px:.1f} px "
-            "between the two parallel sides, give a region with --roi that leaves the third side out."
+            f"{picture.name} shows three sides of a rectangle, and the certified width of {picture.size_mm:g} mm may "
+            f"extend beyond the border: bring the whole width into view; or, if the certified width is that of "
+            f"{width.width_px:.1f} px between the two parallel sides, give a region with --roi that excludes the "
+            "third side."
         )
 
 
@@ -172,7 +177,8 @@ def _expected(
         nearest = min(found, key=lambda pair: abs(pair.width_px - picture.size_mm * px_per_mm))
         if not 0.8 < nearest.width_px / (picture.size_mm * px_per_mm) < 1.25:
             raise CalibrationError(
-                f"{picture.name} is stated to be {picture.size_mm:g} mm, but by the calibration it is about "
+                f"{picture.name} is stated to be {picture.size_mm:g} mm, but according to the calibration its size is "
+                "about "
                 f"{nearest.width_px / px_per_mm:.4g} mm: check the object, and that the size is in millimetres."
             )
         widths.append(nearest)
@@ -197,9 +203,9 @@ def _settled(pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelE
     for picture, found in zip(pictures, choices, strict=True):
         if len(found) > 1 and found[0].length_px < CLEARLY_LONGER * found[1].length_px:
             raise CalibrationError(
-                f"{picture.name} shows a rectangle that is {found[0].width_px:.1f} px one way and "
-                f"{found[1].width_px:.1f} px the other, and either could be the {picture.size_mm:g} mm: give a region "
-                "with --roi that holds the two measured edges and leaves the other two out."
+                f"{picture.name} shows a rectangle of {found[0].width_px:.1f} px by {found[1].width_px:.1f} px, and "
+                f"either side could have the size of {picture.size_mm:g} mm: give a region with --roi that contains "
+                "only the two edges to be measured."
             )
     return longer_edges if any(each == longer_edges for each in agreeing) else agreeing[0]
 
@@ -218,11 +224,11 @@ def _refuse_unit(
             other = sizes.copy()
             other[index] *= factor
             if any(_disagreement(each, other) < SAME_SCALE for each in combinations):
-                # Of two pictures either may be the wrong one.
-                others = "" if len(pictures) > 2 else f" (or {pictures[1 - index].name} is wrong the other way)"
+                # With two pictures, the size of either picture may be wrong.
+                others = "" if len(pictures) > 2 else f" (or {pictures[1 - index].name} is wrong by the inverse factor)"
                 raise CalibrationError(
                     f"All pictures must have one scale, but {picture.name} would have to be {other[index]:.4g} mm "
-                    f"instead of {picture.size_mm:g} mm, a factor of {words}, to agree with the others"
+                    f"instead of {picture.size_mm:g} mm, a factor of {words}, to agree with the other pictures"
                     f"{others}: state every size in millimetres."
                 )
 
@@ -233,6 +239,6 @@ def _refuse_sizes(pictures: Sequence[KnownSize], widths: Sequence[ParallelEdges]
     others = float(np.median(np.delete(scales, odd)))
     raise CalibrationError(
         f"All pictures must have one scale, but {pictures[odd].name} of {pictures[odd].size_mm:g} mm gives "
-        f"{scales[odd]:.4g} px/mm where the others give {others:.4g}: check the sizes, and that the camera was not "
+        f"{scales[odd]:.4g} px/mm and the others give {others:.4g}: check the sizes, and that the camera was not "
         "moved or refocused between the pictures."
     )

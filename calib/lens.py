@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# The distortion polynomial is inverted by repeated substitution; each step gains about a digit for ordinary lenses.
+# Steps of the fixed-point iteration that inverts the distortion; for ordinary lenses each step improves the result by
+# about one digit.
 UNDISTORT_STEPS = 25
 
 

@@ -13,9 +13,10 @@ from calib.lens import Lens
 
 Floats = NDArray[np.float64]
 
-# Columns of OpenCV's Jacobian: rotation 3, translation 3, then focal lengths 2, centre 2, k1, k2, p1, p2, k3.
+# Numbers of columns of OpenCV's Jacobian for the pose (3 rotation, 3 translation) and for the lens (2 focal lengths, 2
+# coordinates of the centre, k1, k2, p1, p2, k3).
 POSE, LENS = 6, 9
-# k3 must lower the sum of squares by more than this many variances to be believed (one parameter, chance of 0.1 %).
+# Reduction of chi-square above which k3 is fitted (one parameter, significance level of 0.1 %).
 WORTH_A_PARAMETER = 10.8
 
 
@@ -54,7 +55,7 @@ def lens_from_boards(pictures: Sequence[BoardCorners], frame_size_px: tuple[int,
     if len(pictures) < 3:
         raise CalibrationError(
             f"A lens needs at least three pictures of the board at different tilts, but there are {len(pictures)}: "
-            "take more, or give a single one for the plane alone."
+            "take more pictures, or give a single picture to calibrate only the plane."
         )
     board = [np.column_stack([each.board_mm, np.zeros(len(each.board_mm))]).astype(np.float32) for each in pictures]
     seen = [each.points_px.astype(np.float32).reshape(-1, 1, 2) for each in pictures]
@@ -94,7 +95,7 @@ def _covariance(
         of_pose, of_lens = jacobian[:, :POSE], jacobian[:, POSE : POSE + LENS].copy()
         if held:
             of_lens[:, 8] = 0.0
-        # The pose of every picture is free: what it can imitate says nothing about the lens (Schur complement).
+        # The pose of every picture is free, so that changes which a pose can reproduce are removed (Schur complement).
         free = of_lens - of_pose @ np.linalg.lstsq(of_pose, of_lens, rcond=None)[0]
         normal += free.T @ free
         left = each.points_px - np.asarray(predicted).reshape(-1, 2)

@@ -54,11 +54,11 @@ class Limits:
         if self.camera_distance_mm <= 0.0:
             raise CalibrationError(
                 f"camera_distance_mm must be positive, but is {self.camera_distance_mm}: "
-                "give the distance from the lens's front to the reference."
+                "give the distance from the front of the lens to the reference."
             )
         if self.tilt_deg >= 45.0:
             raise CalibrationError(
-                f"tilt_deg must be below 45, but is {self.tilt_deg}: calibrate so oblique a view with a chessboard."
+                f"tilt_deg must be below 45, but is {self.tilt_deg}: calibrate an oblique view with a chessboard."
             )
 
     @property

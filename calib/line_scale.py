@@ -19,15 +19,16 @@ from calib.line_search import FEWEST_ROWS, CoarseLines, lines_to_a_pixel
 Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Lines are cut into so many pieces along their length: their scatter is the uncertainty.
+# Number of pieces into which a line is divided along its length; the scatter of the pieces gives the uncertainty.
 PIECES = 8
-# A line narrower than so many blurs shows its middle, but not its two edges.
+# Smallest ratio of a line's width to the blur at which the two edges can be distinguished; a narrower line shows only
+# its centre.
 RESOLVED_BLURS = 2.0
-# Pixels of a line are summed up in bins of this breadth.
+# Width of the bins in which the pixels of a line are averaged.
 BIN_PX = 0.125
-# Lines that the blur is told from.
+# Number of lines from which the blur is determined.
 LINES_FOR_BLUR = 8
-# Smallest standard uncertainty of a line's middle (pixels), however alike its pieces.
+# Smallest standard uncertainty of a line's centre (pixels), even if all pieces agree.
 LEAST_U_PX = 1e-3
 
 
@@ -99,12 +100,12 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
     first = lines_to_a_pixel(part)
     upright, rows, is_turned = (part.T if first.is_turned else part), first.rows, first.is_turned
     at, lean, width_px, blur, u_at = _measured(upright, first)
-    # Lines lean alike: what all of them share turns `across`.
+    # The median slope of all lines corrects the direction `across`.
     slope = first.slope + float(np.median(lean))
     length = float(np.hypot(1.0, slope))
     across = np.array([1.0, -slope]) / length
     row = 0.5 * (rows[0] + rows[1])
-    # Places were found along one row; across the lines they are nearer to each other.
+    # Positions were found along a row; the distances perpendicular to the lines are shorter.
     along = at / length
     start = np.array([at[0], row])
     middle = start + np.outer(along - along[0], across)
@@ -135,7 +136,7 @@ def _measured(upright: Floats, coarse: CoarseLines) -> tuple[Floats, Floats, Flo
     rows = coarse.rows
     row = 0.5 * (rows[0] + rows[1])
     whole = np.arange(rows[0], rows[1] + 1)
-    # The spread of the optics is one for all lines: some of them tell it.
+    # All lines have the same blur, which is determined from some of them.
     some = coarse.middle[:: max(1, coarse.middle.size // LINES_FOR_BLUR)]
     fits = [_fit(upright, row, whole, middle, coarse, None) for middle in some]
     blur = float(np.median([fit[2] for fit in fits]))
@@ -146,7 +147,7 @@ def _measured(upright: Floats, coarse: CoarseLines) -> tuple[Floats, Floats, Flo
         own = np.array([_fit(upright, row, piece, middle, coarse, blur)[:2] for piece in pieces])
         height = np.array([piece.mean() - row for piece in pieces])
         place = own[:, 0]
-        # Dirt spoils a piece: the line goes through those that agree.
+        # Pieces with dirt are excluded from the line's fit, because they deviate from the others.
         keep = np.abs(place - np.median(place)) < 5.0 * 1.4826 * np.median(np.abs(place - np.median(place))) + 0.05
         by, here = np.polyfit(height[keep], place[keep], 1) if np.count_nonzero(keep) > 2 else (0.0, place.mean())
         left = place[keep] - here - by * height[keep]
@@ -155,7 +156,8 @@ def _measured(upright: Floats, coarse: CoarseLines) -> tuple[Floats, Floats, Flo
         lean.append(by)
         width.append(float(np.median(own[keep, 1])))
         u_at.append(float(np.sqrt(left @ left / freedom / np.count_nonzero(keep))))
-    # Few pieces tell little of their own scatter: no line is surer than half of what is usual.
+    # The scatter of few pieces is uncertain, so that the uncertainty of a line is at least half of the median
+    # uncertainty.
     u = np.maximum(np.array(u_at), max(0.5 * float(np.median(u_at)), LEAST_U_PX))
     return np.array(at), np.array(lean), np.array(width), blur, u
 

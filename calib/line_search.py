@@ -10,15 +10,15 @@ from calib.errors import CalibrationError
 
 Floats = NDArray[np.float64]
 
-# Lines must be at least so many pixels apart, and so many of them in view.
+# Smallest distance of lines (pixels), and smallest number of visible lines.
 NEAREST_PX, FEWEST_LINES = 4.0, 3
-# A piece of a line needs so many rows of pixels for its position to be fitted.
+# Smallest number of rows of a piece of a line from which a position is fitted.
 FEWEST_ROWS = 3
-# A row of pixels shows the scale where the lines have this share of their usual contrast.
+# Smallest contrast of a row that shows the scale, as a share of the usual contrast.
 LEAST_CONTRAST = 0.85
-# Lines are looked for within so many degrees of the direction that the gradients have; the second step is finer.
+# Half width of the search about the direction from the gradients (degrees), and finest step of the search.
 SEARCH_DEG, FINE_DEG = 3.0, 0.02
-# A pattern whose lines stand out from the noise of their mean profile by less than this is none.
+# Smallest ratio of the lines' contrast to the noise of their mean profile.
 LEAST_SIGNAL = 8.0
 
 
@@ -116,7 +116,7 @@ def _rows(upright: Floats, slope: float) -> tuple[int, int]:
     shifted = np.array([np.roll(row, -by) for row, by in zip(upright, offset, strict=True)])
     margin = int(np.abs(offset).max())
     inner = shifted[:, margin : shifted.shape[1] - margin] if 2 * margin < shifted.shape[1] // 2 else shifted
-    # Each row against the lines as the best third of the rows shows them.
+    # Each row is compared with the mean of the third of the rows that has the largest contrast.
     own = inner - inner.mean(axis=1, keepdims=True)
     best = np.argsort(own.std(axis=1))[-max(len(own) // 3, FEWEST_ROWS) :]
     usual = np.median(own[best], axis=0)
@@ -127,17 +127,20 @@ def _rows(upright: Floats, slope: float) -> tuple[int, int]:
         raise CalibrationError("A picture of a line scale must show lines, but there are none: check light and focus.")
     runs = np.split(good, np.flatnonzero(np.diff(good) > 1) + 1)
     run = max(runs, key=len)
-    # What is cut by the ends of lines is no line.
+    # Rows at the ends of the lines are excluded.
     first, last = int(run[0]) + (2 if run[0] > 0 else 0), int(run[-1]) - (2 if run[-1] < len(own) - 1 else 0)
     if last - first + 1 < FEWEST_ROWS * 2:
-        raise CalibrationError("A scale's lines must be seen over at least six rows of pixels, but are not: use --roi.")
+        raise CalibrationError(
+            "The lines of a scale must be visible over at least six rows of pixels, but are not: "
+            "select the lines with --roi."
+        )
     return first, last
 
 
 def _found(upright: Floats, slope: float, rows: tuple[int, int], is_turned: bool) -> CoarseLines:
     """Lines of the mean profile, without lines that the picture's border cuts and without marks of another width."""
     profile = _profile(upright, slope, rows)
-    # Columns that the slanted rows do not all reach are left out at both sides alike.
+    # The same number of columns is left out on both sides, where not all slanted rows have pixels.
     first = (upright.shape[1] - profile.size) // 2
     low, high = (float(level) for level in np.percentile(profile, (2, 98)))
     noise = 1.4826 * float(np.median(np.abs(np.diff(upright[rows[0] : rows[1] + 1], axis=0)))) / np.sqrt(2.0)
@@ -148,15 +151,15 @@ def _found(upright: Floats, slope: float, rows: tuple[int, int], is_turned: bool
     marks = is_low if is_dark else ~is_low
     starts = np.flatnonzero(marks & ~np.roll(marks, 1))
     ends = np.flatnonzero(marks & ~np.roll(marks, -1))
-    if marks[0]:  # a line that the picture's border cuts has one edge only
+    if marks[0]:  # a line at the picture's border has only one edge
         starts, ends = starts[starts > 0], ends[ends >= (starts[starts > 0][0] if (starts > 0).any() else profile.size)]
     if starts.size and marks[-1]:
         starts = starts[:-1]
     ends = ends[: starts.size]
     if starts.size < FEWEST_LINES:
         raise CalibrationError(
-            f"A line scale must show at least {FEWEST_LINES} whole lines, but {starts.size} are in view: move the "
-            "scale, or choose the lines with --roi."
+            f"The picture of a line scale must show at least {FEWEST_LINES} complete lines, but shows {starts.size}: "
+            "move the scale, or select the lines with --roi."
         )
     middle, width = 0.5 * (starts + ends) + first, float(np.median(ends - starts + 1))
     pitch = float(np.median(np.diff(middle)))
@@ -164,13 +167,13 @@ def _found(upright: Floats, slope: float, rows: tuple[int, int], is_turned: bool
         raise CalibrationError(
             f"Lines of a scale must be at least {NEAREST_PX:g} px apart, but are {pitch:.1f} px: use a coarser scale."
         )
-    # Digits and dirt are not of a line's width.
+    # Digits and dirt have a width other than that of the lines.
     alike = (ends - starts + 1 < 2.0 * width + 2.0) & (ends - starts + 1 > 0.5 * width - 2.0)
     reach = 0.5 * pitch
     alike &= (middle > reach) & (middle < upright.shape[1] - 1 - reach)
     if np.count_nonzero(alike) < FEWEST_LINES:
         raise CalibrationError(
-            f"A line scale must show at least {FEWEST_LINES} whole lines alike, but {np.count_nonzero(alike)} are in "
-            "view: choose them with --roi."
+            f"The picture of a line scale must show at least {FEWEST_LINES} complete lines of equal width, but shows "
+            f"{np.count_nonzero(alike)}: select such lines with --roi."
         )
     return CoarseLines(middle[alike].astype(np.float64), width, pitch, is_dark, slope, rows, is_turned)

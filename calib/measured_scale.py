@@ -257,7 +257,7 @@ class Calibration:
             width, height = self.frame_size_px
             raise CalibrationError(
                 f"The calibration was made on frames of {width}x{height} pixels, but these are {width_px}x{height_px}: "
-                "calibrate again with the camera as it is now."
+                "calibrate again with the present settings of the camera."
             )
 
     def check_camera(self, settings: Mapping[str, str]) -> None:
@@ -266,8 +266,8 @@ class Calibration:
             known = self.camera.get(name)
             if known is not None and known != value:
                 raise CalibrationError(
-                    f"The calibration was made with the camera's {name} = {known}, but it is {value} now: "
-                    "set it back or calibrate again."
+                    f"The calibration was made with the camera's {name} = {known}, but now {name} is {value}: restore "
+                    "this setting, or calibrate again."
                 )
 
     def _measured(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> tuple[Floats, Budget]:

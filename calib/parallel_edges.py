@@ -13,13 +13,15 @@ from calib.straight_rows import FEWEST_ROWS, OUTLIER_SIGMAS, StraightRows
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# Rows with less than this part of the usual contrast, or so many times the usual misfit, show something else: dust.
+# Smallest contrast of a row as a share of the median, and largest residual as a multiple of the median; other rows are
+# excluded, because they show dust.
 LEAST_CONTRAST, LARGEST_MISFIT = 0.6, 2.5
-# No row is farther off the line than this (pixels, and its noise) while rows are gathered: a corner, a drop.
+# Largest distance of a row from the line (pixels, in addition to its noise) when rows are collected; other rows show a
+# corner or a drop.
 FARTHEST_PX = 0.5
-# A run of rows may be broken for at most this part of its length.
+# Largest interruption of a sequence of valid rows, as a share of its length.
 LARGEST_BREAK = 0.15
-# Rows nearer than so many blurs to the end of an edge show its corner.
+# Distance from the end of an edge, as a multiple of the blur, within which rows are excluded because of the corner.
 CORNER_BLURS = 3.0
 
 
@@ -38,7 +40,7 @@ class ParallelEdges:
     points_px : ndarray, shape (2, 2)
         End points of that width; indices: point, x or y.
     light : bool
-        True if it is light between the edges.
+        True if the area between the edges is light.
     profiles : str
         "rows" for edges measured in rows of pixels, "columns" for edges measured in columns.
     first, last, count : int
@@ -109,7 +111,7 @@ def measure_parallel_edges(grey: Floats, lines: tuple[Floats, Floats], light: bo
     lines : tuple of ndarray, each of shape (2, 2)
         Two points (x, y) on each edge.
     light : bool
-        Whether it is light between the edges.
+        Whether the area between the edges is light.
 
     Raises
     ------
@@ -118,7 +120,7 @@ def measure_parallel_edges(grey: Floats, lines: tuple[Floats, Floats], light: bo
     """
     along = lines[0][1] - lines[0][0]
     if abs(along[0]) > abs(along[1]):
-        # Profiles run along rows; edges that lie along the rows are measured in the picture turned over.
+        # Profiles are taken along rows; edges parallel to the rows are measured in the transposed picture.
         upright = measure_parallel_edges(grey.T, (lines[0][:, ::-1], lines[1][:, ::-1]), light)
         return replace(
             upright,
@@ -140,7 +142,7 @@ def measure_parallel_edges(grey: Floats, lines: tuple[Floats, Floats], light: bo
 def _gather(grey: Floats, coarse: CoarseEdge, line: Floats, room_px: float) -> EdgeRows:
     """Fit rows in which the edge is visible, outwards from the coarse line as far as the edge stays straight."""
     rows = np.arange(max(0, int(np.ceil(line[:, 1].min()))), min(grey.shape[0] - 1, int(line[:, 1].max())) + 1)
-    # The first look leaves the ends out, where corners are; the second knows the line and looks everywhere.
+    # The first fit excludes the ends, where corners are; the second fit uses the resulting line in all rows.
     inner = rows[rows.size // 8 : rows.size - rows.size // 8]
     first = fit_edge(grey, inner, coarse, room_px)
     seed = StraightRows.through(first)
@@ -153,7 +155,10 @@ def _gather(grey: Floats, coarse: CoarseEdge, line: Floats, room_px: float) -> E
     sound &= np.abs(edge.x_px - better.x_px(edge.rows)) < FARTHEST_PX + OUTLIER_SIGMAS * edge.u_x_px
     keep = _one_run(edge.rows, sound, int(np.median(seed.rows)), CORNER_BLURS * edge.blur_px, grey.shape[0])
     if np.count_nonzero(keep) < FEWEST_ROWS:
-        raise CalibrationError("An edge must be straight and sharp over at least ten rows, but is not.")
+        raise CalibrationError(
+            "An edge must be straight and sharp over at least ten rows of pixels, but is not: "
+            "check the picture, its light and its focus."
+        )
     return fit_edge(grey, edge.rows[keep], better, room_px)
 
 
@@ -171,7 +176,7 @@ def _one_run(rows: Ints, sound: NDArray[np.bool_], seed: int, corner_px: float, 
 
 def _across(left: EdgeRows, right: EdgeRows, light: bool) -> ParallelEdges:
     lines = [StraightRows.through(edge) for edge in (left, right)]
-    # Both edges have one direction: the mean of theirs, weighted by how well each is known.
+    # The common direction is the mean of both edges' directions, weighted by their uncertainties.
     weights = np.array([1.0 / line.u_slope**2 for line in lines])
     slope = float(np.average([line.slope for line in lines], weights=weights))
     turn = atan(slope)

@@ -15,11 +15,11 @@ from calib.plane import Plane, apply_homography
 
 Floats = NDArray[np.float64]
 
-# Half-length of the short distance in the middle of the picture whose scale is the plane's (pixels).
+# Half length (pixels) of the short distance at the picture's centre from which the scale is computed.
 MIDDLE_PX = 1.0
-# Step for differentiating by a corner's position (pixels).
+# Step of numerical derivatives by a corner's position (pixels).
 STEP_PX = 0.01
-# Distortion at the corner of the picture for differentiating by it.
+# Step of numerical derivatives by the distortion at the picture's corner.
 STEP_LENS = 1e-3
 
 
@@ -83,9 +83,11 @@ def plane_from_board(corners: BoardCorners, ideal_px: Floats, frame_size_px: tup
 
 def _homography(board_mm: Floats, points_px: Floats) -> Floats:
     homography, _ = cv2.findHomography(board_mm, points_px, 0)
-    matrix = np.array(homography, dtype=np.float64)  # no homography becomes a number of no shape
+    matrix = np.array(homography, dtype=np.float64)  # if there is no homography, the array is not a matrix
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
-        raise CalibrationError("The board's corners do not define a plane: at least four must not lie on a line.")
+        raise CalibrationError(
+            "The board's corners do not define a plane: at least four corners must not lie on a straight line."
+        )
     return matrix
 
 
@@ -97,7 +99,7 @@ def _squared(to_picture: Floats, middle: Floats) -> tuple[Plane, float, float]:
     seen = apply_homography(to_board, middle + steps)
     board_per_px = np.column_stack([seen[0] - seen[1], seen[2] - seen[3]]) / (2.0 * MIDDLE_PX)
     px_per_mm = 1.0 / sqrt(abs(float(np.linalg.det(board_per_px))))
-    # The turn (and mirror) nearest to the picture's own axes: polar decomposition.
+    # Rotation (and reflection) that is nearest to the picture's axes, by polar decomposition.
     left, stretches, right = np.linalg.svd(np.linalg.inv(board_per_px))
     turn = px_per_mm * (left @ right)
     to_flat = np.eye(3)

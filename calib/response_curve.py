@@ -12,13 +12,14 @@ from calib.camera_response import CameraResponse, MeasuredResponse
 
 Floats = NDArray[np.float64]
 
-# Levels that are used, shares of full scale: below is the black level's noise, above the sensor is full.
+# Smallest and largest level that are used, as shares of full scale; lower levels are noise of the black level, and
+# higher levels are saturated.
 LEAST_LEVEL, LARGEST_LEVEL = 0.02, 0.97
-# Knots of the correction to the power law, and the weight of its bends against one reading of 1 %.
+# Number of knots of the correction to the power law, and weight of its second differences relative to the readings.
 KNOTS, SMOOTHNESS = 17, 3.0
-# Places of the scene that an exposure series needs: one for each knot.
+# Smallest number of points of the scene in an exposure series: one for each knot.
 FEWEST_LEVELS = KNOTS
-# Rows of the result.
+# Number of rows of the tabulated curve.
 ROWS = 257
 
 
@@ -71,12 +72,12 @@ def _fit(level: Floats, usable: NDArray[np.bool_], log_time: Floats) -> tuple[fl
     design[np.arange(rows), 2 + left] = at - left
     design[np.arange(rows), 1 + KNOTS + place] = -1.0
     wanted = log_time[picture]
-    # A level near black is the less sure in its logarithm the lower it is.
+    # The logarithm of a level near black has a large uncertainty, and hence a small weight.
     weight = share / (share + 0.05)
     bends = np.zeros((KNOTS, design.shape[1]))
     for knot in range(1, KNOTS - 1):
         bends[knot, knot : knot + 3] = SMOOTHNESS * np.sqrt(rows / KNOTS) * np.array([1.0, -2.0, 1.0])
-    # The correction is nothing at full scale, and what it has in common with the power law is left to that.
+    # The correction is zero at full scale, and contains no part that the power law can represent.
     bends[0, KNOTS] = bends[-1, 1] = np.sqrt(rows)
     solved, *_ = np.linalg.lstsq(
         np.vstack([design * weight[:, None], bends]), np.concatenate([wanted * weight, np.zeros(KNOTS)]), rcond=None

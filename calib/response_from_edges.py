@@ -27,8 +27,9 @@ Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
 LEAST_CONTRAST = 0.15
-"""Least step of an edge, as a share of full scale: a smaller step is curved too little by the response to be visible in
-noise."""
+"""Least step of an edge, as a share of full scale; within a smaller step, the curvature of the response is hidden by
+noise.
+"""
 FEWEST_ROWS = 40
 """Least length of an edge in pixels."""
 MOST_EDGES, MOST_PIXELS = 12, 3000
@@ -49,8 +50,9 @@ LARGEST_U = 0.3
 """Largest standard uncertainty of the exponent that is accepted: a linear camera (1) can then be distinguished from
 consumer cameras (2.2)."""
 LARGEST_MISFIT = 2.0
-"""Largest ratio of the RMS residual to the noise of the plateaus; above it the profile is not a symmetric blur encoded
-by a power law."""
+"""Largest ratio of the RMS residual to the noise of the plateaus; a larger ratio means that the profile is not that of
+a symmetric blur and a power law.
+"""
 MOST_OVERSHOOT, OVERSHOOT_BIN_PX = 0.01, 0.5
 """Largest overshoot of a profile, as a share of its step, and bin width in pixels: sharpening that adds 2 % of the step
 changes the exponent by 0.1 at a blur of 1.2 px (`tests/calib/test_response_from_pictures.py`)."""
@@ -93,15 +95,17 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
     if not profiles:
         raise CalibrationError(
             f"The pictures must show straight edges of at least {FEWEST_ROWS} pixels with a step of "
-            f"{LEAST_CONTRAST:.0%} of full scale and no clipped side, but show none: take a bar in good light."
+            f"{LEAST_CONTRAST:.0%} of full scale and no clipped side, but show none: take a picture of a bar in good "
+            "light."
         )
     overshoot = float(np.median([_overshoot(profile) for profile in profiles]))
     if overshoot > MOST_OVERSHOOT:
         raise CalibrationError(
-            f"The edges must pass from one plateau to the other without overshoot, but overshoot by {overshoot:.1%} of "
-            "their step: the camera sharpens. Switch that off, or take an exposure series instead."
+            f"The edges must pass from one plateau to the other without overshoot, but overshoot by {overshoot:.1%} "
+            "of their step, because the camera sharpens: switch sharpening off, or take an exposure series."
         )
-    # The exponent and the asymmetry of a wide blur can hold each other in a valley of its own.
+    # Exponent and blur are correlated, so that the sum of squares may have several minima; the fit starts at several
+    # exponents.
     tried = [
         least_squares(_left, _start(profiles, at), args=(profiles,), x_scale="jac", bounds=_bounds(profiles))
         for at in STARTS
@@ -111,18 +115,19 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
     used = sum(profile.level.size for profile in profiles)
     misfit = float(np.sqrt(2.0 * solved.cost / max(used - solved.x.size, 1)))
     covariance = np.linalg.pinv(solved.jac.T @ solved.jac)
-    # Neighbouring pixels share noise where a codec or a denoiser has been at work.
+    # A codec or a noise filter correlates the noise of neighbouring pixels.
     shared = rows_in_one(solved.fun[: profiles[0].level.size])
     u_exponent = exponent * float(np.sqrt(shared * covariance[0, 0])) * max(misfit, 1.0)
     if misfit > LARGEST_MISFIT:
         raise CalibrationError(
-            f"The edges' profiles must be those of a symmetric blur behind a power law, but leave {misfit:.1f} times "
-            "the noise: the camera sharpens, or the edges are bevelled or shaded. Take an exposure series instead."
+            f"The edges' profiles must be those of a symmetric blur and a power law, but the residuals are "
+            f"{misfit:.1f} times the noise, because the camera sharpens, or the edges are bevelled or shaded: take an "
+            "exposure series."
         )
     if u_exponent > LARGEST_U:
         raise CalibrationError(
-            f"The edges must determine the exponent to within {LARGEST_U:g}, but give {exponent:.2f} to "
-            f"+-{u_exponent:.2f} only: take more of them, with more contrast, or an exposure series."
+            f"The edges must determine the exponent to within {LARGEST_U:g}, but give {exponent:.2f} with a standard "
+            f"uncertainty of {u_exponent:.2f}: take more edges with more contrast, or an exposure series."
         )
     levels = np.concatenate([profile.level for profile in profiles])
     curve = curve_of(exponent, np.zeros(KNOTS), top_level, name)
@@ -168,7 +173,7 @@ def _apart_px(edge: StraightEdge, other: StraightEdge) -> float:
 def _profile(grey: Grey, edge: StraightEdge, room_px: float, top_level: int) -> _Profile | None:
     levels, ends = grey.astype(np.float64) / top_level, edge.ends
     if abs(edge.direction[0]) > abs(edge.direction[1]):
-        # Profiles run along rows; edges that lie along the rows are measured in the picture turned over.
+        # Profiles are taken along rows; edges parallel to the rows are measured in the transposed picture.
         levels, ends = levels.T, ends[:, ::-1]
     slope = float((ends[1, 0] - ends[0, 0]) / (ends[1, 1] - ends[0, 1]))
     start = float(ends[0, 0] - slope * ends[0, 1])
@@ -190,7 +195,7 @@ def _profile(grey: Grey, edge: StraightEdge, room_px: float, top_level: int) -> 
 
 def _scatter(fitted: EdgeRows, line: StraightRows) -> float:
     off = fitted.x_px - line.at_px - line.slope * (fitted.rows - line.middle_row)
-    # Beyond what noise makes of single rows.
+    # The scatter caused by the noise of single rows is subtracted.
     return float(np.sqrt(max(1.4826 * float(np.median(np.abs(off))) ** 2 - float(np.median(fitted.u_x_px)) ** 2, 0.0)))
 
 
@@ -211,13 +216,14 @@ def _gathered(levels: Floats, fitted: EdgeRows, line: StraightRows, rising: bool
     if clipped or ends[1] - ends[0] < LEAST_CONTRAST:
         return None
     plateau = level[far] - np.where(away[far] < 0.0, ends[0], ends[1])
-    # Levels are whole numbers: a median of them would be zero or one.
+    # The standard deviation is used, because the median deviation of whole-numbered levels would be zero or one;
+    # rounding gives the least noise.
     noise = max(float(np.std(plateau)), 1.0 / (255.0 * np.sqrt(12.0)))
     return _Profile(away.ravel(), level.ravel(), fitted.sigma_px, (ends[0], ends[1]), noise)
 
 
-# Unknowns: ln exponent; of the blur ln sigma, and share and ln width of its wider part; of each edge its place, the
-# light of both plateaus as levels, and the slope of the light.
+# Numbers of unknowns. Common to all edges: ln exponent, ln sigma of the blur, share and ln width of its wider part. For
+# each edge: position, light of both plateaus as levels, and slope of the light.
 _SHARED, _OWN = 4, 4
 
 
@@ -244,7 +250,7 @@ def _left(unknowns: Floats, profiles: Sequence[_Profile]) -> Floats:
     out = []
     for k, profile in enumerate(profiles):
         at_px, dark, light, slope = unknowns[_SHARED + _OWN * k : _SHARED + _OWN * (k + 1)]
-        # The pixel's own width, as the variance of a square of side 1.
+        # The width of the pixel is included as the variance of a uniform distribution of width 1.
         narrow_px = np.hypot(sigma, 1.0 / np.sqrt(12.0))
         away = profile.away_px - at_px
         share = (1.0 - wide) * ndtr(away / narrow_px) + wide * ndtr(away / (ratio * narrow_px))

@@ -17,11 +17,12 @@ from calib.response_curve import FEWEST_LEVELS, LARGEST_LEVEL, LEAST_LEVEL, fitt
 Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Pictures, and the ratio of the longest to the shortest exposure, that a curve needs.
+# Smallest number of pictures, and smallest ratio of the longest to the shortest exposure.
 FEWEST_PICTURES, LEAST_RATIO = 3, 2.0
-# Levels are means over squares of this side (pixels) that are flat: noise and edges would bend the curve.
+# Side of the squares (pixels) over which levels are averaged, and share of the squares, the most uniform ones, that are
+# used, because noise and edges would distort the curve.
 SIDE_PX, FLAT_SHARE = 8, 0.5
-# Places in the scene, evenly spread over its levels.
+# Largest number of squares, evenly distributed over the levels.
 PLACES = 400
 
 
@@ -57,8 +58,8 @@ def response_from_exposures(
     keep = usable.sum(axis=0) >= 2
     if np.count_nonzero(keep) < FEWEST_LEVELS:
         raise CalibrationError(
-            "The scene must have flat parts that are neither black nor white in two of the pictures, but has not: "
-            "take a sheet of paper with shades on it, and exposures nearer to each other."
+            "The scene must have uniform areas that are neither black nor white in at least two pictures, but has too "
+            "few: take a sheet of paper with shades of grey, and exposures nearer to each other."
         )
     level, usable = level[:, keep], usable[:, keep]
     return fitted_response(level, usable, np.log(times), top_level, name)
@@ -73,7 +74,7 @@ def _flat_levels(pictures: Sequence[Grey], top_level: int) -> Floats:
         squares = share.reshape(height // SIDE_PX, SIDE_PX, width // SIDE_PX, SIDE_PX)
         means.append(squares.mean(axis=(1, 3), dtype=np.float64).ravel())
         spreads.append(squares.std(axis=(1, 3), dtype=np.float64).ravel())
-        # A square that a full sensor cuts off anywhere says less light than there was.
+        # A square with any clipped pixel is excluded in this picture, because its mean would be too low.
         full = cv2.erode((share < LARGEST_LEVEL).astype(np.uint8), np.ones((3, 3), dtype=np.uint8))
         cut = full.reshape(height // SIDE_PX, SIDE_PX, width // SIDE_PX, SIDE_PX).min(axis=(1, 3)).ravel() == 0
         means[-1][cut] = 1.0

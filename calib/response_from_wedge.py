@@ -17,7 +17,9 @@ Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
 FEWEST_FIELDS = 6
-"""Least number of fields between black and white for a curve: twice the number for a power law with a bend."""
+"""Least number of fields between black and white for a curve, twice the number of parameters of a power law with one
+correction.
+"""
 MIDDLE = 0.25
 """Share of a field that is left out at each of its borders."""
 LARGEST_SPREAD = 0.5
@@ -51,8 +53,8 @@ def response_from_wedge(
     stated = np.asarray(densities, dtype=np.float64)
     if stated.size < FEWEST_FIELDS or not np.isfinite(stated).all() or not (np.diff(stated) > 0.0).all():
         raise CalibrationError(
-            f"A grey wedge must have at least {FEWEST_FIELDS} fields whose densities rise, but has "
-            f"{', '.join(f'{value:g}' for value in stated[:8])}: state its certificate's."
+            f"A grey wedge must have at least {FEWEST_FIELDS} fields with increasing densities, but has "
+            f"{', '.join(f'{value:g}' for value in stated[:8])}: state the densities of its certificate."
         )
     level, spread = _field_levels(grey, stated.size, top_level, region)
     if level[0] < level[-1]:
@@ -63,9 +65,9 @@ def response_from_wedge(
     blurred = spread[:-1][seen] > LARGEST_SPREAD * np.maximum(steps[seen], 1.0 / top_level)
     if np.count_nonzero(usable) < FEWEST_FIELDS or (steps[seen] <= 0.0).any() or blurred.any():
         raise CalibrationError(
-            f"The region must show {stated.size} even fields, each darker than the one before, of which at least "
-            f"{FEWEST_FIELDS} are neither black nor white, but does not: set --roi to the wedge's fields alone, light "
-            "it evenly and state one density for each field."
+            f"The region must show {stated.size} uniform fields, each darker than the previous field, of which at "
+            f"least {FEWEST_FIELDS} are neither black nor white, but does not: limit --roi to the fields of the "
+            "wedge, light the wedge evenly, and state one density for each field."
         )
     return fitted_response(level[None, :].T, usable[None, :].T, -stated * np.log(10.0), top_level, name)
 
@@ -79,7 +81,7 @@ def _field_levels(
     part = part if part.shape[1] >= part.shape[0] else part.T
     if part.shape[1] < 4 * fields or part.shape[0] < 4:
         raise CalibrationError(
-            f"The region must show {fields} fields, four pixels of each at least, but is {part.shape[1]} by "
+            f"The region must show {fields} fields of at least four pixels each, but is {part.shape[1]} by "
             f"{part.shape[0]} pixels: set --roi to the wedge."
         )
     rows = part[int(MIDDLE * part.shape[0]) : part.shape[0] - int(MIDDLE * part.shape[0])]
@@ -88,6 +90,6 @@ def _field_levels(
         rows[:, int(np.ceil(a + MIDDLE * (b - a))) : max(int(b - MIDDLE * (b - a)), int(a) + 1)]
         for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)
     ]
-    # Thirds are averaged first: noise is no border between two fields.
+    # Thirds of a field are averaged before they are compared, so that noise does not look like a border between fields.
     thirds = [[part.mean() for part in np.array_split(field, 3, axis=1) if part.size] for field in inner]
     return np.array([field.mean() for field in inner]), np.array([np.ptp(means) for means in thirds])

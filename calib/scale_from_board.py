@@ -72,7 +72,8 @@ def scale_from_board(
             "edge bias",
             0.0,
             rectangular(limits.edge_bias_px),
-            f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'}); no corner shows it",
+            f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'}); corners do not "
+            "determine the edge bias",
         ),
     )
     kind = "chessboard" if board.marker_mm is None else "ChArUco board"

@@ -15,7 +15,8 @@ from calib.scale_from_sizes import CHANCE
 
 Floats = NDArray[np.float64]
 
-# A line off its place by more than so many robust standard deviations, and so much of the pitch, is dirt or a digit.
+# Largest deviation of a line from its nominal position: this number of robust standard deviations plus this share of
+# the pitch; otherwise the line is dirt or a digit.
 OUTLIER_SIGMAS, OUTLIER_SHARE = 6.0, 0.02
 
 
@@ -97,7 +98,7 @@ def scale_from_lines(
     at: Floats = lines.at_px[used]
     k: Floats = np.asarray(pitch_mm * index[used], dtype=np.float64)
     rough = float(np.ptp(at) / np.ptp(k))
-    # A phase error of the edge finder moves either edge of a line, so its middle by half of two independent ones.
+    # The phase errors of a line's two edges are independent; the centre moves by half of their sum.
     estimator = rectangular(limits.estimator_px) / np.sqrt(2.0)
     u_edges: Floats = np.hypot(lines.u_at_px[used], estimator)
     u_places: Floats = np.hypot(u_edges, rough * u_line_mm)
@@ -200,7 +201,7 @@ def _budget(
             "edge bias",
             np.diag([0.0, rectangular(limits.edge_bias_px) ** 2]),
             f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'}); a pitch does not "
-            "know it; a bar and a slot would find it",
+            "determine the edge bias, but a bar and a slot do",
         ),
     ]
 
@@ -217,13 +218,14 @@ def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
     used = np.ones(at_px.size, dtype=bool)
     for look in range(5):
         if look == 0:
-            # A line that a third of the places may be wrong about: medians (Theil and Sen).
+            # The first straight line is found by medians (Theil and Sen), which allow a third of the positions to be
+            # wrong.
             apart = index[:, None] - index
             slope = float(np.median((at_px[:, None] - at_px)[apart > 0] / apart[apart > 0]))
             at = float(np.median(at_px - slope * index))
         else:
             slope, at = (float(value) for value in np.polyfit(index[used], at_px[used], 1))
-        # From the whole scale's pitch: many small errors of single steps would add up to a line too many.
+        # Numbers follow from the pitch of the whole scale, because errors of single steps would accumulate.
         index = np.rint((at_px - at) / slope).astype(np.int_)
         left = at_px - at - slope * index
         spread = 1.4826 * float(np.median(np.abs(left[used])))
@@ -235,8 +237,8 @@ def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
         used = again
     if np.count_nonzero(used) < max(3, 0.7 * at_px.size) or len(set(index[used].tolist())) < np.count_nonzero(used):
         raise CalibrationError(
-            f"The lines of a scale must stand at equal distances, but {np.count_nonzero(~used)} of {at_px.size} do "
-            "not: choose a part with lines of one kind with --roi."
+            f"The lines of a scale must be equidistant, but {np.count_nonzero(~used)} of {at_px.size} are not: select "
+            "lines of one kind with --roi."
         )
     return index - index[used].min(), used
 

@@ -15,9 +15,10 @@ from calib.straight_line import StraightLine, line_through_origin, line_with_err
 
 Floats = NDArray[np.float64]
 
-# Residuals that chance gives less often than this are a misfit: they enlarge the covariance and are reported.
+# Probability of a chi-square below which the residuals are regarded as a misfit, which enlarges the covariance and is
+# reported.
 CHANCE = 0.01
-# Sizes nearer than this part of each other are one size.
+# Relative difference below which sizes count as equal.
 SAME_SIZE = 0.01
 
 
@@ -105,7 +106,7 @@ def scale_from_sizes(
     y = polarity * np.array([size.width_px for size in sizes])
     u_x = np.array([size.reference.u_size_mm for size in sizes])
     u_y = np.hypot([size.u_width_px for size in sizes], np.sqrt(2.0) * rectangular(limits.estimator_px))
-    # Edges can be told no better than this, however still the picture; zero would give one picture all the weight.
+    # Least standard uncertainty of a width; an uncertainty of zero would give one picture all the weight.
     u_y = np.maximum(u_y, 1e-4)
     bias_known = _different(x) >= 3 or len(set(polarity.tolist())) == 2
     line = line_with_errors(x, y, u_x, u_y) if bias_known else line_through_origin(x, y, u_x, u_y)
@@ -118,10 +119,12 @@ def scale_from_sizes(
         by_bias = np.array([-float(line.response[0].sum()), -1.0])
         covariance = np.outer(by_bias, by_bias) * rectangular(limits.edge_bias_px) ** 2
         how = f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'})"
-        parts.append(ScalePart("edge bias", covariance, f"{how}; three sizes, or a bar and a slot, would find it"))
+        parts.append(
+            ScalePart("edge bias", covariance, f"{how}; three sizes, or a bar and a slot, determine the edge bias")
+        )
         if response_shift_px:
             shifted = np.outer(by_bias, by_bias) * rectangular(response_shift_px) ** 2
-            how = f"0 to {response_shift_px:.2g} px; state or measure it with --response"
+            how = f"0 to {response_shift_px:.2g} px; state or measure the response (--response)"
             parts.append(ScalePart("camera response", shifted, how))
     lens, tilt = _seen_through(sizes, polarity, frame_size_px, limits.camera_distance_mm * line.slope)
     expected = np.diag(u_y**2 + (line.slope * u_x) ** 2) + np.outer(lens, lens) * rectangular(limits.lens_relative) ** 2

@@ -37,7 +37,7 @@ class StatedScale(BareScale):
 
     def __post_init__(self) -> None:
         """Refuse an impossible scale or uncertainty."""
-        # A dataclass with slots is another class than the one that `super()` without arguments refers to.
+        # `super()` without arguments fails here, because a dataclass with slots is a new class.
         BareScale.__post_init__(self)
         if not (isfinite(self.u_px_per_mm) and 0.0 < self.u_px_per_mm < self.px_per_mm):
             raise ValueError(
@@ -62,16 +62,17 @@ class StatedScale(BareScale):
             ScalePart(
                 "edge bias",
                 np.diag([0.0, rectangular(limits.edge_bias_px) ** 2]),
-                f"+-{limits.edge_bias_px:g} px (default); a stated scale does not know it; a bar and a slot would "
-                "find it",
+                f"+-{limits.edge_bias_px:g} px (default); a stated scale does not determine the edge bias, but a bar "
+                "and a slot do",
             ),
         )
-        # No picture's edges gave the scale, so that it shares no error of the camera response with the recording.
+        # The scale was not measured on edges in a picture, so that it has no error of the camera response in common
+        # with the recording.
         return Calibration(self.px_per_mm, 0.0, parts, frame_size_px, limits, response_shift_px=0.0)
 
 
 def is_stated(scale: object) -> bool:
-    """Whether a scale was stated by the user, and not measured on a reference object."""
+    """Whether a scale was stated by the user instead of measured on a reference object."""
     if isinstance(scale, Calibration):
         return any(part.source == STATED for part in scale.parts)
     return isinstance(scale, BareScale)

@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# Edges are found in a smaller picture: averaging takes noise and blur away, and a pixel or two is near enough.
+# Lengths (pixels) of the longer side of the reduced picture in which edges are found; the averaging reduces noise and
+# blur, and an error of one or two pixels is permitted.
 FINDING_SIDES_PX = (640, 320)
-# Pieces of one edge: directions within so many degrees, and so far (pixels of the smaller picture) beside its line.
+# Largest difference in direction (degrees), and largest distance from the line (pixels of the reduced picture), of
+# segments that belong to one edge.
 SAME_DIRECTION_DEG, SAME_LINE_PX = 4.0, 2.0
-# A piece joins an edge across a gap (a speck of dust, a highlight) of at most this part of the two lengths together.
+# Largest interruption of an edge (by dust or a highlight), as a share of the total length of both segments.
 LARGEST_BREAK = 0.5
-# Shorter edges are corners, letters, dust (pixels of the smaller picture).
+# Smallest length of an edge (pixels of the reduced picture); shorter segments are corners, letters and dust.
 SHORTEST_EDGE_PX = 14.0
 
 

@@ -10,7 +10,8 @@ from calib.errors import CalibrationError
 
 Floats = NDArray[np.float64]
 
-# York's iteration gains several digits a step.
+# Largest number of steps, and relative change at convergence; each step of York's iteration improves the result by
+# several digits.
 STEPS, SETTLED = 50, 1e-15
 
 
@@ -67,7 +68,7 @@ def line_with_errors(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> Straight
         raise CalibrationError(
             f"A straight line needs at least two different sizes, but there are {len(np.unique(x))}."
         )
-    # Sums about a point within the data lose no digits.
+    # Sums relative to the mean avoid a loss of precision.
     x0, y0 = float(x.mean()), float(y.mean())
     slope = float((x - x0) @ (y - y0) / ((x - x0) @ (x - x0)))
     for _ in range(STEPS):

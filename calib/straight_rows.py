@@ -13,14 +13,14 @@ from calib.errors import CalibrationError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# A row farther off the line than so many robust standard deviations does not belong to it.
+# Largest distance of a row from the line, in robust standard deviations.
 OUTLIER_SIGMAS = 4.0
-# The fewest rows that make a straight edge.
+# Smallest number of rows of a straight edge.
 FEWEST_ROWS = 10
-# An edge bent by more than this (pixels), and by more than this part of its length, is a curve: a drop, a disc. What a
-# finder of straight segments takes for one on a circle is bent by 0.02 to 0.05 of its length; a strong lens bends less.
+# Limits of the bend of a straight edge, in pixels and as a share of its length; an edge that exceeds both is a curve.
+# Segments found on a circle are bent by 0.02 to 0.05 of their length; a strong lens bends a straight edge less.
 LARGEST_BEND_PX, LARGEST_BEND = 0.35, 0.01
-# The search for the rows that belong settles after two or three rounds.
+# Largest number of rounds of the search for valid rows, which usually ends after two or three rounds.
 ROUNDS = 10
 
 
@@ -70,10 +70,12 @@ class StraightRows:
         away = rows - rows.mean()
         bend_px = abs(float(np.polyfit(away, x_px, 2)[0])) * float(np.ptp(away)) ** 2 / 4.0
         if bend_px > max(LARGEST_BEND_PX, LARGEST_BEND * float(np.ptp(away))):
-            raise CalibrationError(f"An edge must be straight, but is bent by {bend_px:.1f} px.")
+            raise CalibrationError(
+                f"An edge must be straight, but is bent by {bend_px:.1f} px: use an object with straight edges."
+            )
         slope, at_px = (float(value) for value in np.polyfit(away, x_px, 1))
         residual = x_px - at_px - slope * away
-        # The scatter that is seen, or the noise of the grey levels where the few rows happen to agree better.
+        # The scatter is at least that expected from the noise of the grey levels, because few rows may agree by chance.
         seen = float(np.sqrt(residual @ residual / (rows.size - 2)))
         scatter = max(seen, float(np.sqrt(np.mean(edge.u_x_px[kept] ** 2))))
         alike = rows_in_one(residual)
@@ -90,8 +92,10 @@ class StraightRows:
 
 def _belonging(rows: Ints, x_px: Floats) -> NDArray[np.bool_]:
     if rows.size < FEWEST_ROWS:
-        raise CalibrationError("An edge must be sharp over at least ten rows, but is not.")
-    # A first line that a quarter of the rows may be wrong about: the median of slopes between distant rows.
+        raise CalibrationError(
+            "An edge must be sharp over at least ten rows of pixels, but is not: check light and focus."
+        )
+    # The first line has the median slope between distant rows, so that a quarter of the rows may be wrong.
     half = rows.size // 2
     slope = float(np.median((x_px[half:] - x_px[:-half]) / (rows[half:] - rows[:-half])))
     at_px = float(np.median(x_px - slope * rows))
@@ -101,7 +105,10 @@ def _belonging(rows: Ints, x_px: Floats) -> NDArray[np.bool_]:
         spread = 1.4826 * float(np.median(np.abs(left)))
         belonging = np.abs(left) <= OUTLIER_SIGMAS * max(spread, 1e-9)
         if np.count_nonzero(belonging) < FEWEST_ROWS:
-            raise CalibrationError("An edge must be straight over at least ten rows, but is not.")
+            raise CalibrationError(
+                "An edge must be straight over at least ten rows of pixels, but is not: use an "
+                "object with straight edges."
+            )
         if np.array_equal(belonging, kept):
             break
         kept = belonging

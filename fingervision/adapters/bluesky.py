@@ -28,7 +28,8 @@ FRAMES_TO_JOIN = 5
 """Number of frames to wait for after the last motion, because the stage's position is interpolated between readings
 before and after a frame."""
 JOINED_WITHIN_S = 5.0
-"""Twenty answers of a slow line; until then nothing tells which reading belongs to which frame."""
+"""Longest time for the synchronisation of the clocks: twenty answers over a slow serial line. Before synchronisation,
+readings cannot be assigned to frames."""
 
 
 class _Shared:
@@ -67,7 +68,7 @@ class _Consumer:
 
 
 class StageDevice:
-    """The stage as a bluesky device: `set(mm)` moves; `stop` stops at once; `prepare` and `kickoff` start a flight."""
+    """The stage as a bluesky device: `set(mm)` moves it, `stop` stops it; `prepare` and `kickoff` start a flight."""
 
     parent = None
 
@@ -152,7 +153,7 @@ class StageDevice:
         if not limits.lower_mm <= float(to_mm) <= limits.upper_mm:
             raise LimitError(
                 f"{self.name} must stay between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but {float(to_mm):g} "
-                "mm is requested: nothing was moved."
+                "mm is requested: the stage has not moved."
             )
 
     def _until_rest(self) -> None:
@@ -219,7 +220,7 @@ class GapDevice:
     def read(self) -> dict[str, dict[str, Any]]:
         """Return gap, edges, stage position and force of the last triggered frame; None for a missing gap."""
         if self._newest is None:
-            raise StateError(f"{self.name} must be triggered before it is read: no frame was taken yet.")
+            raise StateError(f"{self.name} must be triggered before it is read: no frame has been measured yet.")
         at_s = self._unix_s + self._at_s
         return {key: {"value": value, "timestamp": at_s} for key, value in self._newest.items()}
 
@@ -281,7 +282,8 @@ class GapDevice:
             self._clock.wait_until(self._clock.now_s() + POLL_S)
             for one in instruments:
                 one.read()
-        # The stage stood or moved before: its place is told between two readings, so the frame lies after the first.
+        # The position of the stage is interpolated between two readings, so that the frame must be later than the first
+        # reading.
         self._clock.wait_until(self._clock.now_s() + POLL_S)
         return self._clock.now_s()
 
@@ -324,7 +326,7 @@ class Devices(NamedTuple):
 
 
 def devices(bed: Bed, *, prefix: str = "") -> Devices:
-    """Make the bluesky devices `stage`, `force` and `gap` of an open test bed; `prefix` stands before each name."""
+    """Make the bluesky devices `stage`, `force` and `gap` of an open test bed; each name begins with `prefix`."""
     lock, unix_s = threading.RLock(), time.time() - bed.clock.now_s()
     shared = _Shared(bed.actuator, lock)
     return Devices(

@@ -116,7 +116,8 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
                 outcome = replace(outcome, input=tasks[number].input)
             except KilledWorker as error:
                 words = (
-                    f"{tasks[number].input} ended {error.allowed_failures + 1} workers: work on it alone to see why."
+                    f"{tasks[number].input} ended {error.allowed_failures + 1} workers: process this input alone to "
+                    f"see the cause."
                 )
                 outcome = failure(tasks[number], words)
             except Exception as error:
@@ -125,7 +126,9 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
                         "The connection to the scheduler was lost; finished results are kept: start the "
                         "scheduler again, then repeat this command."
                     ) from error
-                outcome = failure(tasks[number], f"{tasks[number].input} could not be done on its worker ({error}).")
+                outcome = failure(
+                    tasks[number], f"{tasks[number].input} could not be processed by its worker ({error})."
+                )
             following = next(numbers, None)
             if following is not None:
                 running.add(submitted(following))

@@ -92,7 +92,7 @@ class LocalCrew:
                 worker.is_asked = False
                 return ended
         raise ProcessError(
-            f"Every process ended before its first task: try `fingervision {command}` on one input to see why."
+            f"Every process ended before its first task: try `fingervision {command}` on one input to see the cause."
         )
 
     def outcomes_of(self, tasks: Sequence[Task]) -> Generator[tuple[int, Outcome], None, None]:
@@ -177,8 +177,8 @@ def _died(task: Task, exit_code: int | None) -> str:
         f"signal {signal.Signals(-exit_code).name}" if exit_code is not None and exit_code < 0 else f"code {exit_code}"
     )
     return (
-        f"{task.input} ended its process {ATTEMPTS} times ({how}): work on it alone to see why; SIGKILL mostly means "
-        "that the memory was full."
+        f"{task.input} ended its process {ATTEMPTS} times ({how}): process this input alone to see the cause; SIGKILL "
+        f"usually means that the memory was full."
     )
 
 

@@ -86,9 +86,7 @@ def _page(out: Path, command: str, outcomes: Sequence[Outcome]) -> str:
     from base64 import b64encode
 
     bad = sum(outcome.exit_code != 0 for outcome in outcomes)
-    said = (
-        f"{len(outcomes)} inputs, {bad} of them with a sentence to read" if bad else f"{len(outcomes)} inputs, all done"
-    )
+    said = f"{len(outcomes)} inputs, {bad} of them with a message" if bad else f"{len(outcomes)} inputs, all done"
     picture = b64encode((out / FIGURE).read_bytes()).decode()
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '

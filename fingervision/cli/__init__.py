@@ -29,8 +29,8 @@ class Commands(click.Group):
         for number, argument in enumerate(args, start=1):
             if argument == "" or (argument.startswith("--") and argument.endswith("=")):
                 raise UsageError(
-                    f"A file, folder or value must have a name, but it is empty (argument {number}"
-                    f"{', ' + argument if argument else ''}): give one, or leave the option out."
+                    f"A file name, folder name or value must not be empty, but argument {number} is"
+                    f"{': ' + argument if argument else ''}: give a name or value, or leave the option out."
                 )
         return super().parse_args(ctx, args)
 
@@ -69,7 +69,9 @@ def main() -> None:
     try:
         Path.cwd()
     except FileNotFoundError:
-        click.echo("fingervision: The current folder is not there any more: go to one that is.", err=True)
+        click.echo(
+            "fingervision: The current folder does not exist any more: change to a folder that exists.", err=True
+        )
         sys.exit(ExitCode.COULD_NOT)
     try:
         cli(standalone_mode=True)
@@ -79,12 +81,15 @@ def main() -> None:
     except RuntimeError as error:
         if "Symlink loop" not in str(error):
             raise
-        click.echo(f"fingervision: A link leads back to itself ({error}): name a real file or folder.", err=True)
+        click.echo(
+            f"fingervision: A symbolic link leads back to itself ({error}): name a real file or folder.", err=True
+        )
         sys.exit(ExitCode.COULD_NOT)
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             click.echo(
-                "fingervision: A name must be one that the system can hold, but is too long: shorten it.", err=True
+                "fingervision: A file name must not be longer than the operating system allows, but is: shorten it.",
+                err=True,
             )
             sys.exit(ExitCode.COULD_NOT)
         # Files are their writers' to speak of; what has no name is standard output.
@@ -126,7 +131,7 @@ def _give_up_output(error: OSError) -> NoReturn:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno != errno.EPIPE:
         click.echo(
-            f"fingervision: Standard output could not be written to its end ({error.strerror}): free disk space.",
+            f"fingervision: Standard output could not be written completely ({error.strerror}): free disk space.",
             err=True,
         )
     sys.exit(ExitCode.COULD_NOT)

@@ -128,7 +128,11 @@ def predict(
         folders = {name: out if name == chief else out / name for name in moving}
         move_mechanism(moving, asked, curves, folders, out, as_json=as_json)
     elif asked.moves:
-        click.echo("The stiffness matrix has no masses: add --kind lumped or finite_element for motion.", err=True)
+        click.echo(
+            "The model kind stiffness_matrix has no masses and cannot compute motion: choose --kind lumped or "
+            "finite_element.",
+            err=True,
+        )
     if gripped is not None:
         write_pair_grip(models, gripped, None if drive is None else inputs, out, as_json=as_json)
     if not as_json:

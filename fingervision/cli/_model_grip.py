@@ -61,7 +61,10 @@ def write_grip(
     said = []
     for kind, model in models.items():
         if not (hasattr(model, "half") or hasattr(model, "grip_force_n")):
-            click.echo(f"{kind} knows no part between the fingers: it has no rows in grip.csv.", err=True)
+            click.echo(
+                f"{kind} cannot compute a part between the fingers: grip.csv has no rows of this kind of model.",
+                err=True,
+            )
             continue
         touch = first_grip_mm(model.half, part) if isinstance(getattr(model, "half", None), DrivenBody) else None
         limit = _closing_limit_mm(gripper, model, touch)
@@ -116,7 +119,9 @@ def write_pair_grip(
     """Write grip.csv and grip.png for the finite elements of a mechanism, and print how the part is held."""
     plate = models.get("finite_element")
     if not isinstance(plate, MechanismPlate):
-        click.echo("A part between probes is answered by the finite elements: add --kind finite_element.", err=True)
+        click.echo(
+            "A part between probes can be computed by finite elements only: add --kind finite_element.", err=True
+        )
         return
     gripped, part = GrippedPair(plate, asked.pair), asked.part
     touch = gripped.touch_input_mm(part)

@@ -57,9 +57,9 @@ def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, 
     (out / "modes.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     drawn = next((found[kind] for kind in by_trust(found)), ())
     if not drawn:
-        click.echo("No mode lies in what --modes asks for: nothing is drawn.", err=True)
+        click.echo("No natural mode lies in the range that --modes states: no picture is drawn.", err=True)
         return
-    title = f"{name}: natural modes in the plane, without the actuator's mass, amplitudes at will"
+    title = f"{name}: natural modes in the plane, without the actuator's mass, arbitrary amplitudes"
     figure, _ = _panels(drawn, title)
     figure.savefig(out / "modes.png", dpi=110)
     if film:
@@ -110,7 +110,7 @@ def _in_hz(frequency_hz: float) -> str:
 
 def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:
     """Write a film of every mode vibrating with a period of one second, side by side."""
-    figure, moving = _panels(shapes, f"{title}; slowed to one swing a second")
+    figure, moving = _panels(shapes, f"{title}; slowed to one oscillation per second")
     # H.264 with halved colour needs even sides.
     sides = [2 * ceil(side * _FILM_DPI / 2) / _FILM_DPI for side in figure.get_size_inches()]
     figure.set_size_inches(sides[0], sides[1])

@@ -189,7 +189,9 @@ def follow_drive(
     for kind, model in models.items():
         if not isinstance(getattr(model, "half", None), DrivenBody):
             if not as_json:
-                click.echo(f"{kind} has no masses in the plane: it answers a drive at rest alone (simulation.csv).")
+                click.echo(
+                    f"{kind} has no masses in the plane: for a drive, it gives static results only (simulation.csv)."
+                )
             continue
         found = gripper_motion(model, drive, parse_damping(damping))
         motions[kind] = found.motion
@@ -211,7 +213,7 @@ def words_of(motion: Motion, column: str) -> str:
     )
     more = ", ..." if motion.modes_hz.size > 3 else ""
     return (
-        f"damping ratio {pairs}{more}; {column.removesuffix('_mm')} leaves the static answer by at most "
+        f"damping ratio {pairs}{more}; {column.removesuffix('_mm')} differs from the static result by at most "
         f"{motion.vibration_mm(column):.3g} mm."
     )
 
@@ -289,7 +291,7 @@ def mechanism_motion(
         shown[kind] = _motion_of(model, reduced, finer, damping, curve, column) if sparse else motion
         write_motion(folders[kind] / "response.csv", drive, motion.observed_mm, motion.force_n)
         if not as_json:
-            about = " about the equilibria, where nothing touches" if kind in static else ""
+            about = " about the static equilibria, without contact" if kind in static else ""
             click.echo(f"{kind} in time by {motion.modes_hz.size} modes{about}; {words_of(motion, column)}")
     title = f"{next(iter(models.values())).mechanism.name}, damping {damping}"
     draw_motion(shown, motions, column, title, out / "response.png")

@@ -48,7 +48,7 @@ OPTIONS = (
     click.option(
         "--u-px-per-mm",
         type=float,
-        help="Standard uncertainty of --px-per-mm in pixels per mm, such as of a ruler; u_gap_mm then includes it.",
+        help="Standard uncertainty of --px-per-mm, in pixels per mm; u_gap_mm then includes it.",
     ),
     click.option(
         "--below-tip-mm",

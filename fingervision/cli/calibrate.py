@@ -322,6 +322,6 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
         if study.percent_of_total is not None:
             click.echo(f"%GRR of the total variation: {study.percent_of_total:.2f} %")
         if percent is not None:
-            click.echo(f"%GRR of {tolerance_mm:g} mm: {percent:.2f} % (6 s): {verdict(percent)}")
+            click.echo(f"%GRR of {tolerance_mm:g} mm: {percent:.2f} % (six standard deviations): {verdict(percent)}")
         else:
-            click.echo("State --tolerance-mm to see which part of it the gauge takes up.")
+            click.echo("State --tolerance-mm to see which share of the tolerance the gauge takes up.")

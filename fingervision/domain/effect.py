@@ -92,7 +92,7 @@ class History:
     def times(self) -> Array:
         """Times of the samples (s), shape (n,); only for effects that declare `needs_times`."""
         if self.time_s is None:
-            message = "an effect that needs times was run on a table without them."
+            message = "An effect that needs times was computed for a table without times."
             raise ValueError(message)
         return self.time_s
 
@@ -276,7 +276,7 @@ class Effect:
         if self.needs_force and not history.force:
             return "the table has no force_n, and the gap hardly shows it"
         if self.needs_bodies and not history.bodies:
-            return "it is told by poses of bodies beside a drawing, and not by the gap alone"
+            return "only measured poses of bodies, compared with a drawing, show this effect; the gap alone does not"
         found = self.parameters if self.narrow is None else self.narrow(history)
         if isinstance(found, str) or not self.start:
             return found

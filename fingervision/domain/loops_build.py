@@ -66,7 +66,8 @@ def build(target: Path) -> None:
     command = compiler()
     if command is None:
         msg = (
-            "The loops in C are not built yet, and no C compiler is there (cc, gcc, clang, or the one of CC): install "
+            "The loops in C are not built yet, and no C compiler was found (cc, gcc, clang, or the one that the "
+            "variable CC names): install "
             "one, or `pip install ziglang`, which brings one, or install fingervision with pip, which builds them."
         )
         raise CannotBuildError(msg)

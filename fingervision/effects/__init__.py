@@ -96,5 +96,5 @@ def _place(effect: Effect, *, built_in: bool) -> tuple[int, float, bool, str]:
     return list(Stage).index(effect.stage), effect.order, not built_in, effect.name
 
 
-# `fingervision.effects` itself can be iterated and asked by name.
+# The package `fingervision.effects` can itself be iterated and indexed by name.
 sys.modules[__name__].__class__ = EffectList

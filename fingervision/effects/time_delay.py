@@ -53,6 +53,6 @@ def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...
     if history.dwell_s <= delay.upper:
         return (replace(delay, rugged=True, starts=COMMANDED_STARTS) if history.commanded else delay,)
     return (
-        f"the stage is taken to have stood for {history.dwell_s:.3g} s or longer before each reading, "
-        f"and a delay of at most {delay.upper:g} s is over by then"
+        f"the stage is assumed to have rested for {history.dwell_s:.3g} s or longer before each reading, and a delay "
+        f"of at most {delay.upper:g} s is over by then"
     )

@@ -7,15 +7,17 @@ from threading import Event, Thread
 
 from fingervision.domain.frame import Frame, LostFrame
 
-# Frames that wait between decoder and measurement: enough to even out slow key frames, few enough for 4K pictures.
+# Largest number of frames between decoder and measurement: enough to compensate for slow key frames, and few enough for
+# the memory that 4K pictures need.
 FRAMES_AHEAD = 8
-# How soon the decoder notices that nobody wants its frames any more, and the reader that the decoder is gone.
+# Interval of two checks: by the decoder, whether its frames are still wanted; by the reader, whether the decoder still
+# runs.
 PATIENCE_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """Mark at the end of the frames, with the exception that ended the reading, if there was one."""
+    """Marker for the end of the frames, with the exception that ended the reading, if any."""
 
     error: BaseException | None
 

@@ -7,12 +7,13 @@ from fingervision.domain.errors import ArgumentError, ArgumentTypeError
 from fingervision.domain.frame import Pixels
 
 FULL_SCALE = 65535
-"""Full scale of 16 bits, to which values from 0 to 1 are converted: the rounding adds 4e-6 of the full scale (1 /
-(65535 sqrt 12)), a hundredth of the noise of the best cameras."""
+"""Full scale of 16 bits, to which values from 0 to 1 are converted; the rounding has a standard deviation of 4e-6 of
+the full scale (1 / (65535 sqrt 12)), a hundredth of the noise of the best cameras.
+"""
 OF_EIGHT_BITS = 1e-3
-"""Largest distance from whole 8-bit levels, in every pixel, at which floats count as converted from 8 bits: so small a
-distance is no chance, and single precision rounds by 2e-5. The 8-bit rounding of 1/sqrt(12) levels is then kept in the
-uncertainty."""
+"""Largest distance of any pixel from whole 8-bit levels at which floats are regarded as converted from 8 bits; single
+precision causes a distance of 2e-5. The uncertainty then includes the rounding to 8 bits, 1/sqrt(12) levels.
+"""
 COLOURS = (3, 4)
 MUST = (
     "be a numpy array of shape (height, width), (height, width, 3), (frames, height, width) or "
@@ -43,27 +44,28 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
         The array's shape is not that of a picture.
     """
     if not isinstance(pictures, np.ndarray):
-        advice = "numpy.asarray(...) makes an array of it" if hasattr(pictures, "__array__") else ""
+        advice = "convert it with numpy.asarray(...)" if hasattr(pictures, "__array__") else ""
         raise ArgumentTypeError(argument, MUST, f"is {what_it_is(pictures)}", advice)
     if np.ma.isMaskedArray(pictures):
         raise ArgumentTypeError(
-            argument, MUST, "is a masked array, and a pixel that is masked has no level", "use roi, or .filled(...)"
+            argument,
+            MUST,
+            "is a masked array, in which masked pixels have no level",
+            "select a region by roi, or fill the masked pixels by .filled(...)",
         )
     if pictures.dtype.kind == "c":
         raise ArgumentTypeError(
-            argument, MUST, f"holds complex numbers ({pictures.dtype})", "numpy.abs(...) gives levels"
+            argument, MUST, f"contains complex numbers ({pictures.dtype})", "numpy.abs(...) gives levels"
         )
     if pictures.dtype.kind == "b":
         raise ArgumentTypeError(
             argument,
             MUST,
-            "holds true and false",
+            "contains true and false",
             "a binary picture lacks the exact positions of edges; give the grey picture",
         )
     if not (pictures.dtype.kind == "f" or (pictures.dtype.kind == "u" and pictures.dtype.itemsize <= 2)):
-        advice = (
-            "where the levels end at 255, .astype(numpy.uint8) makes them so" if pictures.dtype.kind in "iu" else ""
-        )
+        advice = "if no level exceeds 255, convert it with .astype(numpy.uint8)" if pictures.dtype.kind in "iu" else ""
         raise ArgumentTypeError(argument, MUST, f"is of type {pictures.dtype}", advice)
     if pictures.size == 0:
         raise ArgumentError(argument, MUST, f"is empty (shape {pictures.shape})")
@@ -109,17 +111,17 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
             row, column = (int(at[0]) for at in np.nonzero(~np.isfinite(picture))[:2])
             raise ArgumentError(
                 subject,
-                "hold a finite level in every pixel",
+                "have a finite level in every pixel",
                 f"{bad} of {picture.size} are NaN or infinite, the first in row {row}, column {column}",
-                "fill them from their neighbours",
+                "replace these levels, for instance by those of their neighbours",
             )
         least, largest = float(picture.min()), float(picture.max())
         if least < 0.0 or largest > 1.0:
             raise ArgumentError(
                 subject,
-                "be from 0 to 1 where its levels are floats (0 black, 1 the end of the scale)",
-                f"runs from {least:.6g} to {largest:.6g}",
-                "divide by the level at which the camera's scale ends",
+                "have levels from 0 (black) to 1 (full scale) if it contains floats",
+                f"has levels from {least:.6g} to {largest:.6g}",
+                "divide the levels by the camera's full scale",
             )
         picture = _stored(picture)
     native = picture.astype(picture.dtype.newbyteorder("="), copy=False)
@@ -133,9 +135,9 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
         if see_through:
             raise ArgumentError(
                 subject,
-                "be opaque where it has an alpha channel",
-                f"{see_through} of {native[:, :, 3].size} pixels are not",
-                "give the colours alone, source[..., :3], if they are what the camera recorded",
+                "have an opaque alpha channel, or none",
+                f"{see_through} of {native[:, :, 3].size} pixels are transparent",
+                "give only the colours, source[..., :3], if the camera recorded them",
             )
     return np.ascontiguousarray(native[:, :, :3])
 

@@ -13,7 +13,9 @@ from fingervision.frames.array_levels import levels_of, stated_shape
 from fingervision.frames.source import Description
 
 HASH_DIGITS = 12
-"""Number of digits of the pictures' SHA-256 in the recording's name: two different ones are equal once in 10^14."""
+"""Number of digits of the pictures' SHA-256 in the recording's name; two different arrays have the same digits with a
+probability of 10^-14.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +54,7 @@ class ArrayFrames:
     def __post_init__(self) -> None:
         stack = stated_shape(self.pictures)
         if self.rate_hz is not None and self.times_s is not None:
-            raise ArgumentError("rate_hz", "be left out where times_s is given", "both are given")
+            raise ArgumentError("rate_hz", "be left out if times_s is given", "both are given")
         if self.rate_hz is not None and not 0.0 < self.rate_hz < float("inf"):
             raise ArgumentError("rate_hz", "be positive", f"is {self.rate_hz:g}")
         times_s = None if self.times_s is None else _checked_times(self.times_s, len(stack))
@@ -119,7 +121,7 @@ def _checked_times(times_s: Sequence[float], count: int) -> tuple[float, ...]:
     try:
         times = np.asarray(times_s, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ArgumentError("times_s", "be one number a picture, in seconds", f"is {times_s!r}") from None
+        raise ArgumentError("times_s", "be one number for each picture, in seconds", f"is {times_s!r}") from None
     if times.shape != (count,):
         raise ArgumentError("times_s", f"be one number for each of the {count} pictures", f"has shape {times.shape}")
     if not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):

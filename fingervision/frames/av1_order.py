@@ -12,7 +12,7 @@ SEQUENCE, FRAME_HEADER, FRAME = 1, 3, 6
 KEY_FRAME, INTRA_ONLY_FRAME, SWITCH_FRAME = 0, 2, 3
 SLOTS, ALL_SLOTS = 8, 0xFF
 SELECT_SCREEN_CONTENT = 2
-# Headers are far shorter; what is longer is not looked at.
+# Number of bytes of a packet that are read, which is more than any header needs.
 HEADER_BYTES = 160
 
 
@@ -25,7 +25,7 @@ class ShownPicture:
     is_key : bool
         Whether decoding can start with this picture.
     order : int
-        `order_hint`: one more than that of the picture presented before, modulo `modulus`.
+        `order_hint`: one more than that of the previously presented picture, modulo `modulus`.
     modulus : int
         2 ** OrderHintBits.
     """
@@ -37,7 +37,7 @@ class ShownPicture:
 
 @dataclass(frozen=True, slots=True)
 class _Sequence:
-    order_bits: int  # 0 where pictures bear no numbers
+    order_bits: int  # 0 if pictures have no numbers
     screen_content: int
     integer_motion: int
     id_bits: int
@@ -56,7 +56,7 @@ class Av1Order:
         self._sequence: _Sequence | None = None
         self._slots: list[tuple[int, bool] | None] = [
             None
-        ] * SLOTS  # number, and whether it is a key frame yet to be shown
+        ] * SLOTS  # for each slot: picture number, and whether the picture is a key frame that is yet to be shown
         if extradata is not None and len(extradata) > 4 and extradata[0] == 0x81:
             self.of(extradata[4:])
 

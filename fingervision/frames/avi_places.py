@@ -18,9 +18,10 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-# The list of frames begins behind the headers, the index stands at the end: nothing longer is searched.
+# Bytes at the start of a file in which the list of frames is searched, and bytes at its end in which the index is
+# searched.
 HEAD_BYTES, TAIL_BYTES = 1 << 20, 1 << 25
-# Between two pictures lie the sound and indices of that moment.
+# Largest number of other chunks (sound, indices) between two pictures.
 CHUNKS_BETWEEN = 64
 HEADER_BYTES = 8
 ENTRY = np.dtype([("id", "S4"), ("flags", "<u4"), ("offset", "<u4"), ("size", "<u4")])
@@ -47,15 +48,16 @@ class AviPlaces:
             begin = file.read(HEAD_BYTES).find(b"movi")
             self._offsets, self._sizes, self._most_missing = _index(file, self._tag, begin, streams)
         self.after_hole = False
-        """Whether bytes are missing between the starts of the last two packets: the first of the two may be damaged
-        itself."""
+        """Whether bytes are missing between the starts of the last two packets, so that the first of the two may be
+        damaged.
+        """
         self._by_offset = {int(offset): number for number, offset in enumerate(self._offsets)}
         self._end: int | None = begin + 4 if begin >= 0 else None
         self._missing = 0
         self._possible = np.zeros(0, np.int64)
         self._number = -1
         self.is_lost = False
-        """Whether the packet before could not be assigned a number."""
+        """Whether the previous packet could not be assigned a number."""
         self.missing: tuple[int, ...] = ()
         """Numbers of frames that the index lists, with a picture, between the last two packets with a number."""
 
@@ -92,7 +94,8 @@ class AviPlaces:
             possible = possible[possible < len(self._sizes)]
         else:
             possible = np.arange(self._number + 1, len(self._sizes))
-        # What is missing makes all behind it lie nearer to the front, never farther, and never by more than the end.
+        # Missing bytes shift all later packets towards the file's start, at most by the number of bytes missing before
+        # the index.
         nearer = self._offsets[possible] - begin
         alike = (self._sizes[possible] == size) & (nearer >= self._missing) & (nearer <= self._most_missing)
         self._possible = possible[alike]
@@ -117,7 +120,7 @@ class AviPlaces:
                     return None
                 (length,) = struct.unpack("<I", header[4:])
                 if header[:4] == b"LIST":
-                    length = 4  # its kind; what is in it follows
+                    length = 4  # the kind of the list; its content follows
                 elif header[:2] == self._tag and header[2:4] in KINDS:
                     number += 1
                 at += HEADER_BYTES + length + length % 2
@@ -140,16 +143,16 @@ def _index(file: BinaryIO, tag: bytes, begin: int, streams: int) -> tuple[NDArra
     if not all(map(KNOWN_CHUNK.fullmatch, entries["id"].tolist())) or np.any(
         np.diff(entries["offset"].astype(int)) <= 0
     ):
-        return nothing, nothing, 0  # a damaged index would tell wrong numbers
+        return nothing, nothing, 0  # a damaged index would give wrong numbers
     is_chunk = np.array([name[:2].isdigit() for name in entries["id"].tolist()], dtype=bool)
     if streams == 1:
-        chosen = entries[is_chunk]  # one whose name is damaged is a frame all the same
+        chosen = entries[is_chunk]  # a chunk with a damaged name is a frame nevertheless
     elif all(int(name[:2]) < streams for name in entries["id"][is_chunk].tolist()):
         chosen = entries[np.isin(entries["id"], [tag + kind for kind in KINDS])]
     else:
         return nothing, nothing, 0
     offsets, sizes = chosen["offset"].astype(np.int64), chosen["size"].astype(np.int64)
-    # Offsets count from the word `movi`; some programs count from the beginning of the file.
+    # Offsets are relative to the word `movi`; some programs state them relative to the beginning of the file.
     base = begin if len(offsets) and offsets[0] < begin else 0
     ends = entries["offset"].astype(np.int64) + base + HEADER_BYTES + entries["size"] + entries["size"] % 2
     most_missing = max(0, int(ends[-1]) - (start + at)) if len(ends) else 0

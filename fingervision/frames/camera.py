@@ -23,9 +23,9 @@ from fingervision.frames.v4l2_ranges import ranges
 
 BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_MSMF, "darwin": cv2.CAP_AVFOUNDATION}
 DEVICES = Path("/sys/class/video4linux")
-# Off Linux cameras have no list; so many numbers are tried.
+# Number of camera numbers that are tried on systems other than Linux, which have no list of cameras.
 NUMBERS_TRIED = 6
-# So many reads may fail before the camera counts as gone.
+# Number of failed reads after which the camera is regarded as disconnected.
 FAILED_READS = 3
 
 
@@ -93,8 +93,8 @@ class CameraFrames:
         if not read or pixels is None:
             self._capture.release()
             raise DeviceError(
-                f"The camera {name} is open but gives no picture: another program may use it, or it does not have the "
-                "format, size and rate asked for; leave out --format, --size and --rate-hz."
+                f"The camera {name} is open but gives no picture: another program may use it, or it does not offer "
+                "the requested format, size and rate; leave out --format, --size and --rate-hz."
             )
         self._closed = Event()
         self._ranges = ranges(name) if self._capture.getBackendName() == V4L2 else {}
@@ -139,9 +139,9 @@ class CameraFrames:
         Parameters
         ----------
         name : str
-            Of the control.
+            Name of the setting.
         value : float
-            In the control's unit.
+            Requested value, in the setting's unit.
         """
         with _quiet():
             self._capture.set(*request_of(self._capture.getBackendName(), name, value))
@@ -165,7 +165,7 @@ class CameraFrames:
         notes = found.notes
         if wish.size_px is not None and wish.size_px != size_px:
             asked, given = (f"{width_px}x{height_px}" for width_px, height_px in (wish.size_px, size_px))
-            notes = (f"The camera was asked for {asked} pixels and gives {given}.", *notes)
+            notes = (f"Pictures of {asked} pixels were requested from the camera, but it gives {given}.", *notes)
         rate_hz = read[cv2.CAP_PROP_FPS]
         return Description(
             name=self.name,
@@ -202,7 +202,7 @@ def _luma(pixels: Any) -> Pixels:
     if pixels.shape[2] == 2:
         luma: Pixels = pixels[:, :, 0].copy()
         return luma
-    # ITU-R BT.601, as `measure` makes grey of colours.
+    # Weights of ITU-R BT.601, which `measure` uses too.
     grey: Pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY)
     return grey
 

@@ -24,16 +24,16 @@ WHILE_RUNNING = (EXPOSURE, GAIN, FOCUS, WHITE_BALANCE)
 def control_list(
     backend: str, read: Mapping[int, float], ranges: Mapping[int, tuple[int, int]]
 ) -> tuple[CameraControl, ...]:
-    """List the settings that a camera allows to be changed while it runs.
+    """List the settings of a camera that can be changed while it runs.
 
     Parameters
     ----------
     backend : str
-        OpenCV's name for it; AVFoundation lets nothing be set.
+        OpenCV's name of the backend; AVFoundation has no such settings.
     read : mapping of int to float
-        What the camera read back, by property.
+        Values that the camera reports, by OpenCV's property.
     ranges : mapping of int to (int, int)
-        Limits by property, in the camera's units, as far as they are known.
+        Smallest and largest value by property, in the camera's units, as far as known.
     """
     return tuple(_controls(backend, read, ranges)) if backend in (V4L2, MSMF) else ()
 
@@ -59,11 +59,9 @@ def request_of(backend: str, name: str, value: float) -> tuple[int, float]:
     Parameters
     ----------
     backend : str
-        OpenCV's name for it.
-    name : str
-        Of the control.
+        OpenCV's name of the backend. name : str Name of the setting.
     value : float
-        In the user's unit.
+        Requested value, in the user's unit.
     """
     if name == FRAME_RATE:
         return cv2.CAP_PROP_FPS, value

@@ -25,14 +25,14 @@ from fingervision.frames.source import Wish
 
 V4L2, MSMF = "V4L2", "MSMF"
 UNSUPPORTED = -1.0
-# Grey levels as the sensor gave them, which every camera of the USB video class has at some size.
+# Format without compression, which every camera of the USB video class offers at some picture size.
 RAW_FORMAT = "YUYV"
-# Formats in which a camera compresses its pictures before they arrive: each by itself, or from one to the next.
+# Formats in which a camera compresses its pictures: each picture by itself, or with reference to other pictures.
 CODINGS = {
     **dict.fromkeys(("MJPG", "JPEG", "AVRn", "dmb1"), Coding.INTRAFRAME),
     **dict.fromkeys(("H264", "HEVC", "X264", "avc1"), Coding.INTERFRAME),
 }
-# One picture is filled while the other is read; more would only be older.
+# One picture is filled while the other is read; further buffers would only contain older pictures.
 BUFFERED_PICTURES = 2
 V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED = 1.0, 0.25
 
@@ -62,15 +62,15 @@ class Control:
 EXPOSURE = Control(controls.EXPOSURE, cv2.CAP_PROP_EXPOSURE, "ms", lambda wish: wish.camera.exposure_ms)
 GAIN = Control(controls.GAIN, cv2.CAP_PROP_GAIN, "", lambda wish: wish.camera.gain)
 FOCUS = Control(controls.FOCUS, cv2.CAP_PROP_FOCUS, "", lambda wish: wish.camera.focus)
-# Also V4L2's WB_TEMPERATURE; Media Foundation knows it by this name alone.
+# In V4L2 the same property is also called WB_TEMPERATURE; Media Foundation has only this name.
 WHITE_BALANCE = Control("white balance", cv2.CAP_PROP_TEMPERATURE, "K", lambda wish: wish.camera.white_balance_k)
 ZOOM = Control(controls.ZOOM, cv2.CAP_PROP_ZOOM, "", lambda wish: None)
 CONTROLS = (EXPOSURE, GAIN, FOCUS, WHITE_BALANCE, ZOOM)
-# What would change by itself from frame to frame, by V4L2's properties, and what that does to the measurement.
+# Automatic settings that can change from frame to frame: V4L2's property, and the consequence for the measurement.
 AUTOMATICS: Mapping[str, tuple[int, str]] = {
-    EXPOSURE.name: (cv2.CAP_PROP_AUTO_EXPOSURE, "the edges move with the light"),
-    FOCUS.name: (cv2.CAP_PROP_AUTOFOCUS, "the scale moves with it"),
-    WHITE_BALANCE.name: (cv2.CAP_PROP_AUTO_WB, "grey levels move with it"),
+    EXPOSURE.name: (cv2.CAP_PROP_AUTO_EXPOSURE, "edges shift with the exposure"),
+    FOCUS.name: (cv2.CAP_PROP_AUTOFOCUS, "the scale changes with the focus"),
+    WHITE_BALANCE.name: (cv2.CAP_PROP_AUTO_WB, "grey levels change with the white balance"),
 }
 READ = (
     cv2.CAP_PROP_FOURCC,
@@ -110,7 +110,8 @@ def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[t
     """
     if backend == V4L2:
         yield cv2.CAP_PROP_MODE, 0.0
-    # The format first: sizes and rates hang on it. Elsewhere than in V4L2 it names what OpenCV makes of the picture.
+    # The format is set first, because the available sizes and rates depend on it. Outside V4L2, it is the format to
+    # which OpenCV converts the picture.
     wanted = wish.camera.format or (RAW_FORMAT if backend == V4L2 else None)
     if wanted is not None:
         yield cv2.CAP_PROP_FOURCC, float(cv2.VideoWriter.fourcc(*wanted))
@@ -145,16 +146,18 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
     """
     settings, notes = {"format": four_letters(read.get(cv2.CAP_PROP_FOURCC, UNSUPPORTED))}, []
     if wish.camera.format is not None and settings["format"] != wish.camera.format:
-        notes.append(f"The camera was asked for the format {wish.camera.format} and gives {settings['format']}.")
+        notes.append(
+            f"The format {wish.camera.format} was requested from the camera, but it gives {settings['format']}."
+        )
     if settings["format"] == "MJPG":
         notes.append(
-            "The camera compresses its pictures (MJPG) before they arrive here: they count as lossy, and the "
-            "uncertainty is larger for it; choose a size or rate that it delivers raw (--format YUYV)."
+            "The camera compresses its pictures (MJPG) with loss, which increases the uncertainty: choose a size or "
+            "rate that the camera offers without compression (--format YUYV)."
         )
     rate_hz = read.get(cv2.CAP_PROP_FPS, UNSUPPORTED)
     if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=controls.SAME_SHARE):
         states = f"states {rate_hz:g}" if rate_hz > 0.0 else "states no rate"
-        notes.append(f"The camera was asked for {wish.rate_hz:g} frames a second and {states}.")
+        notes.append(f"A rate of {wish.rate_hz:g} frames per second was requested from the camera, but it {states}.")
     for control in CONTROLS:
         asked = control.wished(wish)
         if not is_there(read, control.what) or backend not in (V4L2, MSMF):
@@ -165,16 +168,18 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
         settings[control.name] = _words(control, value)
         if asked is not None and not isclose(value, asked, rel_tol=controls.SAME_SHARE):
             notes.append(
-                f"The camera was asked for {control.name} {_words(control, asked)} and takes {_words(control, value)}."
+                f"The camera's {control.name} was requested as {_words(control, asked)}, but is "
+                f"{_words(control, value)}."
             )
     for name, (what, harm) in AUTOMATICS.items() if backend == V4L2 else ():
         if is_there(read, what) and not _is_manual(name, read[what]):
             settings[name] = "automatic"
             notes.append(
-                f"The camera's automatic {name} could not be switched off (it reads back {read[what]:g}): {harm}."
+                f"The camera's automatic {name} could not be switched off (the camera reports the mode "
+                f"{read[what]:g}): {harm}."
             )
     listed = ", ".join(f"{name} {value}" for name, value in settings.items())
-    notes.append(f"The camera reads back: {listed}.")
+    notes.append(f"The camera reports these settings: {listed}.")
     return Settled(settings, tuple(notes))
 
 
@@ -217,7 +222,9 @@ def _words(control: Control, value: float) -> str:
 
 
 def _cannot(backend: str, control: Control, asked: float) -> str:
-    words = f"The camera was asked for {control.name} {_words(control, asked)}"
+    words = f"The camera's {control.name} was requested as {_words(control, asked)}"
     if backend in (V4L2, MSMF):
-        return f"{words}, but has no such setting."
-    return f"{words}, but {backend} lets no program set it: set it in the camera's own program."
+        return f"{words}, but the camera has no such setting."
+    return (
+        f"{words}, but {backend} does not allow programs to change this setting: change it in the camera's own program."
+    )

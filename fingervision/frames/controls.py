@@ -1,7 +1,7 @@
-"""Settings of a camera that may be changed while it runs: which it has, their limits, and the values that it accepted.
+"""Settings of a camera that can be changed while it runs, with their limits and the values that the camera accepted.
 
-A live source with such settings has `controls()` and `set_control(name, value)`; both are called by the thread that
-reads its frames, between two of them, so that a driver needs no lock. A source without these two methods has no such
+A live source with such settings has `controls()` and `set_control(name, value)`; both are called between two frames by
+the thread that reads the frames, so that a driver needs no lock. A source without these two methods has no such
 settings.
 """
 
@@ -13,8 +13,8 @@ from fingervision.domain.errors import DeviceError, FingervisionError, UsageErro
 
 EXPOSURE, GAIN, FOCUS, ZOOM, FRAME_RATE = "exposure", "gain", "focus", "zoom", "frame rate"
 MOVES_SCALE = frozenset({FOCUS, ZOOM})
-"""What changes the picture's scale, so that a calibration no longer holds."""
-# A camera takes the nearest of its steps; what lies nearer than this is what was asked for.
+"""Settings that change the picture's scale and so invalidate a calibration."""
+# A camera chooses the nearest of its possible values; a relative difference below this limit is not reported.
 SAME_SHARE = 0.01
 
 
@@ -25,13 +25,13 @@ class CameraControl:
     Parameters
     ----------
     name : str
-        In words: `exposure`, `gain`, `focus`, `frame rate`.
+        Name of the setting: `exposure`, `gain`, `focus`, `frame rate`.
     value : float
-        What the camera reads back.
+        Value that the camera reports.
     unit : str
-        Of value and limits: `ms`, `Hz`; empty where only the camera's maker knows it.
+        Unit of value and limits: `ms`, `Hz`; empty if only the camera's maker knows it.
     least, greatest : float or None
-        Limits that the camera states; None where it states none.
+        Limits that the camera states; None if it states no limit.
     """
 
     name: str
@@ -46,7 +46,7 @@ class CameraControl:
 
 
 class Adjustable(Protocol):
-    """A live source whose camera may be set while it runs."""
+    """A live source whose camera settings can be changed while it runs."""
 
     def controls(self) -> tuple[CameraControl, ...]:
         """Settings that may be changed while the camera runs, with their present values."""
@@ -58,7 +58,7 @@ class Adjustable(Protocol):
         Raises
         ------
         DeviceError
-            The driver refuses.
+            The driver refuses the value.
         """
         ...
 
@@ -76,7 +76,7 @@ def controls_of(source: object) -> tuple[CameraControl, ...]:
     try:
         found: tuple[object, ...] = tuple(cast("Adjustable", source).controls())
         return tuple(each for each in found if isinstance(each, CameraControl) and isfinite(each.value))
-    except Exception:  # a driver's fault takes its controls, and not the picture
+    except Exception:  # an error in a driver removes the settings, but does not end the picture
         return ()
 
 
@@ -86,13 +86,14 @@ def check_value(controls: tuple[CameraControl, ...], name: str, value: float) ->
     Raises
     ------
     UsageError
-        There is no such control, or the value is none that it has.
+        There is no setting of this name, or the setting does not accept the value.
     """
     control = next((each for each in controls if each.name == name), None)
     if control is None:
         there = ", ".join(each.name for each in controls) or "nothing"
         raise UsageError(
-            f"Settings of this camera that can be changed while it runs: {there}; {name[:40]!r} is none of them."
+            f"The setting must be one of those that can be changed while this camera runs ({there}), but is "
+            f"{name[:40]!r}."
         )
     least, greatest = control.least, control.greatest
     is_known = name in (EXPOSURE, FRAME_RATE)
@@ -118,28 +119,28 @@ def adjust(source: object, name: str, value: float) -> tuple[CameraControl, Came
     source : LiveSource
         Called in the thread that reads it.
     name : str
-        Of the control.
+        Name of the setting.
     value : float
-        In its unit.
+        Requested value, in the setting's unit.
 
     Returns
     -------
     (CameraControl, CameraControl)
-        Before, and after.
+        The setting before and after the change.
 
     Raises
     ------
     DeviceError
         The camera keeps its value, or its driver fails.
     UsageError
-        It has no such control, or no such value.
+        The camera has no setting of this name, or the setting does not accept the value.
     """
     before = check_value(controls_of(source), name, value)
     try:
         cast("Adjustable", source).set_control(name, value)
     except FingervisionError:
         raise
-    except Exception as error:  # a driver's fault must not end the live view
+    except Exception as error:  # an error in a driver must not end the live view
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". ")
         raise DeviceError(f"The camera refused to set {name} {before.words(value)} ({said}).") from error
     after = next((each for each in controls_of(source) if each.name == name), None)
@@ -154,9 +155,9 @@ def adjust(source: object, name: str, value: float) -> tuple[CameraControl, Came
 
 
 def about_change(before: CameraControl, after: CameraControl, asked: float) -> str:
-    """Sentence on a change."""
+    """Sentence that reports a change of a setting to the user."""
     words = f"The camera's {after.name} was {before.words(before.value)} and is {after.words(after.value)} from now on"
-    return f"{words}." if _same(after.value, asked) else f"{words} ({after.words(asked)} was asked)."
+    return f"{words}." if _same(after.value, asked) else f"{words} ({after.words(asked)} was requested)."
 
 
 def _same(one: float, other: float) -> bool:

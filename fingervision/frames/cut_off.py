@@ -11,7 +11,7 @@ def cut_off(
     Parameters
     ----------
     container, stream : PyAV's
-        PyAV objects, after reading to the end.
+        PyAV's objects for file and video stream, after reading to the end.
     packets : int
         Number of packets read.
     last_end_s : float or None
@@ -24,7 +24,7 @@ def cut_off(
     """
     kind = container.format.name
     if "mp4" in kind and stream.frames > packets:
-        return f"The recording is cut off here: the file announces {stream.frames} frames and holds {packets}."
+        return f"The recording is truncated here: the file states {stream.frames} frames but contains {packets}."
     stated_s = None
     if "matroska" in kind:
         stated_s = _clock_s(stream.metadata.get("DURATION")) or (
@@ -34,10 +34,11 @@ def cut_off(
         stated_s = float(stream.duration * stream.time_base)
     if stated_s is None or not stream.average_rate:
         return None
-    # One frame and a half: containers round, and some count up to the last frame's start, others to its end.
+    # A difference of one and a half frames is permitted, because containers round, and state the start or the end of
+    # the last frame.
     if stated_s - (last_end_s or 0.0) > 1.5 / float(stream.average_rate):
         return (
-            f"The recording is cut off here: the file announces {stated_s:.2f} s and holds {last_end_s or 0.0:.2f} s."
+            f"The recording is truncated here: the file states {stated_s:.2f} s but contains {last_end_s or 0.0:.2f} s."
         )
     return None
 

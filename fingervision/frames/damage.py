@@ -23,12 +23,14 @@ class DamageTrail:
 
     def __init__(self) -> None:
         self._numbers = count()
-        self._entered: list[tuple[int, int]] = []  # (tick, number in coded order) of packets whose picture is awaited
+        # (tick, number in coded order) of packets whose pictures have not left the decoder.
+        self._entered: list[tuple[int, int]] = []
         self._last = -1
-        self._broken: dict[int, str] = {}  # why, by number in coded order, until a sound key frame comes after it
-        self._stated_keys: set[int] = set()  # numbers of packets that the container calls key frames
-        self._recoveries: dict[int, int] = {}  # packets that complete a recovery, and those that began it
-        self._given_up: set[int] = set()  # ticks of lost pictures since the damage
+        # Reason for the damage, by number in coded order, until an undamaged key frame follows.
+        self._broken: dict[int, str] = {}
+        self._stated_keys: set[int] = set()  # numbers of packets that are key frames according to the container
+        self._recoveries: dict[int, int] = {}  # packet that completes a recovery: packet that began it
+        self._given_up: set[int] = set()  # ticks of pictures that were lost since the damage
 
     @staticmethod
     def prepare(codec: av.CodecContext) -> None:
@@ -42,7 +44,7 @@ class DamageTrail:
         if packet.is_keyframe and self._broken:
             self._stated_keys.add(self._last)
         if packet.is_corrupt:
-            self.breaks("It is incomplete in the file.")
+            self.breaks("The frame is incomplete in the file.")
         if packet.pts is not None and not packet.is_discard and is_shown:
             heapq.heappush(self._entered, (packet.pts, self._last))
 
@@ -51,7 +53,7 @@ class DamageTrail:
         self._broken.setdefault(self._last, why)
 
     def recovers(self, over: int) -> None:
-        """Record that the last picture is correct whatever came before the packet `over` positions earlier.
+        """Record that the last picture depends on no packet before the one that entered `over` positions earlier.
 
         Streams without key frames are refreshed part by part: once every part has been refreshed, pictures no longer
         depend on those before the refresh.
@@ -87,7 +89,7 @@ class DamageTrail:
         """Yield a picture that left the decoder, and before it the lost frames that belong there."""
         tick = picture.pts
         if tick in self._given_up:
-            return  # behind damage pictures may leave too late; its place is taken
+            return  # after damage, a picture may leave too late: a lost frame has been yielded in its place
         number = picture.opaque if isinstance(picture.opaque, int) else self._last
         while tick is not None and self._entered and self._entered[0][0] <= tick:
             early, early_number = heapq.heappop(self._entered)
@@ -97,8 +99,8 @@ class DamageTrail:
                 self._given_up.add(early)
                 yield early, self._words(early_number)
         if picture.is_corrupt:
-            self._broken.setdefault(number, "It was decoded with errors.")
-        # One flipped bit makes a picture call itself a key frame: the container must say so too.
+            self._broken.setdefault(number, "The frame was decoded with errors.")
+        # A single flipped bit can mark a picture as a key frame, so that the container must mark it as well.
         since = number if picture.key_frame and number in self._stated_keys else self._recoveries.get(number)
         if since is not None and not any(since <= broken <= number for broken in self._broken):
             self._broken = {broken: why for broken, why in self._broken.items() if broken > number}
@@ -123,5 +125,5 @@ class DamageTrail:
         if own is not None:
             return own
         if self._hangs_on_damage(number):
-            return "It is coded as a difference to a frame that is damaged."
-        return "It was lost where the recording is damaged."
+            return "The frame is coded as a difference to a damaged frame."
+        return "The frame was lost at a damaged place of the recording."

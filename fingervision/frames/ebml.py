@@ -14,9 +14,9 @@ class Element:
     Parameters
     ----------
     name : bytes
-        Its identifier, with the marker of its length.
+        Identifier of the element, including the bits that mark the identifier's length.
     begin, end : int
-        Where its content begins and ends in the file.
+        Positions in the file at which the element's content begins and ends.
     """
 
     name: bytes

@@ -21,10 +21,13 @@ from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
 
 MISSING = "Bytes are damaged or missing in the file"
-NO_COUNT = f"{MISSING} here. AVI counts frames to tell the time, so the time of those behind is not known."
+NO_COUNT = (
+    f"{MISSING} here. AVI files contain no times, only a count of frames, so that the times of the following "
+    "frames are not known."
+)
 NO_CLUSTER = (
-    "The time that the file states for the next frames (a Matroska cluster) is damaged: it does not fit the file's "
-    "index, or the frames around it, so their time is not known."
+    "The time that the file states for the next frames (a Matroska cluster) is damaged, because it contradicts the "
+    "file's index or the neighbouring frames; the times of these frames are not known."
 )
 
 
@@ -34,7 +37,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     Parameters
     ----------
     container, stream : PyAV's
-        PyAV objects at the start of the file; the decoder is set to strict mode.
+        PyAV's objects for file and video stream, at the start of the file; the decoder is set to strict mode.
     path : Path
         The file.
 
@@ -71,10 +74,10 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
                     last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
             at_end = at_end or read.at_end
             if read.hole:
-                trail.breaks(f"{MISSING} behind it ({read.hole}).")
+                trail.breaks(f"{MISSING} after this frame ({read.hole}).")
             yield from _decoded(packet, trail, heard, jpegs)
             if read.hole and not read.is_placed:
-                trail.hole(f"{MISSING} before it ({read.hole}).")
+                trail.hole(f"{MISSING} before this frame ({read.hole}).")
                 yield None, f"{MISSING} ({read.hole}); frames may be missing here."
             if read.end:
                 yield from trail.rest()
@@ -83,7 +86,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     yield from trail.rest()
     missing = cut_off(container, stream, packets, last_end_s)
     if missing or at_end:
-        yield None, missing or f"{MISSING} at its end ({at_end})."
+        yield None, missing or f"{MISSING} at the end of the file ({at_end})."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +108,7 @@ class _Read:
     end : str
         Reason why there is no next packet, if that is damage.
     at_end : str
-        Message of the container at the end, mostly that the file is truncated.
+        Message of the container reader at the end of the file, mostly that the file is truncated.
     """
 
     packet: "av.Packet[av.VideoStream]"
@@ -130,10 +133,10 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
         try:
             packet = next(demuxed, None)
         except av.FFmpegError as error:
-            end = f"The file cannot be read any further ({error.strerror})."
+            end = f"The rest of the file cannot be read ({error.strerror})."
         except IndexError:
-            # PyAV has no place for a stream that a damaged file invents on the way.
-            end = "The file cannot be read any further (it announces another stream on the way)."
+            # PyAV raises IndexError if a damaged file seems to begin a further stream.
+            end = "The rest of the file cannot be read (a further stream seems to begin in its middle)."
         hole = heard.of_file()
         missing: tuple[int, ...] = ()
         loses_time = ""
@@ -141,7 +144,7 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
             was_lost = places.is_lost
             number = places.number(packet.pos, packet.size)
             missing, loses_time = places.missing, NO_COUNT if places.is_lost and not was_lost else ""
-            hole = "another chunk was expected" if places.after_hole and not was_lost else ""
+            hole = "a different chunk was expected here" if places.after_hole and not was_lost else ""
             if number is None:
                 packet.pts = packet.dts = None
             else:
@@ -167,10 +170,10 @@ def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
     """Record the frames that are missing before a packet."""
     if read.loses_time:
         if read.is_placed:
-            trail.hole(f"{MISSING} before it.")
+            trail.hole(f"{MISSING} before this frame.")
         yield None, read.loses_time
     for tick in read.missing:
-        trail.lost(tick, f"{MISSING}, and this frame with them.")
+        trail.lost(tick, f"{MISSING}, including this frame.")
 
 
 def _first_packets(path: Path, stream: av.VideoStream) -> Iterator[bytes]:
@@ -185,15 +188,15 @@ def _decoded(
 ) -> Iterator[Picture]:
     fault = jpegs.fault(bytes(packet)) if packet.size else ""
     if fault:
-        trail.breaks(f"It is damaged in the file ({fault}).")
+        trail.breaks(f"The frame is damaged in the file ({fault}).")
     try:
         decoded = packet.decode()
     except av.FFmpegError as error:
-        trail.breaks(f"It could not be decoded ({error.strerror}).")
+        trail.breaks(f"The frame could not be decoded ({error.strerror}).")
         return
     finally:
         said = heard.of_picture()
     if said:
-        trail.breaks(f"It is damaged in the file ({said}).")
+        trail.breaks(f"The frame is damaged in the file ({said}).")
     for picture in decoded:
         yield from trail.leaves(picture)

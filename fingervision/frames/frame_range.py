@@ -11,7 +11,7 @@ def frame_range(frames: Iterable[Frame | LostFrame], first: int, last: int) -> I
     Parameters
     ----------
     frames : iterable of Frame or LostFrame
-        The recording; it is read from its start, because frames depend on earlier ones, and not beyond the range.
+        The recording; it is read from its start, because frames depend on earlier frames, up to the end of the range.
     first, last : int
         Numbers of the first and the last frame, from 0, both included.
 

@@ -91,7 +91,7 @@ class GenicamFrames:
         try:
             self._camera.start()
             first = self._camera.fetch(timeout=SILENT_S)
-        except Exception as error:  # a producer has classes of its own
+        except Exception as error:  # a producer has its own exception classes
             self._release()
             raise DeviceError(f"The camera {name} is open but gives no picture ({error_words(error)}).") from error
         self.has_own_clock = _own_time_s(first) is not None
@@ -153,9 +153,9 @@ class GenicamFrames:
         Parameters
         ----------
         name : str
-            Of the control.
+            Name of the setting.
         value : float
-            In the control's unit.
+            Requested value, in the setting's unit.
         """
         nodes = self._camera.remote_device.node_map
         node, factor, _ = CONTROLS[name]
@@ -182,7 +182,7 @@ class GenicamFrames:
         parts = buffer.payload.components
         size = self.description.height_px, self.description.width_px
         if not parts or not buffer.module.is_complete or parts[0].data.size != size[0] * size[1]:
-            words = "The camera's picture arrived without all of its packets: check the network and its packet size."
+            words = "The frame arrived without some of its packets: check the network and its packet size."
             return LostFrame(index, time_s, Status.DAMAGED, words)
         return Frame(levels(parts[0].data, size), index, time_s, Coding.LOSSLESS)
 

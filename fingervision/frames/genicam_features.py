@@ -11,16 +11,19 @@ from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraContr
 from fingervision.frames.source import Wish
 
 MONO = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
-"""Pixel formats in which each grey level has one or two bytes of its own, by the names of the PFNC (EMVA, Pixel Format
-Naming Convention)."""
+"""Pixel formats in which each grey level occupies one or two whole bytes, by their names in the EMVA's Pixel Format
+Naming Convention.
+"""
 NODES = {"exposure_ms": ("ExposureTime", 1e3), "gain": ("Gain", 1.0)}
-"""Feature of the Standard Features Naming Convention for what may be asked, and its units in ours."""
+"""Features of the Standard Features Naming Convention by the options of this program, with factors that convert the
+option's unit to the feature's.
+"""
 CONTROLS = {
     EXPOSURE: (*NODES["exposure_ms"], "ms"),
     GAIN: (*NODES["gain"], "dB"),
     FRAME_RATE: ("AcquisitionFrameRate", 1.0, "Hz"),
 }
-"""What may be set while the camera runs: its feature, its units in ours, our unit."""
+"""Settings that can be changed while the camera runs: feature, number of its units in one of ours, and our unit."""
 
 
 def control_list(nodes: Any) -> tuple[CameraControl, ...]:
@@ -29,7 +32,7 @@ def control_list(nodes: Any) -> tuple[CameraControl, ...]:
     Parameters
     ----------
     nodes : GenApi's map of nodes
-        Of the camera.
+        Map of the camera's features.
     """
     found = []
     for name, (node, factor, unit) in CONTROLS.items():
@@ -52,7 +55,7 @@ def control_list(nodes: Any) -> tuple[CameraControl, ...]:
 def _limit(nodes: Any, node: str, end: str) -> float | None:
     try:
         return float(getattr(getattr(nodes, node), end))
-    except Exception:  # the camera does not tell it now
+    except Exception:  # the camera does not state the limit at present
         return None
 
 
@@ -74,9 +77,9 @@ def request_settings(nodes: Any, wish: Wish) -> tuple[str, ...]:
         try:
             if value is not None:
                 getattr(nodes, node).value = value
-        except Exception as error:  # not there, not now, beyond its range: each producer has its own class
-            if node != "AcquisitionFrameRateEnable":  # many cameras have no such switch, and need none
-                notes.append(f"The camera was asked for {node} = {value}, and did not take it ({error_words(error)}).")
+        except Exception as error:  # missing or locked feature, or value out of range
+            if node != "AcquisitionFrameRateEnable":  # many cameras do not have this feature and do not need it
+                notes.append(f"The camera refused the requested setting {node} = {value} ({error_words(error)}).")
             continue
     return tuple(notes)
 

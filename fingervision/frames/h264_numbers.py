@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 from fingervision.frames.bit_reader import BitReader
 
-# Kinds of NAL units (ITU-T H.264, table 7-1).
+# Types of NAL units (ITU-T H.264, table 7-1).
 PICTURE, KEY_PICTURE, SUPPLEMENT, SEQUENCE, PICTURE_SET = 1, 5, 6, 7, 8
 RECOVERY_POINT = 6
-# Profiles whose sequence parameters begin with the format of colours (7.3.2.1.1).
+# Profiles whose sequence parameters contain the chroma format (7.3.2.1.1).
 HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
-# Headers are far shorter; what is longer is not looked at.
+# Number of bytes of a unit that are read, which is more than any header needs.
 HEADER_BYTES = 96
 INTRA_SLICES = frozenset({2, 7})
 
@@ -28,9 +28,9 @@ class CodedPicture:
     is_field : bool
         Whether the picture is a field (every second line).
     is_intra : bool
-        Whether its first slice depends on no other picture.
+        Whether the picture's first slice depends on no other picture.
     number : int
-        `frame_num`: one more than that of the reference picture before it, modulo `modulus`.
+        `frame_num`: one more than that of the preceding reference picture, modulo `modulus`.
     modulus : int
         2 ** log2_max_frame_num.
     may_leap : bool
@@ -70,7 +70,7 @@ class H264Numbers:
     def __init__(self, extradata: bytes | None) -> None:
         self._sequences: dict[int, _Sequence] = {}
         self._sequence_of: dict[int, int] = {}
-        self._length_bytes = 0  # in front of every unit; 0 where start codes part them
+        self._length_bytes = 0  # bytes of the length in front of every unit; 0 if units are separated by start codes
         extradata = extradata or b""
         if len(extradata) > 6 and extradata[0] == 1:
             self._length_bytes = (extradata[4] & 3) + 1
@@ -111,7 +111,7 @@ class H264Numbers:
 
     def _picture(self, unit: bytes, recovers_after: int | None) -> CodedPicture:
         bits = _bits(unit)
-        bits.golomb()  # first macroblock
+        bits.golomb()  # number of the slice's first macroblock
         is_intra = bits.golomb() in INTRA_SLICES
         sequence = self._sequences[self._sequence_of[bits.golomb()]]
         if sequence.separate_colours:

@@ -16,7 +16,7 @@ IMAGE_SUFFIXES = LOSSY_SUFFIXES | {".png", ".bmp", ".tif", ".tiff"}
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
-# A few bytes can state any size. The largest cameras have 150 million pixels; a picture of that takes 150 MB a copy.
+# Largest accepted size, because a damaged header can state any size; the largest cameras have 150 million pixels.
 MOST_PIXELS = 200_000_000
 TIFF_STARTS = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 
@@ -55,9 +55,9 @@ def read_image(file: Path) -> Pixels:
     if content.startswith(PNG_SIGNATURE):
         _check_png(file.name, content)
     elif content.startswith(JPEG_START) and JPEG_END not in content[-4096:]:
-        raise UnreadableImageError(f"{file.name} is cut off: the file ends before its picture is complete.")
+        raise UnreadableImageError(f"{file.name} is truncated: the file ends before its picture is complete.")
     elif content.startswith(TIFF_STARTS) and cv2.imcount(str(file)) > 1:
-        raise UnreadableImageError(f"{file.name} holds several pictures: save each of them as a file of its own.")
+        raise UnreadableImageError(f"{file.name} contains several pictures: save each picture in a separate file.")
     width_px, height_px = _stated_size_px(content)
     if width_px * height_px > MOST_PIXELS:
         raise UnreadableImageError(
@@ -84,7 +84,7 @@ def _stated_size_px(content: bytes) -> tuple[int, int]:
     place = 2 if content.startswith(JPEG_START) else len(content)
     while place + 9 < len(content) and content[place] == 0xFF:
         kind = content[place + 1]
-        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):  # start of frame (ITU-T T.81, table B.1)
+        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):  # markers "start of frame" (ITU-T T.81, table B.1)
             height_px, width_px = struct.unpack_from(">HH", content, place + 5)
             return width_px, height_px
         place += 2 + struct.unpack_from(">H", content, place + 2)[0]
@@ -112,7 +112,7 @@ def _check_png(name: str, content: bytes) -> None:
         kind = content[place + 4 : place + 8]
         (stated,) = struct.unpack_from(">I", content, end)
         if zlib.crc32(memoryview(content)[place + 4 : end]) != stated:
-            raise UnreadableImageError(f"{name} is damaged: a part of it fails its checksum.")
+            raise UnreadableImageError(f"{name} is damaged: a chunk of the file has a wrong checksum.")
         if kind == b"IEND":
             return
         place = end + 4

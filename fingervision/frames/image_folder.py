@@ -13,7 +13,7 @@ from fingervision.frames.image_file import IMAGE_SUFFIXES, LOSSY_SUFFIXES, Unrea
 from fingervision.frames.image_times import TIMES_FILE, times_of
 from fingervision.frames.source import Description, Wish
 
-# From a picture in eleven days to the fastest cameras; what lies beyond is a slip, and gives times without meaning.
+# Permitted rates: from one picture in eleven days to the fastest cameras; other rates are typing errors.
 LEAST_HZ, GREATEST_HZ = 1e-6, 1e7
 
 
@@ -68,7 +68,7 @@ class ImageFolder:
         if times_s is not None and self.rate_hz is not None:
             raise UsageError(
                 f"The times of the images are read from {files[0].parent / TIMES_FILE}: leave out --rate-hz, "
-                "or remove that file."
+                "or remove that table."
             )
         height_px, width_px = _first_readable(self.name, files)
         coding = max((_coding(file) for file in files), key=lambda coding: coding is not Coding.LOSSLESS)
@@ -97,7 +97,7 @@ class ImageFolder:
         for index, file in enumerate(self.description.files):
             time_s = self._time_s(index)
             if self.times_s is not None and time_s == last_s:
-                yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+                yield LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the previous frame.")
                 continue
             last_s = time_s
             try:
@@ -109,7 +109,7 @@ class ImageFolder:
                 yield Frame(pixels, index, time_s, _coding(file))
             else:
                 words = (
-                    f"{file.name} has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "
+                    f"{file.name} has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording has "
                     f"{size_px[1]}x{size_px[0]}."
                 )
                 yield LostFrame(index, time_s, Status.DAMAGED, words)
@@ -132,7 +132,7 @@ def _files(name: str) -> tuple[Path, ...]:
             found = list(path.iterdir())
         except PermissionError:
             raise InputFileError(f"The folder {name} may not be read: change its permissions.") from None
-        what = f"The folder {name} must hold images"
+        what = f"The folder {name} must contain images"
     elif path.is_file():
         found = [path]
         what = f"{name} must be an image"

@@ -17,7 +17,7 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
     Returns
     -------
     tuple of float or None
-        Seconds, one for each image; None where there is no table.
+        Time of each image in seconds; None if there is no table.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
         if len(times) != len(files):
             raise DataError(
                 f"{table} must have a time for each of the {len(files)} images, but has {len(times)}: "
-                "name the images in a column file."
+                "add a column `file` with the names of the images."
             )
         return tuple(times.values())
     for file in files:

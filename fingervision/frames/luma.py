@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from fingervision.domain.frame import Pixels
 
-# Luma in packed formats: elements from one pixel to the next, and where the first one is.
+# Packed formats: number of elements from the luma of one pixel to that of the next pixel, and position of the first
+# luma element.
 PACKED = {"yuyv422": (2, 0), "yvyu422": (2, 0), "uyvy422": (2, 1), "ya8": (2, 0), "ya16le": (2, 0), "ya16be": (2, 0)}
-# Formats whose first plane is luma, one element a pixel.
+# Beginnings of the names of formats whose first plane is luma, with one element per pixel.
 PLANAR = ("yuv4", "yuva4", "yuvj4", "gray", "nv1", "nv2", "nv4", "p0", "p2", "p4", "y8")
 
 
@@ -46,7 +47,7 @@ def luma(picture: av.VideoFrame) -> Pixels:
         return levels
     if name.startswith(("p0", "p2", "p4")):
         levels = levels >> np.uint16(16 - bits)
-    # The upper bits are repeated below, so that the darkest level stays 0 and the brightest becomes 65535.
+    # The upper bits are repeated in the free lower bits, so that level 0 stays 0 and the largest level becomes 65535.
     return (levels << np.uint16(16 - bits)) | (levels >> np.uint16(2 * bits - 16))
 
 

@@ -2,9 +2,9 @@
 
 The arithmetic decoders of VP8 and VP9 give a picture for any bytes: after a flipped bit there is no error message, and
 a finger may be shown at its position in an earlier frame. The container may help: a cluster whose first element is a
-CRC-32 states the checksum of all following bytes (FFmpeg writes it into `.mkv`, not into `.webm`). If the checksum does
-not fit, every picture of the cluster counts as damaged, and every later picture that depends on one of them. Codecs
-that detect damage themselves are not checked in this way, because they lose a single picture where this check loses a
+CRC-32 states the checksum of all following bytes (FFmpeg writes it into `.mkv`, not into `.webm`). If the checksum is
+wrong, every picture of the cluster counts as damaged, and every later picture that depends on one of them. Codecs that
+detect damage themselves are not checked in this way, because they lose a single picture where this check loses a
 cluster.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 11.3.1 (CRC-32: of ISO 3309, little-endian).
@@ -22,7 +22,9 @@ CHECKSUM = b"\xbf"
 CHECKSUM_BYTES, ELEMENT_BYTES = 4, 6
 UNCHECKED_CODECS = frozenset({"vp8", "vp9"})
 """Codecs, by FFmpeg's canonical names, that decode any bytes without an error."""
-BROKEN = "The checksum of the part of the file that it stands in (a Matroska cluster) does not fit: bytes are damaged."
+BROKEN = (
+    "Bytes are damaged in the part of the file that contains the frame: the checksum of its Matroska cluster is wrong."
+)
 
 
 class ClusterChecksums:
@@ -37,9 +39,9 @@ class ClusterChecksums:
     def __init__(self, path: Path) -> None:
         self._sound: list[tuple[int, int]] = []
         self.are_stated = False
-        """Whether the file has checksums at all."""
+        """Whether any cluster of the file has a checksum."""
         self.cover_all = False
-        """Whether every cluster has one that fits."""
+        """Whether every cluster has a checksum that agrees with its bytes."""
         try:
             with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
                 self._read(content)

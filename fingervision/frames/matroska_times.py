@@ -22,7 +22,7 @@ TIMESTAMP, SIMPLE_BLOCK, BLOCK_GROUP, BLOCK = b"\xe7", b"\xa3", b"\xa0", b"\xa1"
 CUE_POINT, CUE_TIME, CUE_PLACE, CUE_TRACK, CUE_CLUSTER = b"\xbb", b"\xb3", b"\xb7", b"\xf7", b"\xf1"
 TRACKS, TRACK, TRACK_NUMBER = b"\x16\x54\xae\x6b", b"\xae", b"\xd7"
 DURATION = b"\x44\x89"
-# Pictures that are coded out of order overlap between clusters by no more than the longest reordering of H.264.
+# Largest number of frames by which two clusters may overlap in time, the longest reordering of H.264.
 MOST_REORDERED = 16
 
 
@@ -154,7 +154,7 @@ def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
 def _duration(content: mmap.mmap) -> float | None:
     """Duration in ticks; None if it is not stated."""
     at = content.find(INFO)
-    while at >= 0:  # the name stands in the file's table of contents too
+    while at >= 0:  # the name also occurs in the file's table of contents
         info = element(content, at)
         stated = None if info is None else child(content, info, DURATION)
         if stated is not None and stated.end - stated.begin in (4, 8):

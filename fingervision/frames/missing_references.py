@@ -36,34 +36,40 @@ ADAPTING_CODECS = frozenset({"ffv1"})
 """Codecs of whole pictures whose non-key frames are decoded with statistics of the frames before."""
 INTRA_PROPERTY = 1  # FFmpeg's AV_CODEC_PROP_INTRA_ONLY
 TIMED_CONTAINERS = ("mov", "matroska", "flv", "asf", "ogg")
-# An even row: so many single steps at least, and nearly all steps a whole number of the usual one. A camera's own times
-# scatter by far more than a tick in far more than a fiftieth of the steps; a few false times are damage of the file.
+# Times are equidistant if at least this number of steps equal the usual step, and this share of all steps are whole
+# multiples of it. Times from a camera's clock scatter by more than a tick in more than 2 % of the steps; a few wrong
+# times are damage of the file.
 EVEN_STEPS, EVEN_SHARE = 8, 0.98
-# Containers round a time to their tick, and a step has two ends.
+# Permitted deviation of a step (ticks): containers round both times of a step to a tick.
 TICKS = 1.01
-# With more holes than one in five steps pictures are left out by habit: programs do not code what does not change. A
-# network or disk that loses so much is noticed.
+# With a larger share of holes, the encoder left out pictures deliberately, for instance unchanged pictures; so many
+# losses in a network or on a disk would be noticed.
 MOST_HOLES = 0.2
-# A step is a hole beside so many on each side; cameras that are short of light go on at half the rate.
+# Number of steps on each side with which a longer step is compared: a camera in weak light may continue at half the
+# rate, which is no hole.
 BESIDE = 4
-# Key frames come after a fixed number of pictures if nine in ten of three or more distances between them are equal.
+# Key frames are regarded as regular if at least three distances between them are known, and nine in ten are equal.
 FEWEST_LENGTHS, KEYS_SHARE = 3, 0.9
-# A bit that turns by chance does so in half of the pictures: nineteen in twenty, of ten at least, are no chance.
+# The bit is regarded as toggling if it toggles in 95 % of at least ten pictures; a random bit toggles in half of them.
 FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
-OWN_RECORDING = "Recorded by fingervision, with a list of its lost frames beside it."
+OWN_RECORDING = "Recorded by fingervision, with a list of the lost frames in the same folder."
 """Comment in a container whose packets were checked during the recording, and whose list of lost frames is stored with
 it."""
 
-NUMBER_LEFT_OUT = "A picture that it hangs on is missing: the numbers of the coded pictures leave one out."
+NUMBER_LEFT_OUT = "A picture on which the frame depends is missing: the numbers of the coded pictures have a gap."
 BIT_NOT_TURNED = (
-    "A picture that it hangs on is missing: the bit that turns with every coded picture (vop_rounding_type) did not."
+    "A picture on which the frame depends is missing: a bit that toggles with every coded picture (vop_rounding_type) "
+    "did not toggle."
 )
-SHOWN_TOO_LATE = "A picture that it hangs on is missing: it should be shown between two, and only one came."
+SHOWN_TOO_LATE = (
+    "A picture on which the frame depends is missing: the frame must be shown between two pictures, but "
+    "the second is not there."
+)
 TIME_LEFT_OUT = (
-    "It is coded with the help of a picture that is missing: the recording's times, otherwise an even row, leave out "
-    "{count} before it. If the camera itself skipped there, convert the file with "
-    "`ffmpeg -i IN -c:v ffv1 -g 1 OUT.mkv` and measure that."
+    "A picture on which the frame depends is missing: {count} of the recording's otherwise equidistant times are "
+    "missing before the frame. If the camera itself skipped these pictures, convert the file with `ffmpeg -i IN -c:v "
+    "ffv1 -g 1 OUT.mkv`, and measure the converted file."
 )
 
 
@@ -82,8 +88,8 @@ def missing_references(path: Path, stream: av.VideoStream, container_format: str
     Returns
     -------
     dict of int to str
-        By packet number in decoding order, from 0: reason why the pictures from this packet to the next key frame are
-        damaged.
+        Reason why the pictures from a packet to the next key frame are damaged, by the packet's number in decoding
+        order, from 0.
     """
     codec = stream.codec
     is_whole = codec.properties & INTRA_PROPERTY and codec.canonical_name not in ADAPTING_CODECS
@@ -172,14 +178,14 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
     for at, step in holes:
         count = round(step / usual) - 1
         if count < 1 or not _is_whole(step, usual):
-            continue  # a pause, after which times begin anew
-        # What is missing was coded after the last picture before it on which others hang.
+            continue  # a pause of the camera, after which the times are not multiples of the step
+        # The missing pictures were coded after the last reference picture before the hole.
         last = bisect_right(needed, (at, len(packets)))
         number = needed[last - 1][1] + 1 if last else 0
         if number >= len(packets) or packets[number].is_key or _all_came(key_numbers, number, count):
             continue
         if count % 2 and _turns_on(packets, number, unturned) and not _key_is_due(keys, at, count * usual):
-            continue  # the bit counts none
+            continue  # the rounding bit shows that no picture is missing
         found[number] = TIME_LEFT_OUT.format(count=count)
     return found
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 HEAD_BYTES, LONG_HEAD_BYTES = 8, 16
 INNER = frozenset({b"moov", b"trak", b"mdia", b"minf", b"stbl", b"edts"})
-"""Boxes that hold others."""
+"""Boxes that contain other boxes."""
 
 
 def boxes(content: mmap.mmap, begin: int, end: int) -> Iterator[tuple[bytes, int, int]]:
@@ -42,7 +42,7 @@ def rows(content: mmap.mmap, place: tuple[int, int], form: str) -> Iterator[tupl
     Raises
     ------
     struct.error
-        There are fewer.
+        The table has fewer rows than stated.
     """
     begin, end = place
     (count,) = struct.unpack_from(">4xI", content[begin:end])

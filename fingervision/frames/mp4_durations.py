@@ -29,16 +29,19 @@ from fingervision.frames.open_container import open_container
 from fingervision.frames.spoken_damage import listening
 
 GIVES_UP = "error reading header"
-"""What FFmpeg's reader of MP4 says when it gives up (libavformat/mov.c, mov_read_header)."""
+"""Message of FFmpeg's MP4 reader when it stops reading a header (libavformat/mov.c, mov_read_header)."""
 MOST_ENTRIES = 4
-"""A table of so few rows belongs to a constant rate. Longer ones are not searched for one byte that would explain a
-difference: among so many there always is one."""
+"""Largest number of rows of a table for a constant rate. Longer tables are not searched for a single damaged byte that
+would explain a difference, because among many bytes such a byte is always found.
+"""
 BYTE_VALUES = 256
 MOST_PICTURES = 10_000_000
-"""More than a day at 100 Hz: a table that announces more is damaged, and not written out."""
+"""Largest number of pictures, more than a day at 100 Hz; a table that states more pictures is damaged, and is not
+expanded.
+"""
 NO_SCALE = (
-    "The file states durations of its pictures that contradict one another, or a table of times that cannot be read: "
-    "its table of contents is damaged, so that no frame's time is known."
+    "The file's table of contents is damaged, so that no frame's time is known: its durations contradict one another, "
+    "or a table of times cannot be read."
 )
 
 
@@ -49,17 +52,17 @@ class _Track:
     Parameters
     ----------
     scale, ticks : int
-        Ticks a second of the track, and how many it lasts.
+        Ticks per second of the track, and its duration in ticks.
     steps : tuple of (int, int)
         Numbers of pictures with their durations in ticks.
     sizes, offset_count : int or None
-        Of how many pictures there are sizes, and offsets of presentation.
+        Number of pictures with a size, and with an offset of presentation.
     presented : int
         Ticks from the first presentation to the end of the last.
     shown : int
-        Duration of the edit list, in ticks of the film; 0 where there is none.
+        Duration of the edit list, in ticks of the film; 0 without an edit list.
     empty : int
-        Of that, in which nothing is shown.
+        Part of `shown` in which nothing is shown.
     skipped : int
         Ticks of the track, from its first picture, that are not shown.
     """
@@ -95,7 +98,7 @@ def states_another_duration(path: Path) -> bool:
     except (OSError, ValueError):
         return False
     except struct.error:
-        return True  # a table ends before its last row, or states what cannot be
+        return True  # a table ends before its last row, or states impossible values
     film_scale = films[0][0] if films else 0
     return any(_contradicts(track, film_scale) for track in tracks)
 
@@ -117,11 +120,12 @@ def _contradicts(track: _Track, film_scale: int) -> bool:
         return True
     longest = max(ticks for _, ticks in track.steps)
     total = sum(count * ticks for count, ticks in track.steps)
-    # Programs state the sum of the durations, or from the first presentation to the last; some a picture more.
+    # Programs state the sum of the durations, or the time from the first presentation to the last; some add one
+    # picture.
     more = {total + ticks for _, ticks in track.steps}
     last_count, last_ticks = track.steps[-1]
     if last_count == 1:
-        # How long the last picture lasts moves none, and programs that copy a film state it as they like.
+        # The duration of the last picture does not affect any time, and programs that copy a film change it.
         more |= {one - last_ticks + ticks for one in (*more, total) for _, ticks in track.steps}
     departures = [abs(track.ticks - sound) for sound in (total, track.presented, *more)]
     if min(departures) and (_is_explained(track) or (min(departures) > longest and _is_another(track.ticks, total))):
@@ -133,7 +137,7 @@ def _contradicts(track: _Track, film_scale: int) -> bool:
     slack_s = longest / track.scale + 1.0 / film_scale
     if shown_s > there_s + slack_s:
         return True
-    # A film that was cut: or one byte of the ticks a second is another.
+    # A shorter duration means that the film was cut, or that one byte of the ticks per second is damaged.
     is_cut = there_s > shown_s + slack_s
     return is_cut and any(
         abs(ticks - track.skipped - scale * shown_s) <= 1.0 + scale / film_scale

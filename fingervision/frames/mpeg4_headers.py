@@ -16,9 +16,9 @@ LAYER_CODES = range(0x20, 0x30)
 PLANE_CODE = 0xB6
 EXTENDED_PIXEL_SHAPE, RECTANGULAR = 15, 0
 BUFFER_PARAMETER_BITS = 79
-# Headers are far shorter; what is longer is not looked at.
+# Number of bytes of a unit that are read, which is more than any header needs.
 HEADER_BYTES = 64
-# Seconds since the last picture are counted in single bits.
+# Largest number of seconds since the previous picture; the header has one bit for each second.
 MOST_SECONDS = 3600
 
 
@@ -40,7 +40,7 @@ class Mpeg4Picture:
     kind : Mpeg4Kind
         Type of the picture, by its dependence on others.
     rounding : int or None
-        `vop_rounding_type`, 0 or 1; None if it is not in the header.
+        `vop_rounding_type`, 0 or 1; None if the header does not contain it.
     """
 
     kind: Mpeg4Kind

@@ -22,20 +22,20 @@ from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT, Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
 
-# Names that cameras give to what nobody else shall know: password, pwd, token, key, auth, user, loginpas and the like.
+# Names of parameters with which cameras transmit secrets: password, pwd, token, key, auth, user, loginpas and others.
 SECRET_PARAMETERS = re.compile(
     r"([?&;][^=&;#]*(?:pass|pwd|psw|pw|token|key|secret|auth|user|usr|login)[^=&;#]*=)[^&;#]*", re.I
 )
 STARTS = ("rtsp://", "http://", "https://")
-# A camera that answers no sooner is not there; one that has been silent for so long is cut off.
+# Longest time until a camera answers, and longest time without data before the connection counts as lost.
 OPEN_TIMEOUT_S, READ_TIMEOUT_S = 5.0, 2.0
-# Little is looked at before the first frame, and none is kept back.
+# Options for a short delay: few bytes are examined before the first frame, and no frame is buffered.
 OPTIONS = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay", "probesize": "1000000"}
-# These codecs code every picture by itself.
+# Codecs that code every picture independently.
 INTRAFRAME_CODECS = frozenset({"mjpeg", "png"})
-# In these formats pictures follow one another without times.
+# Formats in which pictures have no times.
 WITHOUT_TIMES = frozenset({"mpjpeg", "mjpeg", "jpeg_pipe", "image2pipe", "h264", "hevc"})
-# What FFmpeg warns of when a network lost something: sequence numbers that are missing, a picture without its end.
+# Beginnings of FFmpeg's warnings about losses in a network: missing sequence numbers, incomplete pictures.
 LOST_ON_THE_WAY = ("RTP: missed", "max delay reached", "Packet corrupt", "Continuity check failed")
 LOSSLESS_CODECS = frozenset({"png", "rawvideo", "ffv1"})
 
@@ -47,7 +47,7 @@ def accepts(name: str) -> bool:
 
 def without_password(name: str) -> str:
     """Return the address without the camera's password, for display on a browser page and storage in a run."""
-    # A password may hold `/` and `@`: what stands before the last @ is who asks, not where.
+    # A password may contain `/` and `@`, so that user and password extend to the last @.
     shown = re.sub(r"^(\w+://[^/@:?#]*):.*@", r"\1:***@", name)
     return SECRET_PARAMETERS.sub(r"\1***", shown)
 
@@ -65,7 +65,7 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
     if wish.rate_hz is not None or wish.size_px is not None:
         raise UsageError(
             "--size and --rate-hz are for cameras of this computer, but "
-            f"{without_password(name)} determines its own: set them in that camera."
+            f"{without_password(name)} determines size and rate itself: set them in that camera."
         )
     return NetworkStream(name)
 
@@ -100,16 +100,17 @@ class NetworkStream:
             ) from error
         if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
             self._container.close()
-            raise DeviceError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
+            raise DeviceError(f"The stream {self.name} must contain a video that can be decoded, but does not.")
         self._stream = self._container.streams.video[0]
-        # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed. By its
-        # parameters, since there may be no encoder by the name of its decoder (AV1).
+        # The stream's coding parameters are copied into a container of our own, because a recording may begin after the
+        # camera's container is closed. They are copied as parameters, because some decoders have no encoder of the same
+        # name (AV1).
         self._kept = av.open(io.BytesIO(), "w", format="matroska")
         self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream, opaque=True)
         codec = self._stream.codec_context
         codec.options = STRICT | EXPORTED
         DamageTrail.prepare(codec)
-        codec.thread_count = 1  # threads of frames would each keep one back
+        codec.thread_count = 1  # each thread of a frame-parallel decoder would delay one frame
         if codec.width < 1 or codec.height < 1:
             self._container.close()
             raise DeviceError(
@@ -129,7 +130,7 @@ class NetworkStream:
             coding=Coding.LOSSLESS if codec.name in LOSSLESS_CODECS else coding,
             width_px=codec.width,
             height_px=codec.height,
-            # Without times the rate is FFmpeg's guess.
+            # Without times, the rate would be FFmpeg's guess.
             rate_hz=float(rate) if rate and self.has_own_clock else None,
             has_times=True,
             frame_count=None,
@@ -161,8 +162,8 @@ class NetworkStream:
                         time_s = self._time_s(tick, arrived_s, last_s)
                         item = self._item(next(numbers), time_s, found, last_s)
                         last_s = time_s
-                        # A packet whose picture the decoder still holds back stays: the end of a recording would hold a
-                        # picture more than the table of what was measured.
+                        # A packet whose picture is still in the decoder stays in the list; otherwise a recording would
+                        # contain one picture more than its table.
                         arrived = _until_shown(waiting, tick)
                         yield Received(item, arrived_s, tuple(waiting[:arrived]))
                         del waiting[:arrived]
@@ -179,22 +180,22 @@ class NetworkStream:
             try:
                 packet = next(demuxed, None)
             except (av.FFmpegError, OSError) as error:
-                why = "it broke off" if isinstance(error, av.InvalidDataError) else _reason(error)
+                why = "the connection was interrupted" if isinstance(error, av.InvalidDataError) else _reason(error)
                 raise DeviceError(self._cut(why)) from error
             if packet is None or not packet.size:
-                raise DeviceError(self._cut("the camera ended it"))
+                raise DeviceError(self._cut("the camera ended the stream"))
             yield packet, monotonic()
 
     def _cut(self, why: str) -> str:
-        return f"The stream {self.name} is cut off ({why})."
+        return f"The stream {self.name} is interrupted ({why})."
 
     def _decoded(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
         if packet.size and (fault := self._jpegs.fault(bytes(packet))):
-            trail.breaks(f"It arrived damaged ({fault}).")
+            trail.breaks(f"The frame arrived damaged ({fault}).")
         try:
             pictures = packet.decode()
         except av.FFmpegError as error:
-            why = f"It could not be decoded ({error.strerror})."
+            why = f"The frame could not be decoded ({error.strerror})."
             if self.description.coding is Coding.INTERFRAME:
                 trail.breaks(why)
             else:
@@ -203,7 +204,7 @@ class NetworkStream:
         finally:
             said = heard.of_picture()
         if said:
-            trail.breaks(f"It arrived damaged ({said}).")
+            trail.breaks(f"The frame arrived damaged ({said}).")
         for picture in pictures:
             yield from trail.leaves(picture)
 
@@ -213,10 +214,10 @@ class NetworkStream:
             return LostFrame(index, time_s, Status.DAMAGED, found)
         steps = self._steps.of(found)
         if (found.width, found.height) != size_px:
-            words = f"It has {found.width}x{found.height} pixels, but the stream {size_px[0]}x{size_px[1]}."
+            words = f"The frame has {found.width}x{found.height} pixels, but the stream has {size_px[0]}x{size_px[1]}."
             return LostFrame(index, time_s, Status.DAMAGED, words)
         if time_s == last_s:
-            return LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+            return LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the previous frame.")
         coding = self.description.coding
         return Frame(luma(found), index, time_s, coding, not found.key_frame, steps)
 
@@ -233,13 +234,13 @@ class NetworkStream:
         if not self.has_own_clock or self._stream.time_base is None:
             return arrived_s
         if tick is None:
-            # Its header was lost. The host's clock is another one: all frames behind would move in time.
+            # The header with the time was lost. A time by the computer's clock would shift all following frames.
             return (before_s or 0.0) + float(self._stream.time_base)
         return float(tick * self._stream.time_base)
 
 
 def _until_shown(waiting: list[OwnPacket], tick: int | None) -> int:
-    """Number of the waiting packets up to that of the picture shown at a tick; all of them if none states this tick."""
+    """Number of waiting packets up to the one whose picture is shown at a tick; all packets if none has this tick."""
     shown = [place for place, own in enumerate(waiting, 1) if tick is not None and own.packet.pts == tick]
     return shown[-1] if shown else len(waiting)
 

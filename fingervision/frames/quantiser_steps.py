@@ -14,20 +14,22 @@ from numpy.typing import NDArray
 
 from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 
-# The decoder's option that brings them.
+# Option of the decoder that exports the quantiser steps.
 EXPORTED = {"export_side_data": "venc_params"}
 SIDE_DATA = "VIDEO_ENC_PARAMS"
-# enum AVVideoEncParamsType.
+# Values of the enumeration AVVideoEncParamsType.
 VP9, H264, MPEG = 0, 1, 2
-# ITU-T H.264 (2021), 8.5.9: the step is 1 at a parameter of 4 and doubles with every six, at 8 bits.
+# ITU-T H.264 (2021), 8.5.9: at 8 bits, the step is 1 at a quantisation parameter of 4, and doubles when the parameter
+# increases by 6.
 H264_UNIT, H264_DOUBLES = 4.0, 6.0
-# libvpx, vp9_quant_common.c: steps begin at 4 and 8 for a transform of gain 8; they grow by 1, or by this where it is
-# more.
+# libvpx, vp9_quant_common.c: the first steps are 4 and 8, for a transform of gain 8; further steps grow by 1 or by this
+# factor, whichever is more.
 VP9_LOSSLESS, VP9_FIRST, VP9_GROWTH, VP9_GAIN, VP9_COUNT = 4.0, 8, 1.01975, 8.0, 256
 # ISO/IEC 14496-2, 7.4.4: coefficients are multiples of twice the quantiser, which is what FFmpeg states.
-# What a coder leaves alone, as a share of its step against H.264's: the MPEG family rounds differences to zero below
-# 1.25 steps (H.263's quantiser) where H.264 does so below 0.6 to 0.8; VP9's coders round nearer, and filter the rest.
-# Measured with `python -m tests.benchmarks.compressed_video --only mpeg4-1-upright vp9-1-upright`.
+# Factor by which the range of differences that a codec rounds to zero, relative to its step, exceeds that of H.264. The
+# MPEG family rounds differences below 1.25 steps to zero (H.263's quantiser), H.264 those below 0.6 to 0.8; VP9's range
+# is smaller, and a filter reduces the remaining errors. Measured with `python -m tests.benchmarks.compressed_video
+# --only mpeg4-1-upright vp9-1-upright`.
 MPEG_LEAVES, VP9_LEAVES = 2.0, 0.5
 # A block that is not coded again keeps the error of the last picture that coded it, and what later pictures add. They
 # also mend some of it: an earlier step counts by so much less with every picture.
@@ -52,14 +54,14 @@ def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
     picture : av.VideoFrame
         Picture that was decoded with `EXPORTED` among the decoder's options.
     """
-    carried: Any = picture.side_data  # PyAV's stubs call its items strings
+    carried: Any = picture.side_data  # the type stubs of PyAV declare the items as strings
     found = next((each for each in carried if each.type.name == SIDE_DATA), None)
     if found is None:
         return None
     data = bytes(found)
     count, blocks_at, size, kind, base = struct.unpack_from("@IxxxxQQii", data)
     shape = (-(-picture.height // BLOCK_PX), -(-picture.width // BLOCK_PX))
-    if kind == VP9 and not count:  # one for the whole picture, unless it has segments
+    if kind == VP9 and not count:  # one step for the whole picture, unless it has segments
         step = VP9_LEAVES * VP9_STEPS[min(max(base, 0), VP9_COUNT - 1)]
         return Quantiser(np.full(shape, step, dtype=np.float32))
     if not count or kind not in (H264, MPEG):

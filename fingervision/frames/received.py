@@ -21,7 +21,7 @@ class OwnPacket:
     time_s, decode_s : float
         Presentation time and decoding time, on the source's clock.
     is_key : bool
-        Whether its picture depends on no other picture.
+        Whether the packet's picture depends on no other picture.
     """
 
     packet: "av.Packet[av.VideoStream]"
@@ -58,9 +58,9 @@ class Received:
     item : Frame or LostFrame
         The frame; its `time_s` is on the source's clock.
     arrived_s : float
-        Time at which the computer had received the whole frame, on its monotonic clock.
+        Time by the computer's monotonic clock at which the whole frame had been received.
     packets : tuple of OwnPacket
-        Packets received since the frame before; empty if the source does not compress.
+        Packets received since the previous frame; empty if the source does not compress.
     driven : Driven or None
         State of the stage at the exposure, if the source knows it.
     """

@@ -8,14 +8,14 @@ import av
 
 from fingervision.frames.h264_numbers import CodedPicture, H264Numbers
 
-# Steps in time that tell the usual one.
+# Number of time steps whose median is the usual step.
 STEPS = 8
-# A step longer than this share of the usual one leaves a picture out; times may be rounded, or jitter on a network.
+# Ratio to the usual step above which a picture is missing; it allows for rounding and for jitter in a network.
 LEAP_SHARE = 1.5
 
 
 class Link(Enum):
-    """Result of checking a picture's frame number: it follows the last one, a reference may be missing, or unknown."""
+    """Result of checking a picture's number: it follows the last number, a reference may be missing, or unknown."""
 
     FOLLOWS = "follows"
     BROKEN = "broken"
@@ -48,7 +48,8 @@ class ReferenceChain:
         self._tick: int | None = None
         self._since_key, self._has_seen_key = 0, False
         self._key_every: int | None = None
-        self._recovering: tuple[int, int] | None = None  # number at which all is right again, pictures since it began
+        # Picture number at which the recovery is complete, and number of pictures since its start.
+        self._recovering: tuple[int, int] | None = None
         self.recovered_over: int | None = None
         """Number of pictures since the start of the recovery that the last picture completes; None if it completes
         none."""
@@ -82,10 +83,10 @@ class ReferenceChain:
             return Link.FOLLOWS
         if step == 1:
             return Link.BROKEN if self._may_hide_a_key(before, missing, picture.modulus) else Link.FOLLOWS
-        # Without others all pictures are whole; some cameras then do not count.
+        # In a stream of intra pictures only, no picture depends on others, and some cameras do not count the pictures.
         if step == 0 and picture.is_intra and before.is_intra:
             return Link.UNKNOWN
-        # Numbers may be left out on purpose: pictures are missing only where time leaps too.
+        # If the stream allows gaps in the numbers, pictures are missing only if the times have a gap as well.
         return Link.UNKNOWN if picture.may_leap and step and not missing else Link.BROKEN
 
     def _may_hide_a_key(self, before: CodedPicture, missing: int, modulus: int) -> bool:
@@ -109,7 +110,7 @@ class ReferenceChain:
         if self._recovering is not None:
             self._recovering = self._recovering[0], self._recovering[1] + 1
         if picture.recovers_after is not None:
-            # One that begins before the last is complete would end later: the last stays.
+            # A recovery that begins before the current recovery is complete would end later, and is ignored.
             target = (picture.number + picture.recovers_after) % picture.modulus
             self._recovering = self._recovering or (target, 0)
         if self._recovering is not None and picture.is_reference and picture.number == self._recovering[0]:

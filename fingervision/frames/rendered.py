@@ -65,7 +65,8 @@ class RenderedFrames:
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
         """Render the frames one by one."""
-        from fingervision.rendering import render  # a third of a second that no recording of a camera needs
+        # Imported here, because the import takes a third of a second, and recordings of cameras do not need it.
+        from fingervision.rendering import render
 
         for index, scene in enumerate(self.scenes):
             time_s = None if self.rate_hz is None else index / self.rate_hz

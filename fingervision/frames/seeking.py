@@ -12,7 +12,8 @@ from fingervision.frames.open_container import open_container
 from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
 from fingervision.frames.video_file import upright, upright_steps
 
-# From one key frame to the next; a stream with longer groups is read by counting.
+# Largest number of frames that are decoded from a key frame to the wanted frame; beyond it, frames are counted from the
+# recording's start.
 MOST_FRAMES_TO_DECODE = 600
 
 

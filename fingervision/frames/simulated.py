@@ -15,10 +15,12 @@ from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
 
 NAME = "simulated"
-# The paper's scale, and the paper's gripper between nearly closed and open (mm).
+# Scale of the camera, and smallest and largest gap of the gripper (mm), as in the paper (sources in
+# docs/explanation/sources.md).
 PX_PER_MM = 34.0
 CLOSED_MM, OPEN_MM = 1.0, 4.0
-# A cycle is drawn once and then repeated, with its noise: drawing takes longer than measuring.
+# Number of frames of one cycle, which is rendered once and then repeated with the same noise, because rendering takes
+# longer than measuring.
 CYCLE_FRAMES = 100
 USUAL_SIZE_PX, USUAL_RATE_HZ = (640, 480), 25.0
 BELOW_TIP_MM = 0.3
@@ -55,7 +57,7 @@ class SimulatedGripper:
     size_px : (int, int)
         Width and height.
     rate_hz : float
-        Frames in a second.
+        Frames per second.
     """
 
     has_own_clock = True
@@ -98,7 +100,7 @@ class SimulatedGripper:
             if place not in drawn:
                 drawn[place] = self._drawn(place, rng)
             time_s = index / self._rate_hz
-            # A machine that draws too slowly gets a slower camera: like a real one, it never hurries to catch up.
+            # If rendering is too slow, the camera becomes slower; it never delivers frames faster to catch up.
             started_s = max(started_s, monotonic() - time_s - 1.0 / self._rate_hz)
             if self._closed.wait(max(0.0, started_s + time_s - monotonic())):
                 return
@@ -109,9 +111,10 @@ class SimulatedGripper:
         self._closed.set()
 
     def _drawn(self, place: int, rng: np.random.Generator) -> Pixels:
-        from fingervision.rendering import Camera, render, two_fingers  # see `frames.rendered`
+        # Imported here, because the import takes a third of a second.
+        from fingervision.rendering import Camera, render, two_fingers
 
-        # A wide picture shows the same gripper, a narrow one a smaller opening.
+        # In a picture narrower than 640 px, the gripper opens less.
         share = min(1.0, self._size_px[0] / 640)
         scene = two_fingers(
             gap_px=share * true_gap_mm(place) * PX_PER_MM,

@@ -11,9 +11,11 @@ from collections.abc import Iterable
 
 import simplejpeg
 
-# The DC part alone is drawn: every code is read all the same, and nothing is spent on pixels that nobody looks at.
+# Scale factor of the decoded picture: at 1/8 only the DC coefficients are rendered, which saves time, although every
+# code is read.
 SMALLEST = 8
-# Some cameras break the format in every picture, with bytes of their own. So many pictures show whether this one does.
+# Number of pictures from which it is learnt whether this camera violates the format in every picture, as some cameras
+# do.
 PICTURES_TO_LEARN = 16
 
 

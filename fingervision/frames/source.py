@@ -177,7 +177,8 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
     if len(claims) > 1:
         who = " and ".join(f"{entry.name} ({entry.origin})" for entry in claims)
         raise UsageError(
-            f"Only one kind of source may accept {name}, but {who} would: rename it, or remove one of them."
+            f"Only one kind of source may accept {name}, but {who} accept it: rename the recording, or remove one of "
+            "these kinds of source."
         )
     if claims:
         return _opened(claims[0], name, wish or Wish())
@@ -189,8 +190,8 @@ def _accepts(entry: Entry[SourceKind], name: str) -> bool:
         return entry.value.accepts(name)
     try:
         return bool(entry.value.accepts(name))
-    except Exception as error:  # it takes nothing else with it
-        LOG.warning("fingervision: The frame source %s of %s is left out (%r).", entry.name, entry.origin, error)
+    except Exception as error:  # an error in one kind of source must not affect the others
+        LOG.warning("fingervision: The frame source %s of %s cannot be used (%r).", entry.name, entry.origin, error)
         return False
 
 

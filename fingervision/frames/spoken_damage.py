@@ -6,11 +6,13 @@ from dataclasses import dataclass, field
 
 import av
 
-# A damaged slice is an error, not a guess from the picture before it; checksums are looked at where there are any.
+# A damaged slice raises an error instead of being replaced by the previous picture, and existing checksums are
+# verified.
 STRICT = {"err_detect": "crccheck+explode"}
-# Errors in what no pixel hangs on: cheap cameras write such headers into every picture.
+# Errors in headers that do not affect pixels; cheap cameras write such headers into every picture.
 HARMLESS = ("unable to decode APP",)
-# The rest of what FFmpeg says at this level is said by helpers of its own (scaling, the log itself), not of the stream.
+# Other sources of messages at this level are FFmpeg's helpers (scaling, the log itself), which do not concern the
+# stream.
 HELPERS = ("swscaler", "swresampler", "")
 
 
@@ -60,7 +62,7 @@ def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
     before = av.logging.get_level()
     av.logging.set_level(av.logging.WARNING if warnings else av.logging.ERROR)
     try:
-        # Slices are decoded by threads of FFmpeg's own, so not this thread alone.
+        # The log of all threads is collected, because FFmpeg decodes slices in its own threads.
         with av.logging.Capture(local=False) as log:
             yield Heard(decoder, warnings, log)
     finally:

@@ -6,7 +6,7 @@ from fingervision.frames.damage import DamageTrail
 from fingervision.frames.reference_chain import Link, ReferenceChain
 from fingervision.frames.transport_stream import MISSING, TransportLosses
 
-LOST_REFERENCE = "A picture that it hangs on is missing: the numbers of the coded pictures leave one out."
+LOST_REFERENCE = "A picture on which the frame depends is missing: the numbers of the coded pictures have a gap."
 
 
 class StreamLosses:
@@ -26,7 +26,7 @@ class StreamLosses:
         self._chain = ReferenceChain(codec.name, codec.extradata)
 
     def before(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> str:
-        """Report the packets that are missing before this one, so that damaged pictures can be marked.
+        """Report the packets that are missing before a packet, so that damaged pictures can be marked.
 
         Return a sentence if whole frames are missing from a series with equidistant times.
         """
@@ -35,7 +35,7 @@ class StreamLosses:
         if link is Link.BROKEN:
             trail.missing(LOST_REFERENCE)
         elif leaps and link is not Link.FOLLOWS:
-            trail.hole("Frames are missing before it.")
+            trail.hole("Frames are missing before this frame.")
         return MISSING if leaps else ""
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:

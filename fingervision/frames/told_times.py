@@ -7,13 +7,16 @@ import av
 
 from fingervision.frames.damage import Picture
 
-# An even row: so many equal steps one after the other. Cameras of uneven rate never make one, to the tick.
+# Number of consecutive equal steps after which times are regarded as equidistant; times of cameras with a variable rate
+# never agree to one tick.
 EVEN_STEPS = 8
-# Containers round a time to their tick, and a step has two ends.
+# Permitted deviation of a step (ticks): containers round both times of a step to a tick.
 TICKS = 1.01
 
-BACKWARDS = "Its time is not after that of the frame before it: one of the two is damaged in the file."
-OUT_OF_ROW = "Its time does not fit between those of the frames around it, which are evenly spaced."
+BACKWARDS = (
+    "The frame's time is not later than that of the previous frame: one of the two times is damaged in the file."
+)
+OUT_OF_ROW = "The frame's time does not fit between those of its neighbours, which are equidistant."
 
 
 def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
@@ -27,7 +30,7 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
     Parameters
     ----------
     pictures : iterable of (int or None, VideoFrame or str)
-        Ticks with pictures, or with the reason why there is no picture. One item is held back.
+        Ticks with pictures, or with the reason why there is no picture. One item is read in advance.
 
     Yields
     ------
@@ -48,7 +51,7 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
             continue
         latest = held_tick if latest is None else max(latest, held_tick)
         if tick < latest:
-            # The latest time stays, so that what follows must come after it.
+            # The latest time is kept, so that following pictures must be later than this time.
             yield held if tick >= held_tick else _lost(held, BACKWARDS)
             held, before = _lost(picture, BACKWARDS), None
             steps.clear()

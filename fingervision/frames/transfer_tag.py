@@ -10,15 +10,15 @@ from calib.camera_response import STUDIO
 from fingervision.frames.image_file import JPEG_START, PNG_SIGNATURE
 from fingervision.frames.open_container import open_container
 
-# Transfer characteristics of ITU-T H.273, table 3, by what `calib.camera_response` calls them.
+# Transfer characteristics of ITU-T H.273, table 3, with their names in `calib.camera_response`.
 VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: "bt709", 16: "pq", 18: "hlg"}
-# Colour range of ITU-T H.273, 8.3: VideoFullRangeFlag is 0; as PyAV numbers it.
+# PyAV's number of the limited colour range (ITU-T H.273, 8.3: VideoFullRangeFlag is 0).
 STUDIO_RANGE = 1
 LUMA_FORMATS = ("yuv", "yuyv", "uyvy", "yvyu", "nv", "p0", "p2", "p4", "gray", "y2")
 # PNG stores 100000 / gamma of the file (PNG specification, 11.3.3.2).
 PNG_GAMMAS = {45455: "srgb", 100000: "linear"}
 EXIF_START, EXIF_IFD, COLOUR_SPACE = b"Exif\x00\x00", 0x8769, 0xA001
-# Tags stand in front of the pixels.
+# Number of bytes at the start of a file that are searched for tags, which precede the pixels.
 HEAD_BYTES = 1 << 16
 
 

@@ -5,15 +5,15 @@ import av
 from fingervision.frames.damage import DamageTrail
 from fingervision.frames.told_times import EvenRow
 
-MISSING = "Frames are missing here: the times leave an even row."
+MISSING = "Frames are missing here: the otherwise equidistant times have a gap."
 
 
-# These codecs know no uneven rate: in whatever container, frames that leave the row were lost.
+# Codecs with a constant rate: in any container, a gap in the times means lost frames.
 EVEN_CODECS = frozenset({"mpeg1video", "mpeg2video"})
 
 
 class TransportLosses:
-    """Checks the packets of a transport stream, or of a codec with constant rate; for others it reports nothing.
+    """Checks the packets of a transport stream, or of a codec with constant rate; reports nothing for other streams.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class TransportLosses:
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:
         """Report an incomplete packet as damaged after it entered the decoder, if the stream does not mark it so."""
-        # Pictures are cut out of the stream after its damage was marked: the mark may be one too early.
+        # Damage is marked before the stream is divided into pictures, so that the mark may be at the previous packet.
         if self._is_one and (packet.pts is None or self._was_corrupt):
-            trail.breaks("It is incomplete.")
+            trail.breaks("The frame is incomplete.")
         self._was_corrupt = packet.is_corrupt

@@ -21,9 +21,9 @@ from fingervision.frames.spoken_damage import STRICT, listening
 
 FILES_KEPT = 16
 DAMAGE_SEEN = (
-    "Damage was noticed in this recording ({what}), and {codec} carries no checksum, so that no frame of it can be "
-    "told to be sound: copy the file again from its source, or cut out a part that is whole "
-    "(`ffmpeg -ss 10 -to 20 -i IN -c copy OUT.mkv`); record with FFV1 or H.264."
+    "This recording is damaged ({what}), and {codec} has no checksums, so that further damage cannot be detected in "
+    "any frame: copy the file again from its source, or cut out an undamaged part (`ffmpeg -ss 10 -to 20 -i IN -c "
+    "copy OUT.mkv`); record with FFV1 or H.264."
 )
 
 
@@ -66,8 +66,8 @@ def _noticed(path: Path, index: int, codec: str, size: int, changed_ns: int) -> 
                 try:
                     packet = next(packets, None)
                 except (av.FFmpegError, IndexError):
-                    break  # the end is missing, or what is there cannot be read
-                # What the container says with its last packet is about the end.
+                    break  # the end of the file is missing or cannot be read
+                # A message of the container reader with the last packet concerns the end of the file.
                 if has_begun and last_said:
                     said = last_said
                 if said or packet is None or not packet.size:

@@ -1,4 +1,4 @@
-"""Limits of a V4L2 camera's settings, asked of the driver (Linux).
+"""Limits of a V4L2 camera's settings, as stated by the driver (Linux).
 
 Source: `struct v4l2_queryctrl` and `VIDIOC_QUERYCTRL` in linux/videodev2.h; numbers of the controls in
 linux/v4l2-controls.h.
@@ -22,7 +22,7 @@ NUMBERS: Mapping[int, int] = {
     cv2.CAP_PROP_FOCUS: 0x009A090A,
     cv2.CAP_PROP_TEMPERATURE: 0x0098091A,
 }
-"""V4L2's controls by OpenCV's properties."""
+"""Numbers of V4L2's controls, by OpenCV's properties."""
 
 Ioctl = Callable[[int, int, bytes], Any]
 
@@ -33,14 +33,14 @@ def ranges(name: str, ioctl: Ioctl | None = None) -> dict[int, tuple[int, int]]:
     Parameters
     ----------
     name : str
-        Number or device.
+        Number or device file of the camera.
     ioctl : callable, optional
-        The system's, unless another is given.
+        Function to use in place of the system's `ioctl`.
 
     Returns
     -------
     dict of int to (int, int)
-        Empty where the driver does not say.
+        Limits by OpenCV's property; empty if the driver does not state them.
     """
     if ioctl is None:
         if sys.platform != "linux":
@@ -59,7 +59,7 @@ def ranges(name: str, ioctl: Ioctl | None = None) -> dict[int, tuple[int, int]]:
             try:
                 answer = ioctl(device, QUERY, LAYOUT.pack(number, 0, b"", 0, 0, 0, 0, 0))
             except OSError:
-                continue  # the camera has no such setting
+                continue  # the camera does not have this setting
             _, _, _, least, greatest, _, _, flags = LAYOUT.unpack(answer)
             if not flags & DISABLED and least < greatest:
                 found[what] = (least, greatest)

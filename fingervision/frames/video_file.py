@@ -25,24 +25,23 @@ from fingervision.frames.spoken_damage import STRICT
 from fingervision.frames.told_times import believable
 from fingervision.frames.unseen_damage import unseen_damage
 
-# FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy, because
-# the stream does not say.
+# FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec with both a lossy and a lossless mode (H.264)
+# counts as lossy, because the stream does not state its mode.
 INTRA_PROPERTY, LOSSY_PROPERTY = 1, 2
 QUARTER_DEG = 90
 RAW_CAMERA_FILES = {
-    ".mraw": "holds a Photron camera's bare pixels, without their size and rate: export it from Photron FASTCAM Viewer "
-    "as 16-bit TIFF images or uncompressed AVI, and measure those.",
-    ".cihx": "describes a Photron recording and holds no pictures: export the recording from Photron FASTCAM Viewer as "
-    "16-bit TIFF images or uncompressed AVI, and measure those.",
-    ".cine": "must be a Phantom camera's recording, but cannot be read as one (FFmpeg reads uncompressed 8- and 16-bit "
-    "ones): export it from PCC as 16-bit TIFF images or uncompressed AVI, and measure those.",
+    ".mraw": "contains raw pixels of a Photron camera without their size and rate: export the recording from Photron "
+    "FASTCAM Viewer as 16-bit TIFF images or uncompressed AVI, and measure the exported files.",
+    ".cihx": "describes a Photron recording but contains no pictures: export the recording from Photron FASTCAM "
+    "Viewer as 16-bit TIFF images or uncompressed AVI, and measure the exported files.",
+    ".cine": "must be a Phantom camera's recording, but cannot be read (only uncompressed 8- and 16-bit recordings "
+    "can): export it from PCC as 16-bit TIFF images or uncompressed AVI, and measure the exported files.",
 }
 """Advice for files of high-speed cameras that cannot be read."""
 
 NO_CHECKSUM = (
-    "Pictures of {codec} carry no checksum, and neither does this file: where its bytes were damaged on the way, a "
-    "frame may look sound and be wrong. If it came over a network or from an old disk, compare it with its source; "
-    "record with FFV1 or H.264."
+    "Neither {codec} nor this file has checksums, so that a damaged frame may look undamaged. If the file came over a "
+    "network or from an old disk, compare it with its source; record with FFV1 or H.264."
 )
 
 
@@ -73,7 +72,9 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
         If a rate is given for a file with its own times.
     """
     if wish.rate_hz is not None:
-        raise UsageError(f"--rate-hz is for images without times, but {name} is a video with its own: leave it out.")
+        raise UsageError(
+            f"--rate-hz is for images without times, but {name} is a video with its own times: leave --rate-hz out."
+        )
     return VideoFile(name)
 
 
@@ -96,8 +97,8 @@ class VideoFile:
             codec = stream.codec_context
             if codec.width < 1 or codec.height < 1:
                 raise DataError(
-                    f"{self.name} has no pictures in its video: it is empty or was cut off at its start; "
-                    "record it again."
+                    f"{self.name} has no pictures in its video: the file is empty or was truncated near its start; "
+                    "record the video again."
                 )
             rate = float(stream.average_rate) if stream.average_rate else None
             length_s = float(container.duration / av.time_base) if container.duration else None
@@ -106,22 +107,29 @@ class VideoFile:
             notes: tuple[str, ...] = (
                 ()
                 if ratio in (None, 0, 1)
-                else (f"The file states pixels that are not square ({ratio}): one scale cannot hold along both axes.",)
+                else (
+                    f"The file states pixels that are not square ({ratio}): a single scale is then not valid along "
+                    "both axes.",
+                )
             )
             if (tracks := len(_tracks(container))) > 1:
                 notes += (
-                    f"The file holds {tracks} videos; the first ({codec.width}x{codec.height}) is measured. `ffmpeg -i "
-                    f"{Path(self.name).name} -map 0:v:1 -c copy second.mkv` takes out the second.",
+                    f"The file contains {tracks} videos; the first ({codec.width}x{codec.height}) is measured. "
+                    "`ffmpeg -i "
+                    f"{Path(self.name).name} -map 0:v:1 -c copy second.mkv` extracts the second video.",
                 )
             size_px = (codec.width, codec.height)
             if stream.codec.canonical_name in UNCHECKED_CODECS and not ClusterChecksums(Path(self.name)).cover_all:
                 notes += (NO_CHECKSUM.format(codec=stream.codec.canonical_name),)
             turned = _rotation_deg(container, stream)
             if turned % QUARTER_DEG:
-                notes += (f"The file states a rotation of {turned} degrees, which is no quarter turn: not applied.",)
+                notes += (
+                    f"The file states a rotation of {turned} degrees, which is not a multiple of 90 degrees and "
+                    "is not applied.",
+                )
             elif turned:
                 size_px = (size_px[1], size_px[0]) if turned % (2 * QUARTER_DEG) else size_px
-                notes += (f"The pictures are turned by {turned} degrees, as the file asks of every player.",)
+                notes += (f"The pictures are rotated by {turned} degrees, as the file requests.",)
             object.__setattr__(
                 self,
                 "description",
@@ -149,8 +157,8 @@ class VideoFile:
             stream = _stream(container, self.name)
             stream.codec_context.options = STRICT | EXPORTED
             if self.description.coding is Coding.INTERFRAME:
-                # With threads for slices FFmpeg's H.264 neither fills in nor marks what is missing in a picture
-                # (libavcodec/h264_slice.c, enable_er): parts of older pictures would stand there, unsaid.
+                # With threads for slices, FFmpeg's H.264 decoder neither replaces nor marks missing parts of a picture
+                # (libavcodec/h264_slice.c, enable_er), so that parts of older pictures would remain unnoticed.
                 stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
             untrusted = unseen_damage(Path(self.name), stream, container.metadata.get("comment"))
@@ -166,7 +174,9 @@ class VideoFile:
                 if pixels.shape[1::-1] != (self.description.width_px, self.description.height_px):
                     yield LostFrame(index, time_s, Status.DAMAGED, _of_another_size(pixels, self.description))
                 elif tick is not None and tick == last_tick:
-                    yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+                    yield LostFrame(
+                        index, time_s, Status.DUPLICATE, "The frame has the same time as the previous frame."
+                    )
                 else:
                     hangs = not found.key_frame
                     yield Frame(pixels, index, time_s, self.description.coding, hangs, steps)
@@ -183,11 +193,11 @@ def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream
     """Find the first video stream of a file, and its decoder."""
     tracks = _tracks(container)
     if not tracks:
-        raise DataError(f"{name} must hold a video, but has no video stream: give another file.")
+        raise DataError(f"{name} must contain a video, but has no video stream: give another file.")
     stream = tracks[0]
     if stream.codec_context is None:
         raise DataError(
-            f"{name} is stored with a codec that cannot be decoded here: convert it losslessly, for instance with "
+            f"{name} is stored with a codec that this program cannot decode: convert it losslessly, for instance with "
             "`ffmpeg -i IN -c:v ffv1 OUT.mkv`."
         )
     return stream
@@ -224,7 +234,7 @@ def upright_steps(steps: Quantiser | None, picture: av.VideoFrame) -> Quantiser 
 
 def _of_another_size(pixels: Pixels, description: Description) -> str:
     return (
-        f"It has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "
+        f"The frame has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording has "
         f"{description.width_px}x{description.height_px}."
     )
 
@@ -240,6 +250,6 @@ def _not_a_video(name: str, error: Exception) -> FingervisionError:
     if path.is_file() and path.stat().st_size == 0:
         return DataError(f"{name} must be a video, but the file is empty: record or copy it again.")
     return DataError(
-        f"{name} must be a video, but cannot be read as one: it is of another kind, or was cut off before its index "
-        "was written (an MP4 file needs its end); record or copy it again."
+        f"{name} must be a video, but cannot be read as one: the file has another format, or was truncated before its "
+        "index was written (the index of an MP4 file is often at its end); record or copy it again."
     )

@@ -5,11 +5,11 @@ from math import radians
 
 from fingervision.storage.toml_section import Section
 
-# The largest frames that any camera makes are smaller; what lies beyond is a slip.
+# Largest coordinate, larger than the frames of any camera; a larger value is a typing error.
 FARTHEST_PX = 100_000.0
-# An edge is fitted in pieces along its length, each of a pixel at least; longer than a frame is a slip.
+# Smallest length, because an edge is fitted in eight pieces of at least a pixel; largest length, longer than any frame.
 SHORTEST_EDGE_PX, LONGEST_PX = 8.0, 20_000.0
-# A thing is looked for so far from where it was in the frame before.
+# Default and largest distance from the position in the previous frame at which an object is searched.
 REACH_PX, LARGEST_REACH_PX = 12.0, 200.0
 POLARITIES = ("any", "rising", "falling")
 
@@ -21,7 +21,7 @@ def middle(section: Section) -> tuple[float, float]:
 
 
 def reach(section: Section) -> float:
-    """Read `reach_px`: how far the object may move from frame to frame; within it, nothing may look like the object."""
+    """Read `reach_px`: how far the object may move between frames; no similar object may lie within this distance."""
     return section.number("reach_px", REACH_PX, low=1.0, high=LARGEST_REACH_PX)
 
 
@@ -55,7 +55,7 @@ class EdgeKeys:
     length_px, reach_px : float
         Length of edge that is fitted, and largest motion between frames.
     polarity : int
-        +1 for a rising edge (lighter along the direction), -1 for a falling one, 0 for any.
+        +1 for a rising edge (lighter along the direction), -1 for a falling edge, 0 for any edge.
     """
 
     middle_px: tuple[float, float]

@@ -10,9 +10,9 @@ from fingervision.gauges.gauge_file import Gauge
 from fingervision.gauges.reading import Mark, Reading
 from fingervision.gauges.status import GaugeStatus
 
-# Red, green, blue: where it was looked for, what was found, and where nothing was.
+# Colours (red, green, blue) of the searched zone, of a result, of a zone without a result, and behind text.
 ZONE, FOUND, FAILED, BACKING = (150, 150, 150), (64, 255, 160), (255, 96, 96), (0, 0, 0)
-# OpenCV draws sub-pixel places as whole numbers of 1/16 px.
+# OpenCV draws sub-pixel positions as multiples of 1/16 px.
 FRACTION = 16
 USUAL_HEIGHT_PX, CROSS_PX, LETTER = 480.0, 5.0, 0.4
 

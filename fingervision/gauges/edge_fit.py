@@ -103,7 +103,7 @@ def fit_near(
         found.append(_edge(follower, picture, fitted, k))
     if cut_off:
         if fitted.lost - SURE * fitted.u_lost > MOST_LOST:
-            return NotFound(GaugeStatus.SATURATED, "the flank itself is clipped")
+            return NotFound(GaugeStatus.SATURATED, "the flank of the edge is clipped")
         hidden = HIDDEN_SHIFT_SIGMAS * hypot(fitted.blur_px, 0.29)
         found = [replace(one, u_position_px=hypot(one.u_position_px, hidden)) for one in found]
     return found, float(fitted.covariance[0, 1]) if len(chosen) > 1 else 0.0
@@ -126,25 +126,25 @@ def _refused(
     contrast = float(fitted.contrast[k])
     known = follower.known
     if contrast * step.contrast <= 0.0 or abs(contrast) < CONTRAST_FLOOR * picture.top:
-        return NotFound(GaugeStatus.NO_EDGE, "too little contrast")
+        return NotFound(GaugeStatus.NO_EDGE, "the edge has too little contrast")
     if (
         known is not None
         and not LEAST_OF_KNOWN <= contrast / known.contrast <= MOST_OF_KNOWN
         and len(fitted.contrast) < 2
     ):
-        return NotFound(GaugeStatus.NO_EDGE, "another contrast")
+        return NotFound(GaugeStatus.NO_EDGE, "the contrast differs too much from that in the previous frame")
     if abs(float(fitted.position_px[k]) - step.position_px) > FARTHEST_FROM_CANDIDATE_PX + fitted.blur_px:
-        return NotFound(GaugeStatus.NO_EDGE, "the fit left the step")
+        return NotFound(GaugeStatus.NO_EDGE, "the fit moved away from the edge")
     if fitted.blur_px >= LARGEST_BLUR_PX:
         return NotFound(GaugeStatus.BLURRED)
     if fitted.noise > MOST_NOISE * abs(contrast):
-        return NotFound(GaugeStatus.NO_EDGE, "texture, no step")
+        return NotFound(GaugeStatus.NO_EDGE, "there is texture, but no edge")
     if abs(float(fitted.slope[k])) > MOST_LEAN:
-        return NotFound(GaugeStatus.NO_EDGE, "it leans by more than 45 degrees against the direction")
+        return NotFound(GaugeStatus.NO_EDGE, "the edge is tilted by more than 45 degrees against the gauge")
     if k == 0 and fitted.least_piece < LEAST_PIECE:
-        return NotFound(GaugeStatus.NO_EDGE, "it ends within the gauge's length")
+        return NotFound(GaugeStatus.NO_EDGE, "the edge ends within the gauge's length")
     if k == 0 and fitted.bend_px > max(LARGEST_BEND_PX, LARGEST_BEND * follower.length_px):
-        return NotFound(GaugeStatus.NO_EDGE, f"it is bent by {fitted.bend_px:.1f} px: shorten length_px")
+        return NotFound(GaugeStatus.NO_EDGE, f"the edge is bent by {fitted.bend_px:.1f} px: shorten length_px")
     variance = float(fitted.covariance[k, k])
     if not 0.0 < variance < LEAST_SURE_PX**2:
         return NotFound(GaugeStatus.LOW_CONTRAST)

@@ -101,10 +101,10 @@ class EdgeFollower:
         if len(alike) > 1:
             places = ", ".join(f"{step.position_px:+.0f}" for step in alike)
             return NotFound(
-                GaugeStatus.AMBIGUOUS, f"{len(alike)} edges within reach, at {places} px along the direction"
+                GaugeStatus.AMBIGUOUS, f"{len(alike)} edges lie within reach_px, at {places} px along the direction"
             )
         if abs(alike[0].position_px) > reach + 1.0:
-            return NotFound(GaugeStatus.NO_EDGE, "it lies farther away than it may have moved")
+            return NotFound(GaugeStatus.NO_EDGE, "the nearest edge is farther away than reach_px permits")
         return alike[0], steps
 
     def _in_reach(self, steps: list[StepCandidate], reach: float) -> list[StepCandidate]:

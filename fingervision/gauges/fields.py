@@ -1,4 +1,4 @@
-"""Settings that a kind of gauge reads, found by letting it read a table that records every request."""
+"""Settings that a kind of gauge reads, determined by giving it a table that records every request."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from pathlib import Path
 from fingervision.gauges.kinds import kind_named
 from fingervision.storage.toml_section import Section
 
-# What is answered where a kind asks for a number without a default: a size that suits most things in a picture.
+# Value returned for a required number; this size suits most objects in a picture.
 USUAL_PX = 40.0
 
 

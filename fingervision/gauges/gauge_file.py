@@ -22,9 +22,9 @@ from fingervision.storage.toml_purpose import refuse_other_file
 from fingervision.storage.toml_section import Section, read_document
 
 SCHEMA = 1
-# A table of a thousand gauges and a name of a hundred characters are slips.
+# Largest number of gauges, and largest length of a name; more would be a mistake in the file.
 MOST_GAUGES, LONGEST_NAME = 1000, 100
-# Keys of a gauge's size; what is larger than the frame's diagonal can never be in view.
+# Keys that state sizes; a size larger than the frame's diagonal is refused, because the gauge cannot be in view.
 SIZES = ("length_px", "distance_px", "diameter_px", "width_px", "height_px", "size_px")
 
 
@@ -93,7 +93,10 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
         top.refuse("schema", f"must be {SCHEMA}, but is {schema}: this program is older than the file.")
     sections = top.tables("gauge")
     if not 1 <= len(sections) <= MOST_GAUGES:
-        raise DataError(f"{path} must hold 1 to {MOST_GAUGES} tables [[gauge]], but holds {len(sections)}: add one.")
+        raise DataError(
+            f"{path} must contain 1 to {MOST_GAUGES} tables [[gauge]], but contains {len(sections)}: add "
+            "or remove gauges."
+        )
     gauges: dict[str, Gauge] = {}
     for section in sections:
         gauge = gauge_of(section, gauges)
@@ -120,7 +123,7 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
     if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
         section.refuse("name", f"must be 1 to {LONGEST_NAME} printable characters, but is {name[:200]!r}.")
     if name in others:
-        section.refuse("name", f"must be another than those before, but {name!r} comes again: rename one.")
+        section.refuse("name", f"must be unique in the file, but {name!r} occurs twice: rename one of the gauges.")
     kind_name = section.word("kind", of=kinds())
     kind = kind_named(kind_name)
     section.only(("name", "kind", *kind.KEYS))
@@ -140,7 +143,7 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
         if not (-0.5 <= x <= width_px - 0.5 and -0.5 <= y <= height_px - 0.5):
             raise DataError(
                 f"The gauge {gauge.name!r} must have its centre inside the picture of {width_px}x{height_px} "
-                f"pixels, but it lies at x_px = {x:g}, y_px = {y:g}: move the gauge into the picture."
+                f"pixels, but its centre is at x_px = {x:g}, y_px = {y:g}: move the gauge into the picture."
             )
         largest = (width_px**2 + height_px**2) ** 0.5
         for key in SIZES:
@@ -148,5 +151,5 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
             if size > largest:
                 raise DataError(
                     f"The gauge {gauge.name!r} must be smaller than the picture of {width_px}x{height_px} pixels, but "
-                    f"its {key} is {size:g}: make it smaller."
+                    f"its {key} is {size:g}: reduce {key}."
                 )

@@ -13,9 +13,10 @@ from fingervision.vision.pipeline import Settings
 
 Floats = NDArray[np.float64]
 
-# So many pixels count as one in what a codec has left: what it does to a whole block looks like the thing itself.
+# Number of neighbouring pixels whose codec errors are alike and which therefore count as one pixel.
 SHARED_PIXELS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 12.0}
-# An edge along a codec's blocks shares more: a pair across upright fingers in HEVC at 1 Mbit/s scatters so.
+# The same number for edges, which is larger along the borders of a codec's blocks; it follows from the scatter of a
+# pair gauge across upright fingers in HEVC at 1 Mbit/s.
 EDGE_SHARED_PIXELS = SHARED_PIXELS | {Coding.INTERFRAME: 36.0}
 
 

@@ -12,8 +12,9 @@ from fingervision.measuring.scale import Scale
 
 Floats = NDArray[np.float64]
 
-# Lengths are uncertain alike near each other: the budget is asked once for points of a square of this side, and for
-# directions of this breadth. Within both, perspective and lens change by far less than they are uncertain.
+# The relative uncertainty is computed once for all points of a square of this side, and for all directions of a sector
+# of this angle, from a length of this number of pixels. Within square and sector, perspective and lens change by much
+# less than their uncertainty.
 SQUARE_PX, SECTOR_RAD, BASELINE_PX = 32.0, pi / 12.0, 64.0
 
 

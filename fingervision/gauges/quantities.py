@@ -12,7 +12,8 @@ from typing import NamedTuple, Protocol
 from fingervision.gauges.plane_scale import PlaneScale
 
 Point = tuple[float, float]
-# An angle is turned by what lens and plane do to two points so far to either side of its middle (pixels).
+# An angle is corrected for lens and plane by means of two points at this distance (pixels) on either side of its
+# middle.
 ANGLE_REACH_PX = 10.0
 
 
@@ -100,8 +101,8 @@ class Distance:
     u_px : float
         Standard uncertainty of the distance, from the fit.
     polarity : int
-        +1 if it is light between the edges and dark beyond, -1 if it is dark between; 0 if both edges have the same
-        polarity, so that their biases cancel.
+        +1 if the area between the edges is light, -1 if this area is dark; 0 if both edges have the same polarity, so
+        that their biases cancel.
     u_response_px : float
         Standard uncertainty of each edge's position due to an unknown camera response.
     """
@@ -141,7 +142,7 @@ class Shift:
     Parameters
     ----------
     from_px, to_px : (float, float)
-        The point in the first frame, and now.
+        The point in the first frame, and in the present frame.
     direction_rad : float
         Direction of the displacement: 0 to the right, pi / 2 downwards.
     u_px : float
@@ -168,7 +169,7 @@ class Shift:
         (x, y), (to_x, to_y) = flat
         moved_px = (to_x - x) * cos(self.direction_rad) + (to_y - y) * sin(self.direction_rad)
         shared_px = scale.relative_u(self.from_px, self.direction_rad) * moved_px
-        # In the first frame nothing was registered: the shift is zero by definition.
+        # In the first frame, the shift is zero by definition and has no uncertainty.
         phase_px = scale.u_phase_px if self.u_px > 0.0 else 0.0
         return Cell(moved_px / scale.px_per_mm, hypot(self.u_px, shared_px, phase_px) / scale.px_per_mm, "mm")
 
@@ -182,7 +183,7 @@ class Angle:
     point_px : (float, float)
         Middle of the line or object.
     angle_rad : float
-        From the x axis towards the y axis, clockwise on the screen.
+        Angle from the x axis towards the y axis, which is clockwise on the screen.
     u_rad : float
         Standard uncertainty from the fit.
     is_turn : bool

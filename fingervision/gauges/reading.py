@@ -28,7 +28,7 @@ class Reading:
     Parameters
     ----------
     status : GaugeStatus
-        Whether there are values, or why not.
+        Whether the gauge has values, or the reason why it has none.
     quantities : tuple of Quantity
         Values in the order of the kind's names; empty if there are none.
     marks : tuple of Mark
@@ -36,7 +36,7 @@ class Reading:
     zone : Mark
         Shape of the searched zone in the picture.
     words : str
-        Reason why there is no value, if more is known than the status says.
+        Reason why there is no value, if the reason is more specific than the status.
     """
 
     status: GaugeStatus

@@ -24,7 +24,7 @@ from fingervision.storage.gauges_csv import GaugeRow, GaugeRows, GaugesCsv
 from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import Settings
 
-# Rows are made for so many frames at once: lens and plane are taken off all of their points together.
+# Number of frames whose rows are computed together, so that lens and plane are corrected for all points at once.
 FRAMES_AT_ONCE = 64
 
 
@@ -56,7 +56,7 @@ class GaugeRecording:
     gauges : tuple of Gauge
         Gauges read from the file.
     scale : Scale or None
-        Conversion from pixels to millimetres; without one all values stay in pixels.
+        Conversion from pixels to millimetres; without a scale, all values are in pixels.
     frame_size_px : (int, int)
         Width and height of the frames.
     settings : Settings

@@ -26,13 +26,13 @@ class GaugeStatus(StrEnum):
 
 
 MEANING = {
-    GaugeStatus.OUT_OF_VIEW: "what it measures, or a part of it that is needed, lies outside of the picture",
-    GaugeStatus.NO_EDGE: "no straight edge of this polarity and contrast lies where it may be",
-    GaugeStatus.NOT_FOUND: "nothing that looks like it lies where it may be",
-    GaugeStatus.AMBIGUOUS: "more than one thing that looks like it lies where it may be: lower reach_px, state the "
+    GaugeStatus.OUT_OF_VIEW: "the measured object, or a necessary part of it, lies outside the picture",
+    GaugeStatus.NO_EDGE: "no straight edge with this polarity and contrast lies in the searched zone",
+    GaugeStatus.NOT_FOUND: "no matching object lies in the searched zone",
+    GaugeStatus.AMBIGUOUS: "more than one matching object lies in the searched zone: reduce reach_px, state the "
     "polarity, or move the gauge",
-    GaugeStatus.LOW_CONTRAST: "too little is seen there to measure",
-    GaugeStatus.SATURATED: "the flank of its edge is clipped at the end of the scale",
-    GaugeStatus.BLURRED: "its edge is spread by more than 5 px (standard deviation)",
-    GaugeStatus.TOUCHING: "its two edges are too near each other to be told apart",
+    GaugeStatus.LOW_CONTRAST: "the object has too little contrast or texture to be measured",
+    GaugeStatus.SATURATED: "the flank of the edge is clipped at the end of the scale",
+    GaugeStatus.BLURRED: "the blur of the edge exceeds 5 px (standard deviation)",
+    GaugeStatus.TOUCHING: "the two edges are too near each other to be distinguished",
 }

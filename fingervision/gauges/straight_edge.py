@@ -8,37 +8,38 @@ import numpy as np
 from fingervision.gauges.reading import Mark
 from fingervision.gauges.status import GaugeStatus
 
-# An edge has at least this share of full scale (as `fingervision.vision.pipeline` has it for the whole picture).
+# Smallest contrast of an edge, as a share of full scale (as in `fingervision.vision.pipeline`).
 CONTRAST_FLOOR = 0.03
-# From frame to frame its contrast stays within these factors: what has less is something else.
+# Limits of the ratio of an edge's contrast to that in the previous frame; outside them, another edge is assumed.
 LEAST_OF_KNOWN, MOST_OF_KNOWN = 0.4, 2.5
-# What the fit leaves is at most this share of the contrast: more is texture. Every eighth of the edge has at least this
-# share of the whole's contrast.
+# Largest residual of the fit as a share of the contrast, above which texture is assumed; smallest contrast of any
+# eighth of the edge, as a share of the contrast of the whole edge.
 MOST_NOISE, LEAST_PIECE = 0.35, 0.5
-# `blurred` begins at a sigma of 5 px (measuring a gap has the same limit).
+# Blur (standard deviation) at which the status is `blurred`, as for a gap.
 LARGEST_BLUR_PX = 5.0
-# A bend beyond this (pixels, and share of the length) is a curve: the limits of `calib.straight_line`.
+# Largest bend of a straight edge, in pixels and as a share of its length (the limits of `calib.straight_line`).
 LARGEST_BEND_PX, LARGEST_BEND = 0.35, 0.01
-# How an edge may lean against its gauge's direction in the first frame, and the steps in which that is tried; a profile
-# across 40 px of an edge is blurred by 2 px where the lean is wrong by half a step.
+# Slopes of an edge, relative to its gauge, that are tried in the first frame; an error of half a step blurs the profile
+# over 40 px of an edge by 2 px.
 LEANS = tuple(float(lean) for lean in np.linspace(-0.6, 0.6, 13))
 MOST_LEAN = 1.0
-# Strips of the profile beyond the reach: an edge there must be seen whole.
+# Number of strips of the profile beyond the search distance, so that an edge at this distance is completely visible.
 BEYOND_PX = 8
-# Nothing alike may be within so many times the reach of where it was: a motion may exceed what was stated by half, and
-# the neighbour is still not taken for it.
+# No similar edge may lie within this multiple of reach_px; a motion may then exceed reach_px by half without a
+# confusion with a neighbouring edge.
 GUARD = 1.5
-# After a frame without a number the thing may be farther away: so many times the reach at most.
+# Largest multiple of reach_px at which an edge is searched after frames without a value.
 MOST_TIMES = 4
-# An edge beside it that has this share of its contrast is part of the model.
+# Smallest contrast of a neighbouring edge, as a share of the measured edge's contrast, at which it is fitted too.
 LEAST_BESIDE = 0.1
-# The fit stays near the candidate.
+# Largest distance between the fitted edge and the candidate, in addition to the blur.
 FARTHEST_FROM_CANDIDATE_PX = 3.0
-# A plateau of which this share is at the end of the scale is cut off. Where a sixteenth of the step is surely lost (a
-# tenth may be) the flank itself is clipped; up to a tenth the edge lies up to 0.125 sigma_e nearer to the light: a
-# rectangular distribution that begins at zero.
+# A plateau is clipped if this share of its pixels is at the end of the scale. The flank is clipped as well if more than
+# 6 % of the step is lost with a confidence of two standard uncertainties. Otherwise up to a tenth of the step may be
+# lost, which shifts the edge by 0 to 0.125 sigma_e towards the light side (rectangular distribution; sigma_e is the
+# standard deviation of the blur).
 MOST_CLIPPED, MOST_LOST, SURE, HIDDEN_SHIFT_SIGMAS = 0.5, 0.06, 2.0, 0.125 / 3.0**0.5
-# The fitted position is no number where it is less sure than this (pixels).
+# Largest standard uncertainty of an accepted position (pixels).
 LEAST_SURE_PX = 1.0
 
 

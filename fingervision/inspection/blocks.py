@@ -4,13 +4,14 @@ import numpy as np
 
 from fingervision.domain.frame import Pixels
 
-# Coders of pictures work in blocks of this side (pixels).
+# Side of the blocks in which codecs process pictures (pixels).
 BLOCK_PX = 8
-# Edges of things are no noise: a step counts up to so many levels, several times the noise of cameras.
+# Larger differences of neighbouring levels are left out, because they are edges of objects; this limit is several times
+# the noise of cameras.
 LARGEST_STEP = 12
-# Noise alone makes up to 0.1 in a small picture, JPEG of quality 95 0.4, of 85 and less 1 and more.
-# Steps between blocks that are larger than those within by the first share show that the picture was coded; by the
-# second, that what is seen beside an edge is the coder's work.
+# Limits of the blockiness. Above the first, the picture was coded in blocks; above the second, structures beside an
+# edge are regarded as errors of the codec. Noise alone gives up to 0.1 in a small picture, JPEG of quality 95 gives
+# 0.4, and JPEG of quality 85 or less gives 1 or more.
 BLOCKY, HEAVY = 0.3, 0.5
 
 

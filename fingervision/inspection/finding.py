@@ -9,14 +9,16 @@ if TYPE_CHECKING:
     from fingervision.domain.status import Status
     from fingervision.inspection.sample import Sample
 
-# A limit that costs less than this (pixels, standard) is not worth mending: a good set-up (contrast of 100 levels,
-# noise of 2, blur of 1.2 px, 20 rows) is known no better (measuring.md, section 2).
+# Cost (standard uncertainty in pixels) below which a limit is not worth correcting: the standard uncertainty of a good
+# set-up with a contrast of 100 levels, noise of 2 levels, blur of 1.2 px and 20 rows.
 GOOD_PX = 0.0106 * 2.0**0.5
-# What costs so many times more is the first thing to mend: it alone makes nine tenths of the uncertainty.
+# Ratio of a cost to that of a good set-up above which the severity is red; at this ratio the limit alone causes nine
+# tenths of the variance.
 POOR_TIMES = 3.0
-# Refusals of fewer frames than this share (a part that passes, a hand) are counted in the report's first line only.
+# A smaller share of unmeasured frames (a passing part, a hand) gives no finding of its own.
 FEW_REFUSED = 0.2
-# Where more than this share is refused nothing else matters; where less is, what the others suffer from is the cause.
+# Above this share of unmeasured frames, the reason for them is the first finding; below it, the other findings explain
+# them.
 MOSTLY_REFUSED = 0.5
 
 
@@ -104,9 +106,9 @@ def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy
     if not count or count < FEW_REFUSED * sample.frames:
         return None
     words = next(sample.refused[status].words for status in statuses if status in sample.refused)
-    figure = f"{count} of {sample.frames} frames gave no number: {words[0].lower()}{words[1:]}"
+    figure = f"{count} of {sample.frames} frames have no gap: {words[0].lower()}{words[1:]}"
     share = count / sample.frames
-    return Finding(name, Severity.POOR, figure, None, None, remedy, "frames without a number", share)
+    return Finding(name, Severity.POOR, figure, None, None, remedy, "frames without a gap", share)
 
 
 def without(u_px: float, mended_px: float) -> float:

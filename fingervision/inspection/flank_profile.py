@@ -12,11 +12,11 @@ from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
 
-# Bins across the edge (pixels), the fewest pixels in one, and the fewest bins of a profile.
+# Width of a bin across the edge (pixels), smallest number of pixels in a bin, and smallest number of bins of a profile.
 BIN_PX, FEWEST_IN_BIN, FEWEST_BINS = 0.25, 6, 12
-# The profile reaches so many blurs and so many pixels to either side, at most so far.
+# Extent of the profile to either side: this multiple of the blur plus these pixels, at most the last number of pixels.
 REACH_BLURS, REACH_EXTRA_PX, FARTHEST_PX = 4.0, 3.0, 20.0
-# A flank's far half is straight: rows scatter about its line by no more than this (pixels).
+# Largest scatter of the rows about a straight line (pixels) in the half of a flank that is farther from the tip.
 STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
 
 
@@ -72,14 +72,15 @@ def flank_profile(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, light
         return None
     n = np.maximum(count, 1)
     middle, mean = np.bincount(place, t) / n, np.bincount(place, value) / n
-    # Scatter about the bin's own slope, so that the edge's steepness is no noise.
+    # The scatter is computed about a line through each bin, so that the slope of the edge is not counted as noise.
     dt = t - middle[place]
     slope = np.bincount(place, dt * value) / np.maximum(np.bincount(place, dt * dt), 1e-9)
     left = value - mean[place] - slope[place] * dt
     variance = np.bincount(place, left**2) / np.maximum(count - 2, 1)
     usual = float(np.median(variance[full]))
     u_level = np.sqrt(np.maximum(variance[full], usual) / count[full])
-    # The noise is the levels'; light has it multiplied by the curve's slope, so that responses are judged alike.
+    # The noise of the stored levels is multiplied by the slope of the response curve, so that different responses are
+    # compared with the same noise.
     gain = np.interp(mean[full], np.arange(light.size), np.gradient(light))
     in_light = np.bincount(place, light[stored])[full] / count[full]
     return FlankProfile(middle[full], in_light, np.maximum(u_level * gain, 1e-6), pixel)

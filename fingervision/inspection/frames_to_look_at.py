@@ -6,7 +6,7 @@ from time import monotonic
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import FrameSource
 
-# However fast a camera is, so many frames tell enough.
+# Largest number of frames; more frames from a fast camera would not improve the findings.
 MOST_FRAMES = 150
 
 

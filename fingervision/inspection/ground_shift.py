@@ -21,15 +21,16 @@ from fingervision.vision.orientation import Orientation
 
 Floats = NDArray[np.float64]
 
-# The ground ends so far above the higher tip (pixels): beyond the blur of its edge.
+# Distance (pixels) of the background strip from the higher tip, which excludes the blur of the tip's edge.
 MARGIN_PX = 12
-# A strip of so few rows is too narrow to follow; more than this says no more.
+# Smallest number of rows of a strip that can be registered, and largest number that improves the result.
 FEWEST_ROWS, MOST_ROWS = 24, 256
-# Registration is refined to this part of a pixel; whole transforms of more frames than this say no more.
+# The registration is refined to 1/50 pixel; more than 60 frames would not improve the result.
 UPSAMPLED, MOST_FRAMES = 50, 60
-# Detail is what is finer than so many pixels: light that is uneven does not move with the ground.
+# Structures coarser than this (pixels) are removed, because uneven light does not move with the background.
 COARSE_PX = 8.0
-# Halves that disagree by more than this (pixels, standard deviation) follow noise.
+# Largest standard uncertainty (pixels) from the difference between the two halves; above this limit, noise is
+# registered instead of texture.
 AGREE_PX = 0.3
 
 
@@ -71,14 +72,14 @@ class GroundTracker:
             tips = [orientation.along_size - 1 - tip for tip in tips]
         room = int(min(tips)) - MARGIN_PX
         if self._reference is None:
-            # Some room, because tips move.
+            # A second margin is left free, because the tips move.
             self._rows, self._direction = min(room - MARGIN_PX, MOST_ROWS), outcome.direction
             if self._rows >= FEWEST_ROWS:
                 self._reference = self._halves(upright[:room])
             return
         if room >= self._rows:
             halves = self._halves(upright[: self._rows])
-            # What is cut off at black or white throughout has no detail at all.
+            # A half that is completely clipped to black or white has no texture.
             if all(half.any() for half in (*self._reference, *halves)):
                 self._register(halves)
 
@@ -87,7 +88,8 @@ class GroundTracker:
         if len(self._found) < 2:
             return GroundShift(np.zeros(0), np.zeros(0), None)
         both = np.array(self._found)
-        # Rounding of the refinement is no agreement: fixed dirt on a sensor stays at exactly nothing.
+        # The uncertainty is at least half a step of the refinement; otherwise, dirt on the sensor, whose shift is
+        # exactly zero, would be registered with no uncertainty.
         apart = max(float(np.std(both[:, 0] - both[:, 1])) / 2.0, 0.5 / UPSAMPLED)
         middle = np.vstack([np.zeros((1, 2)), both.mean(axis=1)])
         return GroundShift(middle[:, 1], middle[:, 0], apart if apart < AGREE_PX else None)

@@ -19,7 +19,7 @@ from fingervision.vision.wall_width import WIDER
 
 Floats = NDArray[np.float64]
 
-# What a camera's own noise is taken to be where a codec has removed it (levels of 255).
+# Assumed noise of the camera if a codec has removed the noise (grey levels of 255).
 CAMERA_NOISE = 2.0
 
 

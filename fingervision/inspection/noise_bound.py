@@ -5,10 +5,10 @@ Only ratios of these uncertainties are used.
 
 from math import pi, sqrt
 
-# A good set-up: noise over contrast (2 of 100 levels), and blur of an edge (sigma_e, pixels) that is neither soft nor
-# under-sampled (measuring.md, section 2: below 0.5 px the pixels show).
+# A good set-up: ratio of noise to contrast (2 of 100 levels), and blur of an edge (sigma_e, pixels) that is neither
+# soft nor undersampled, as a blur below 0.5 px would be.
 GOOD_NOISE, GOOD_BLUR_PX = 0.02, 1.3
-# The window of a fit reaches so many blurs, and so many pixels more, to either side.
+# Extent of a fit's window to either side: this multiple of the blur, plus these pixels.
 REACH_BLURS, REACH_EXTRA_PX = 4.0, 4.0
 
 

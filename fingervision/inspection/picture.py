@@ -16,7 +16,8 @@ from fingervision.vision.grey import to_grey
 from fingervision.vision.overlay import draw_overlay, in_eight_bits
 
 COLOURS = {Severity.GOOD: "#3a9d5d", Severity.FAIR: "#e0a100", Severity.POOR: "#c8372d"}
-# What leaves no number is drawn as long as the longest bar, or so long where there is none (pixels).
+# Cost (pixels) at which a finding without a cost is drawn if no finding has one; else it is drawn as long as the
+# longest bar.
 NO_NUMBER_PX = 1.0
 
 
@@ -44,7 +45,7 @@ def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None
         left.imshow(canvas)
     left.set_axis_off()
     mend = to_mend(findings)
-    left.set_title(f"First to mend: {mend[0].name}" if mend else NOTHING.split(":")[0], loc="left")
+    left.set_title(f"Correct first: {mend[0].name}" if mend else NOTHING.split(":")[0], loc="left")
     in_um = sample.scale is not None
     costs = [(each.cost_um if in_um else each.cost_px) for each in findings]
     longest = max([cost for cost in costs if cost is not None] or [0.0]) or NO_NUMBER_PX

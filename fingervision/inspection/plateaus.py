@@ -11,9 +11,11 @@ from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
 
-# Plateaus are read in a strip of so many pixels beyond so many blurs from the inner edge.
+# Width (pixels) of the strip in which plateaus are read, and its distance from the inner edge as a multiple of the
+# blur.
 STRIP_PX, BEYOND_BLURS = 6, 3.0
-# Half of the sensor's noise already lies beyond the end of the scale where so many pixels stand at it.
+# Share of clipped pixels above which a plateau counts as clipped; about half of the noise distribution is then beyond
+# the end of the scale.
 AT_END_SHARE = 0.25
 
 

@@ -11,9 +11,10 @@ from fingervision.inspection.flank_profile import FlankProfile
 
 Floats = NDArray[np.float64]
 
-# A symmetric spread that is not Gaussian (a disc, a box, sharpening) is a Gaussian and a share of a wider one.
+# A symmetric point spread that is not Gaussian (a disc, a box, sharpening) is modelled by the sum of two Gaussians, the
+# second of which is wider by this factor.
 WIDER = 1.8
-# Blur is looked for within these limits (pixels).
+# Limits of the fitted blur (pixels).
 LEAST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
 
 

@@ -8,7 +8,7 @@ from fingervision.inspection.catalogue import doubts, to_mend
 from fingervision.inspection.finding import Finding, Severity
 from fingervision.inspection.sample import Sample
 
-NOTHING = "Nothing to mend: every limit that was looked for costs less than a good set-up's own uncertainty."
+NOTHING = "Nothing to mend: every limit that was examined costs less than the uncertainty of a good set-up."
 LIGHTS = {Severity.GOOD: "good", Severity.FAIR: "FAIR", Severity.POOR: "POOR"}
 
 
@@ -69,12 +69,12 @@ def as_text(sample: Sample, findings: list[Finding]) -> str:
 
 def _head(sample: Sample) -> str:
     if not sample.looks:
-        return f"{sample.frames} frames of {sample.description.name} were looked at; none gave a number."
+        return f"{sample.frames} frames of {sample.description.name} were inspected; none has a gap."
     m = sample.looks[len(sample.looks) // 2].outcome
     gap = f"{m.gap_px:.2f} px" if sample.scale is None else f"{m.gap_px / sample.scale.px_per_mm:.4f} mm"
     return (
-        f"{sample.frames} frames of {sample.description.name} were looked at; the gap is {gap}, known to "
-        f"{m.u_gap_px:.3f} px from frame to frame (standard uncertainty)."
+        f"{sample.frames} frames of {sample.description.name} were inspected; the gap is {gap}; its standard "
+        f"uncertainty from frame to frame is {m.u_gap_px:.3f} px."
     )
 
 

@@ -22,18 +22,20 @@ from fingervision.vision.wall_width import WIDER
 
 Floats = NDArray[np.float64]
 
-# Beyond these odds (2 ln of the ratio of likelihoods) it is certain for every purpose.
+# Larger values (2 ln of the likelihood ratio) are limited to this value, which is practically certainty.
 LARGEST_ODDS = 60.0
-# Optics are not quite symmetric, and lossy coding less so: no bin is better known than this share of the contrast.
+# Smallest standard uncertainty of a bin, as a share of the contrast, because optics and lossy codecs do not blur
+# exactly symmetrically: for pictures stored without loss, and with loss.
 MODEL_SHARE, LOSSY_SHARE = 0.001, 0.03
-# Sharpening in the camera comes after its transfer curve and makes coded edges even: with overshoots beyond the
-# plateaus of this share of the contrast the shape says nothing.
+# The camera sharpens after its transfer curve, which makes edges symmetric in the stored levels. The shape of an edge
+# is therefore not used if it overshoots a plateau by this share of the contrast, and by this number of standard
+# deviations of the plateau's scatter.
 OVERSHOOT, OVERSHOOT_SIGMAS = 0.03, 3.0
-# Flanks that speak for different responses with more than this (odds of e^2 to one) show something else.
+# If both flanks support different responses with more than this value (odds of e^2 to one), another cause is present.
 CONTRADICTING = 4.0
-# Scatter of a plateau is told from so many bins.
+# Smallest number of bins from which the scatter of a plateau is computed.
 FEWEST_FOR_SCATTER = 4
-# A profile that reaches so near to either end of the scale is cut off, and leans because of that (share of it).
+# Level (share of full scale) above which a profile is regarded as clipped; clipping makes an edge asymmetric.
 CUT_OFF_SHARE = 0.995
 
 
@@ -109,7 +111,7 @@ def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Set
     blur_px = float(np.median([edges.blur_px[side, 0] for _, edges in seen]))
     tip_px = float(np.median([edges.blur_px[side, 1] for _, edges in seen]))
     if blur_px**2 + PIXEL_VARIANCE > (1.0 + WIDER) * (tip_px**2 + PIXEL_VARIANCE):
-        return None  # what spreads a flank and no tip is no spread of the optics: motion, or a wall
+        return None  # the optics blur flank and tip alike; motion or a side wall widens only the flank
     u_level = np.hypot(np.hypot(stored.u_level, floor * (high - low)), _pattern(stored, ends))
     fits = []
     for response in (settings.response, settings.other_response):
@@ -119,7 +121,8 @@ def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Set
         assert profile is not None  # noqa: S101 - as `stored`
         gain = np.interp(stored.level, identity, np.gradient(table))
         fits.append(fit_step(replace(profile, u_level=np.maximum(u_level * gain, 1e-6)), blur_px, sloping=True))
-    # What neither explains is error of the model: both are judged by the better one's own misfit.
+    # A misfit of both responses is an error of the model; the residual of the better fit then replaces the stated
+    # noise.
     excess = max(min(fit.chi_square for fit in fits) / fits[0].freedom, 1.0)
     return (fits[0].chi_square - fits[1].chi_square) / excess
 

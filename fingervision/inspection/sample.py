@@ -29,18 +29,20 @@ from fingervision.vision.pipeline import Settings, look_closely, measure_frame
 
 Floats = NDArray[np.float64]
 
-# Frames that are looked at closely, evenly over all that are read: enough to average noise, few enough for 4K.
+# Number of frames inspected in detail, evenly distributed over all frames read: enough to average noise, and few enough
+# for 4K frames.
 CLOSELY = 16
-# Another response than the assumed one is taken for the rest of the inspection where the edges say so as surely.
+# If the edges support the alternative response with this probability, it is used for the rest of the inspection.
 SURELY = 0.9
-# Rims and walls of a tenth of the contrast are seen below this ratio of noise to contrast.
+# Rims and side walls of a tenth of the contrast can be detected below this ratio of noise to contrast.
 SEEING_NOISE = 2.0 * GOOD_NOISE
-# The median step between neighbours is so many times the noise (0.6745 sqrt(2) for a normal one), and outlines are lost
-# where noise has this share of the contrast (five times what is good).
+# Ratio of the median difference between neighbouring pixels to the noise (0.6745 sqrt(2) for normal noise), and ratio
+# of noise to contrast (five times that of a good set-up) above which outlines are lost.
 STEP_OF_NOISE, LOST_NOISE = 0.954, 5.0 * GOOD_NOISE
-# The steepest of the pixels lie on edges; outlines are lost above this spread (twice what is good).
+# Quantile of the slopes that represents the edges, and blur (twice that of a good set-up) above which outlines are
+# lost.
 STEEPEST, LOST_BLUR_PX = 0.995, 2.0 * GOOD_BLUR_PX
-# Fingers and gap fill a picture that they take so much of: the rest is room to move in.
+# Fingers and gap fill the picture if they occupy this share of it, because the fingers need the rest to move.
 FILLED = 0.6
 
 
@@ -178,7 +180,7 @@ class Sample:
         return self.median(look.noise for look in self.looks) <= SEEING_NOISE
 
     def median(self, values: Iterable[float]) -> float:
-        """Median over the frames inspected in detail; 0 without such frames."""
+        """Median of one value per frame inspected in detail; 0 without values."""
         each = list(values)
         return float(np.median(each)) if each else 0.0
 

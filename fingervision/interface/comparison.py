@@ -103,7 +103,9 @@ class Comparison:
         for name, found in self.models.items():
             which = "" if len(self.models) == 1 else f"{name}: "
             lines.append(f"{which}{found.words()}")
-            lines += [f"  {place.words}" for place in found.places] or ["  nowhere beyond the noise"]
+            lines += [f"  {place.words}" for place in found.places] or [
+                "  model and measurement nowhere differ by more than the noise"
+            ]
             lines += [f"  note: {words}" for words in (*found.data.notes, *found.data.refitted())]
         return "\n".join(lines)
 
@@ -136,7 +138,8 @@ class Comparison:
 
     def __repr__(self) -> str:
         words = (
-            f"{name}: {found.rms_mm:.3g} mm RMS, noise {found.noise_mm:.2g} mm, {len(found.places)} places beyond it"
+            f"{name}: {found.rms_mm:.3g} mm RMS, noise {found.noise_mm:.2g} mm, {len(found.places)} places with a "
+            f"larger difference"
             for name, found in self.models.items()
         )
         return f"Comparison({'; '.join(words)})"

@@ -208,13 +208,15 @@ def diagnose(
     own = tuple(effects)
     for each in own:
         if not isinstance(each, Effect):
-            raise ArgumentError("effects", "be effects, as fingervision.effect makes them", f"holds {each!r}")
+            raise ArgumentError("effects", "be effects made by fingervision.effect", f"holds {each!r}")
     seed = whole_number("seed", seed, 0)
     with added(own):
         forced, without = effect_names("with_effects", with_effects), effect_names("without_effects", without_effects)
         if forced & without:
             both = ", ".join(sorted(forced & without))
-            raise ArgumentError("with_effects", "not hold what without_effects rules out", f"{both} is in both")
+            raise ArgumentError(
+                "with_effects", "not hold an effect that without_effects excludes", f"{both} is in both"
+            )
         table = measured_given(measured, columns)
         given = model_given(model, kind, columns)
         made = provenance({"measured table": table.path, "model": given.path}, call)

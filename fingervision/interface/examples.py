@@ -84,7 +84,7 @@ CASES = {
         "fingervision compare samples.csv --model comsol.csv --out results",
     ),
     "diagnose": Case(
-        "which effect a simulation lacks beside a measured table",
+        "which effect a simulation lacks in comparison with a measured table",
         {**PAPER_RUN, **PAPER, "corrected/model.toml": f"{OWN}examples/diagnose/model.toml"},
         "fingervision diagnose samples.csv --model comsol.csv --out results",
     ),
@@ -114,7 +114,7 @@ CASES = {
         "fingervision effects --effects ./mine.py",
     ),
     "table": Case(
-        "foreign tables, and what they are understood as",
+        "tables of other programs, and how they are interpreted",
         {
             **{name: f"{OWN}examples/table/{name}" for name in ("stage.lvm", "comsol.txt", "log.csv")},
             "table1.csv": "paper/table1.csv",
@@ -173,7 +173,7 @@ def copy_example(name: str, folder: Path) -> Case:
         raise UnknownNameError("name", name, CASES, "one of the examples", "`fingervision example` lists them")
     case = CASES[name]
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError(f"--out must be a new folder, but {folder} is there already: name another.")
+        raise UsageError(f"--out must be a new folder, but {folder} exists already: name another.")
     samples, package = sample_folder(), Path(fingervision.__file__).parent
     # Whole or not at all.
     part = folder.with_name(f".{folder.name}.part")

@@ -88,7 +88,7 @@ def _camera(source: Any, frames: int | None) -> Opener:
     try:
         if frames is None:
             raise ArgumentError(
-                "frames", "be given for a camera, which goes on for ever", "is not", "say how many frames to measure"
+                "frames", "be given for a camera, which has no last frame", "is not", "say how many frames to measure"
             )
         count = whole_number("frames", frames, 1)
         kept = KeptFrames(source.description, tuple(islice(iter(source), count)))

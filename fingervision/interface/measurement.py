@@ -154,7 +154,8 @@ class Measurement:
         measured = [each for each in outcomes if isinstance(each, GapMeasurement)]
         if not measured:
             raise UsageError(
-                "A budget needs at least one measured gap, but no frame has one: `counts` and `advice` tell why."
+                "A budget needs at least one measured gap, but no frame has one: `counts` and `advice` give the "
+                "reasons."
             )
         return gap_budget(measured, self._found.task.scale)
 

@@ -140,11 +140,13 @@ def range_of(frames: Any) -> tuple[tuple[int, int] | None, Any]:
         return None, frames
     if isinstance(frames, str) or not hasattr(frames, "__len__") or len(frames) != 2:
         raise ArgumentTypeError(
-            "frames", "be how many frames of a camera, or the first and the last of a recording", f"is {frames!r}"
+            "frames",
+            "be a number of frames (of a camera), or the first and the last frame (of a recording)",
+            f"is {frames!r}",
         )
     first, last = (whole_number("frames", value, 0) for value in frames)
     if first > last:
-        raise ArgumentError("frames", "rise from the first to the last", f"is ({first}, {last})")
+        raise ArgumentError("frames", "not have a first frame after the last one", f"is ({first}, {last})")
     return (first, last), None
 
 

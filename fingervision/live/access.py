@@ -9,13 +9,17 @@ from fingervision.live.guard import LOOPBACK_NAMES
 from fingervision.storage.plain_file import plain
 
 LEAST_LETTERS = 12
-"""Smallest length of a password; one guess per second is allowed (`guard.GUESS_COSTS_S`), so that guessing is
-hopeless."""
+"""Smallest number of characters of a password; as only one guess per second is allowed (`guard.GUESS_COSTS_S`), a
+password of this length cannot be guessed.
+"""
 PLAIN = (
-    "The page is served beyond this machine, over plain HTTP: who can listen to the network can read it, its token and "
-    "its password. Use it on a bench's own network alone, through an SSH tunnel, or with --tls-cert and --tls-key."
+    "Other computers can reach the page, over plain HTTP: whoever can listen to the network can read the page, its "
+    "token and its password. Use plain HTTP only on a separate network of the test bed or through an SSH tunnel, or "
+    "give --tls-cert and --tls-key."
 )
-ENCRYPTED = "The page is served beyond this machine, over TLS: whoever has the password and the address can look."
+ENCRYPTED = (
+    "Other computers can reach the page, over TLS: whoever has the address and the password can watch the live view."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,8 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
     Raises
     ------
     UsageError
-        Other machines could connect without a password, or only one of the certificate and its key is given for TLS.
+        Other computers could connect without a password, or a certificate is given without its key, or a key without
+        its certificate.
     DataError, InputFileError
         A file cannot be read, or the password is too short.
     """
@@ -67,13 +72,13 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
         raise UsageError("TLS needs both --tls-cert and --tls-key, but one is missing.")
     for file in (certificate, key):
         if file is not None and not file.is_file():
-            raise InputFileError(f"There is no file {file}: name the certificate and its key.")
+            raise InputFileError(f"There is no file {file}: give the files of the certificate and of its key.")
     if certificate is not None and key is not None:
         _check_pair(certificate, key)
     if password_file is None and host not in LOOPBACK_NAMES:
         raise UsageError(
-            f"--host {host} lets other machines connect, which needs a password: write one of at least {LEAST_LETTERS} "
-            "letters into a file and name it with --password-file."
+            f"--host {host} lets other computers connect, which needs a password: write a password of at least "
+            f"{LEAST_LETTERS} characters into a file, and name the file with --password-file."
         )
     return Access(host, port, "" if password_file is None else _password(password_file), certificate, key)
 
@@ -85,8 +90,8 @@ def _check_pair(certificate: Path, key: Path) -> None:
     except (ssl.SSLError, OSError, ValueError) as error:
         why = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
         raise InputFileError(
-            f"The certificate {certificate} and the key {key} must be PEM files that belong together, the key without "
-            f"a password, but cannot be used ({str(why).lower().replace('_', ' ')}): make a new pair."
+            f"The certificate {certificate} and the key {key} must be PEM files that belong together, and the key "
+            f"must have no password, but they cannot be used ({str(why).lower().replace('_', ' ')}): make a new pair."
         ) from error
 
 

@@ -8,7 +8,7 @@ from fingervision.domain.errors import DeviceError, FingervisionError, StateErro
 from fingervision.frames.controls import CameraControl, adjust, controls_of
 
 ANSWERED_WITHIN_S = 3.0
-"""Longest wait for a change, which is applied between frames; some cameras restart for another frame rate."""
+"""Longest wait until the camera has applied a change (s); some cameras restart when their frame rate is changed."""
 
 
 @dataclass(slots=True, eq=False)
@@ -22,11 +22,11 @@ class _Wanted:
 
 
 class Adjustments:
-    """Requested changes of camera settings: any thread may request, the reading thread applies them between frames."""
+    """Changes of camera settings that any thread may request and the reading thread applies between two frames."""
 
     def __init__(self) -> None:
         self.controls: tuple[CameraControl, ...] = ()
-        """What may be set, as it was read last."""
+        """Settings that can be changed, with the values that were read last."""
         self._chosen: dict[str, float] = {}
         self._wanted: SimpleQueue[_Wanted] = SimpleQueue()
         self._lock = Lock()
@@ -37,11 +37,11 @@ class Adjustments:
         Raises
         ------
         DeviceError
-            The camera refuses, or sends no frame any more.
+            The camera refuses the value, or sends no more frames.
         StateError
-            The source has nothing that can be set.
+            The source has no settings that can be changed.
         UsageError
-            It has no such control, or no such value.
+            The source has no setting of this name, or the setting does not accept the value.
         """
         if not self.controls:
             raise StateError("This source has no settings that can be changed while it runs.")
@@ -51,7 +51,9 @@ class Adjustments:
             with self._lock:
                 if not wanted.done.is_set():
                     wanted.is_void = True
-                    raise DeviceError(f"The camera does not answer, so its {name} was not changed: is it plugged in?")
+                    raise DeviceError(
+                        f"The camera does not answer, so that its {name} was not changed: is the camera plugged in?"
+                    )
         if wanted.failure is not None:
             raise wanted.failure
         assert wanted.found is not None  # noqa: S101 - what is done has a result or a failure

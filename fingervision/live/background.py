@@ -9,11 +9,14 @@ from pathlib import Path
 from fingervision.domain.errors import ProcessError
 
 LOWEST = 19
-"""Niceness of what runs beside a camera: it gets what nobody else wants."""
+"""Niceness of a command that runs beside a camera: the command gets only processor time that no other program needs."""
 WAITED_FOR = 5
-"""Niceness of what somebody waits for while no camera runs: a third of what a busy program beside it gets. At the
-lowest, which is a seventieth, a recording of a second was not measured within two minutes at a load of 24."""
-# Threads of the live view ask to be served first, and a process begins with the priority of the thread that starts it.
+"""Niceness of a command whose result a user awaits while no camera runs. Such a command gets a third of the processor
+time that a busy program gets. At `LOWEST`, a seventieth of it, a recording of one second was not measured within two
+minutes at a load of 24.
+"""
+# Threads of the live view have a raised priority (see `promptness`), which a process inherits from the thread that
+# starts it.
 BEGIN = (
     "import os, sys\n"
     "if hasattr(os, 'setpriority'):\n"
@@ -23,7 +26,7 @@ BEGIN = (
     "main()\n"
 )
 ENDS_WITHIN_S = 5.0
-# Libraries that compute would each take all cores.
+# Without these limits, the numerical libraries would use all cores.
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
@@ -56,11 +59,13 @@ class BackgroundCommand:
                     stdout=out,
                     stderr=error_stream,
                     env={**os.environ, **ONE_THREAD, "PYTHONPATH": paths},
-                    # Ctrl-C in the terminal is the live view's, which ends this one.
+                    # Ctrl-C in the terminal must reach only the live view, which then ends this process.
                     start_new_session=True,
                 )
         except OSError as error:
-            raise ProcessError(f"No process could be started ({error.strerror}): close other programs.") from error
+            raise ProcessError(
+                f"A process for a fingervision command could not be started ({error.strerror}): close other programs."
+            ) from error
 
     @property
     def exit_code(self) -> int | None:

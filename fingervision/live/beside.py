@@ -60,7 +60,8 @@ def stand_beside(session: Session, beside: Beside) -> None:
         session.features |= {"bed": bench, "allow_motion": beside.allow_motion}
         bench.say = session.say
         if model is None and bench.bed.model is not None:
-            # What the bed's gripper should do, without what is hidden in it: as beside a run's table.
+            # Prediction for the bed's gripper without the hidden effects, in the same form as the file beside a run's
+            # table.
             make_out_folder(session.out)
             model = session.out / SIMULATION
             write_expected(model, bench.bed.model, bench.bed.limits)

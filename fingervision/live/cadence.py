@@ -6,19 +6,22 @@ from math import fsum, sqrt
 from statistics import median
 from threading import RLock
 
-# Rate and jitter are those of so many frames.
+# Number of the most recent frames from which rate and jitter are computed.
 FRAMES_LOOKED_AT = 100
-# Late frames are missing frames only if those after them are late too: a network holds frames up and then hurries.
+# A delay is counted as missing frames only if this many consecutive frames are late: a network may delay a few frames
+# and then deliver them in quick succession.
 FRAMES_UNTIL_SURE = 5
-# Later than this share of a period, for good, and a frame is missing.
+# A frame is missing if the following frames are permanently later than this share of a period.
 LATE_SHARE = 0.75
 FRAMES_TO_KNOW_THE_PERIOD = 10
-# Frames that follow sooner than this share of a period were held up and hurry; nothing is judged by them.
+# A frame that follows its predecessor within this share of a period was delayed; missing frames are not judged by it.
 HURRY_SHARE = 0.5
-# The period is the median over strides of so many frames, among so many: what holds frames up, and what is missing,
-# then weighs little. The mean of usual steps would be too short where many frames are a little late.
+# The period is the median duration of strides of 25 frames, among the last 250 frames, divided by 25. Delayed and
+# missing frames then have little influence; the mean of the shorter intervals would be biased where many frames are
+# slightly late.
 FRAMES_A_STRIDE, FRAMES_FOR_THE_PERIOD = 25, 250
-# Of the lateness that is no missing frame, so much is taken over: the period is never quite right, and would add up.
+# Share of a lateness without missing frames by which the expected times are corrected. The period has a small error,
+# which would otherwise accumulate.
 FORGIVEN_SHARE = 0.02
 
 
@@ -56,7 +59,7 @@ class Cadence:
             return
         self._due_s = time_s if self._due_s is None else self._due_s + period_s
         if time_s < self._due_s:
-            # Earlier than it could be: frames that were counted as missing were only held up.
+            # The frame is earlier than expected: frames that were counted as missing were only delayed.
             self.missing = max(0, self.missing - round((self._due_s - time_s) / period_s))
             self._due_s = time_s
             self._lateness_s.clear()
@@ -100,7 +103,7 @@ class Cadence:
         steps = [after - before for before, after in pairwise(self._last_hundred())]
         if len(steps) < 2:
             return None
-        # Asked for with every picture: `statistics.pstdev`, which is exact, takes a millisecond.
+        # This is computed for every picture; the exact `statistics.pstdev` would take a millisecond.
         mean_s = fsum(steps) / len(steps)
         return sqrt(fsum((step - mean_s) ** 2 for step in steps) / len(steps))
 

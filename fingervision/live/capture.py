@@ -13,10 +13,10 @@ from fingervision.live.adjustments import Adjustments
 from fingervision.live.promptness import be_prompt
 from fingervision.live.timeline import Timeline
 
-# Frames that may wait while something else holds the processor up: four seconds at 25 frames a second. What comes on
-# top is lost and counted.
+# Largest number of frames that wait for the measurement while the processor is busy: four seconds at 25 frames per
+# second. Further frames are lost and counted.
 FRAMES_WAITING = 100
-# How long to wait before a source that was cut off is opened again.
+# Time between attempts to open an interrupted source again.
 AGAIN_AFTER_S = 0.3
 
 Open = Callable[[], LiveSource]
@@ -82,7 +82,7 @@ class Capture:
         self._thread = Thread(target=self._read, name="capture", daemon=True)
 
     def start(self) -> None:
-        """Begin to read frames although none is used yet, because queued frames would arrive late and all at once."""
+        """Begin to read and discard frames, because frames that queue up in a camera would arrive late."""
         if self._again is not None:
             self._thread.start()
 
@@ -123,17 +123,17 @@ class Capture:
                 why = "The source ended."
             except FingervisionError as error:
                 why = str(error)
-            except Exception as error:  # a driver's fault must not end the live view silently
+            except Exception as error:  # an error in a driver must not end the live view without a message
                 why = f"The source failed ({type(error).__name__}: {error})."
             if self._again is None:
                 self._put(Happening("failed", why))
                 self._put(Ended())
                 return
-            self._put(Happening("interrupted", f"{why} Waiting for it to come back."))
+            self._put(Happening("interrupted", f"{why} The live view waits until the source is back."))
             if not self._reopened():
                 return
             self._timeline.cut()
-            self._put(Happening("resumed", "The source is back; the gap in the data is a gap."))
+            self._put(Happening("resumed", "The source is back; the data lack the frames of the interruption."))
 
     def _reopened(self) -> bool:
         assert self._again is not None  # noqa: S101 - only called where it can be opened again
@@ -151,12 +151,12 @@ class Capture:
                     self._put(Happening("camera", words))
                 if source.description.camera != before:
                     notes = "".join(f" {note}" for note in source.description.notes[-1:])
-                    self._put(Happening("camera", f"The camera is set otherwise now.{notes}"))
+                    self._put(Happening("camera", f"The camera has come back with other settings.{notes}"))
                 return True
             source.close()
             words = (
                 f"The source came back with {found[0]}x{found[1]} pixels, but had {size_px[0]}x{size_px[1]}: "
-                "set it as before, or start again."
+                "set the camera as before, or start the live view again."
             )
             if words != said:
                 said = words
@@ -169,7 +169,10 @@ class Capture:
             time_s, jump_s = self._timeline.at(item.time_s, received.arrived_s)
             if jump_s:
                 self._put(
-                    Happening("time_jumped", f"The source's clock jumped by {jump_s:+.3f} s; the host's joins it.")
+                    Happening(
+                        "time_jumped",
+                        f"The source's clock jumped by {jump_s:+.3f} s; the computer's clock bridges the jump.",
+                    )
                 )
         else:
             time_s = None

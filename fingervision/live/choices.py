@@ -13,7 +13,7 @@ from fingervision.measuring.task import Task
 
 MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
 """Settings whose change invalidates the zero."""
-ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region or direction."
+ZERO_IS_OFF = "The zero was removed, because it was set with another scale, height, region or direction of the tips."
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,8 @@ class Choices:
         Raises
         ------
         UsageError
-            The region lies outside the frame, or the height is not positive.
+            The region lies outside the frame, the height is not positive, or the lower limit is not below the upper
+            limit.
         DataError
             The scale is for other frames.
         """
@@ -104,7 +105,7 @@ class Choices:
         limits = (self.least_mm, self.greatest_mm)
         if None not in limits and self.least_mm >= self.greatest_mm:  # type: ignore[operator]
             raise UsageError(
-                f"The lower limit must be below the upper one, but they are {self.least_mm:g} and "
+                f"The lower limit must be below the upper limit, but the limits are {self.least_mm:g} and "
                 f"{self.greatest_mm:g} mm."
             )
         return replace(self, scale=scale)

@@ -8,13 +8,13 @@ import numpy as np
 from fingervision.domain.frame import Frame
 from fingervision.vision.grey import full_scale, to_grey
 
-# Every so manieth pixel along both axes tells enough.
+# Every eighth pixel along both axes is sufficient.
 STEP_PX = 8
-# A white background is the usual set-up; a picture of which so much is white shows no fingers.
+# A white background is usual, but a picture of which a larger share is white shows no fingers.
 WHITE_SHARE = 0.99
-# Below this share of full scale the brightest pixels leave little contrast.
+# If the 99th percentile of the grey levels is below this share of full scale, the contrast is low.
 DARK_SHARE, BRIGHTEST_PERCENT = 0.25, 99.0
-# The brightest parts are the ground: it must not change by more over so many frames.
+# The brightest parts are the background; it may change by at most this share of full scale over 50 frames.
 CHANGE_SHARE, FRAMES_LOOKED_AT = 0.05, 50
 
 
@@ -38,6 +38,6 @@ class Exposure:
         elif ground < DARK_SHARE:
             self.words = "The picture is too dark: raise the exposure or the light."
         elif max(self._ground) - min(self._ground) > CHANGE_SHARE:
-            self.words = "The light is changing: switch off automatic exposure, or shield the bench."
+            self.words = "The light is changing: switch off automatic exposure, or shield the set-up from other light."
         else:
             self.words = ""

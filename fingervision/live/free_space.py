@@ -3,7 +3,7 @@
 import shutil
 from pathlib import Path
 
-# The first frames' sizes say little, and the file is buffered.
+# Shorter or smaller recordings give no data rate: the first frames differ in size, and the file is buffered.
 LEAST_S, LEAST_BYTES = 2.0, 1_000_000
 
 

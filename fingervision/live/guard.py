@@ -16,7 +16,7 @@ from starlette.websockets import WebSocketClose
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 EVERYWHERE = frozenset({"0.0.0.0", "::"})
-# The page itself, its script, style and sockets come from here; nothing else is loaded, sent to, or framed.
+# The browser loads scripts and styles from this server only, connects to this server only, and refuses frames.
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -30,7 +30,7 @@ HEADERS: Mapping[str, str] = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-# Script, style and licence are the program's own and the same for everybody.
+# The files under this path (script, style, licence) contain no data of the user, so that they need no token.
 PUBLIC_PATH = "/page/"
 POLICY_VIOLATION, UNAUTHORISED = 1008, 401
 WRITER, VIEWER = "writer", "viewer"
@@ -73,7 +73,8 @@ class Guard:
             return
         refused = self._refusal(scope)
         if refused is not None and refused[0] == UNAUTHORISED:
-            # One guess a second, whoever guesses; who has the password does not wait.
+            # Wrong passwords are answered one per second, for all clients together; a right password is answered at
+            # once.
             async with self._guess:
                 await asyncio.sleep(GUESS_COSTS_S)
         if refused is None:
@@ -87,26 +88,32 @@ class Guard:
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         headers = Headers(scope=scope)
         if not self._is_ours(headers.get("host", "")):
-            return 400, "The Host must be the address of this live view."
+            return (
+                400,
+                "The header Host must be the address of this live view: open the address that the terminal shows.",
+            )
         origin = headers.get("origin")
         if origin is None and scope["type"] == "websocket":
-            return 403, "The Origin must be this live view's page, but is missing."
+            return 403, "The header Origin must be the address of this live view, but is missing."
         if origin is not None and origin != f"{self._scheme}://{headers.get('host', '')}":
-            return 403, "The Origin must be this live view's page."
+            return (
+                403,
+                "The header Origin must be the address of this live view: open the address that the terminal shows.",
+            )
         if self._password and not is_password(headers.get("authorization", ""), self._password):
-            return UNAUTHORISED, "The password is asked for: any name will do."
+            return UNAUTHORISED, "This live view needs its password: enter the password with any user name."
         if scope["type"] == "http" and scope["path"].startswith(PUBLIC_PATH):
             return None
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
-        # Each is compared, so that the time tells nothing of which was nearly right.
+        # All tokens are compared, so that the response time does not depend on which token matches.
         roles = [role for token, role in self._tokens.items() if hmac.compare_digest(given.encode(), token.encode())]
         if not roles:
-            return 403, "The address must hold the token: open the one that the terminal shows."
+            return 403, "The address must contain the token: open the address that the terminal shows."
         scope["role"] = roles[0]
         return None
 
     def _is_ours(self, stated: str) -> bool:
-        # Browsers leave out the port of http, 80, and of https, 443.
+        # Browsers leave out the default ports: 80 of http, and 443 of https.
         usual = 443 if self._scheme == "https" else 80
         full = f"{stated}:{usual}" if self._port == usual and not stated.endswith(f":{usual}") else stated
         name, _, port = full.rpartition(":")

@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-# A browser asks as soon as it is connected; so many may be about to from one address, and for so long.
+# Limits for connections without a request, from one address: their number, and their duration. A browser sends its
+# first request as soon as it is connected.
 HALF_OPEN_AT_ONCE, ASKS_WITHIN_S = 16, 5.0
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import GapRow
 
-# Ten minutes at 25 frames a second.
+# Number of rows: ten minutes at 25 frames per second.
 ROWS_KEPT = 15_000
 STATUSES = tuple(Status)
-# frame, time_s, status and thirteen numbers; behind them input and force.
+# Columns of a row: frame, time_s, status and thirteen numbers; two further columns hold input and force.
 COLUMNS_KEPT = 16
 
 
@@ -27,7 +27,7 @@ class History:
     """
 
     def __init__(self, kept: int = ROWS_KEPT) -> None:
-        # Filled, so that its memory is taken now and not while it fills. NaN is an empty cell, in memory alone.
+        # Filling the array makes the operating system allocate its memory now. NaN represents an empty cell, only here.
         self._cells = np.full((kept, COLUMNS_KEPT + 2), np.nan)
         self.count = 0
         self._lock = Lock()

@@ -19,8 +19,9 @@ from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 
 FRAMES_KEPT = 16
-"""Number of frames whose readings are kept; pages only need the newest picture, and this number covers half a second at
-25 frames per second."""
+"""Number of frames whose readings are stored: half a second at 25 frames per second, as a page only needs the readings
+of the newest picture.
+"""
 FRAMES_COUNTED = 100
 """Number of the most recent frames among which those measured without gauges are counted for the page."""
 
@@ -51,7 +52,7 @@ class LiveGauges:
 
     @property
     def first(self) -> int | None:
-        """Number of the frame in which gauges are drawn; in a live source, any frame."""
+        """Number of the frame in which gauges are drawn: the displayed frame, as a live source admits any frame."""
         seen = self._session.seen
         return None if seen is None else seen.frame.index
 
@@ -64,8 +65,8 @@ class LiveGauges:
             return self._failure
         if left_out := sum(self._left_out):
             return (
-                f"{left_out} of the last {len(self._left_out)} frames were measured without the gauges: measuring lags "
-                "behind the source."
+                f"{left_out} of the last {len(self._left_out)} frames were measured without the gauges, because the "
+                "measurement is slower than the source."
             )
         return ""
 
@@ -95,7 +96,7 @@ class LiveGauges:
         version, gauges = self._board.snapshot()
         tables = {table["name"]: dict(table) for table in self._board.tables}
         if task.scale is not self._scale:
-            # A patch counts from its first frame: what was counted in another scale begins anew.
+            # A patch gauge measures from its first frame; after a change of scale every gauge starts again.
             self._scale, self._followers = task.scale, {}
         kept = self._followers
         self._followers = {
@@ -127,7 +128,7 @@ def put_live_gauges(session: Session, path: Path, *, is_asked_for: bool = False)
     Raises
     ------
     DataError, InputFileError
-        The file exists and cannot be meant for these frames.
+        The file exists but cannot be read, or its gauges do not fit these frames.
     """
     description = session.description
     board = GaugeBoard(path, (description.width_px, description.height_px))

@@ -6,9 +6,9 @@ from queue import Empty, Full, Queue
 from threading import Event, Thread
 from typing import TextIO
 
-# Ten minutes at 25 frames a second; what comes on top is left out and counted.
+# Largest number of queued lines: ten minutes at 25 frames per second. Further lines are left out and counted.
 LINES_WAITING = 15_000
-# How long a reader may take at the end for what waits.
+# Longest time that a reader may take at the end for the queued lines.
 PATIENCE_S = 2.0
 
 
@@ -26,7 +26,7 @@ class Outlet:
     def __init__(self, stream: TextIO | None, waiting: int = LINES_WAITING) -> None:
         self.left_out = 0
         self.broken = stream is None
-        """Whether nobody reads any more."""
+        """Whether the stream is closed, so that text cannot be printed any more."""
         self._stream = stream
         self._waiting: Queue[str] = Queue(waiting)
         self._ending = Event()

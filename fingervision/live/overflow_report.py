@@ -29,4 +29,6 @@ class OverflowReport:
         if lost > self._told and now_s - self._told_at_s >= SAID_EVERY_S:
             self._told_at_s = now_s
             more, self._told = lost - self._told, lost
-            self._tell("overflowed", f"{more} frames came faster than they could be measured, and are lost.")
+            self._tell(
+                "overflowed", f"{more} frames are lost, because they arrived faster than they could be measured."
+            )

@@ -23,13 +23,13 @@ from fingervision.live.view import View
 
 MESSAGES_A_SECOND, MOST_DIGITS = 120, 12
 TRY_AGAIN_LATER = 1013
-# The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
+# Shortest time between two pictures, as a screen needs it; longest time between two states without a new picture.
 PREVIEW_EVERY_S, STATE_EVERY_S = 0.03, 0.2
-# When measuring or the disk lags, a picture now and then must do.
+# Time between two pictures while the measurement or the disk is too slow.
 PREVIEW_IN_A_HURRY_EVERY_S = 0.5
-# A page that does not acknowledge is gone.
+# The connection of a page that does not acknowledge a state within this time is closed.
 ACKNOWLEDGED_WITHIN_S = 20.0
-ONLY_LOOKS = "This address only looks: whoever started the live view has the one that works it."
+ONLY_LOOKS = "With this address you can only watch: ask whoever started the live view for the address that controls it."
 TAKE_OVER = "take_over"
 
 
@@ -76,9 +76,13 @@ class PageSocket:
         failed = next((error for task in done if (error := task.exception()) is not None), None)
         if failed is not None and not isinstance(failed, WebSocketDisconnect):
             silent = isinstance(failed, TimeoutError)
-            why = "The page did not answer." if silent else f"Sending failed ({type(failed).__name__})."
+            why = (
+                "The browser page did not acknowledge the last picture."
+                if silent
+                else f"Sending failed ({type(failed).__name__})."
+            )
             if not silent:
-                self._view.say("page", f"{why} The page connects again.")
+                self._view.say("page", f"{why} The browser page connects again.")
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
                 await page.close(TRY_AGAIN_LATER, why)
 
@@ -99,7 +103,7 @@ class PageSocket:
             if picture is not None:
                 pictured_s = monotonic()
             what = (view, known, picture, self._about())
-            # To go to another thread and back takes longer than a short message.
+            # A short message is composed here, because changing to another thread and back would take longer.
             following = message(*what) if is_short(view, known) else await asyncio.to_thread(message, *what)
             known = following.known
             shown = seen
@@ -115,7 +119,9 @@ class PageSocket:
             while True:
                 text = await self._page.receive_text()
                 if len(received_s) == MESSAGES_A_SECOND and monotonic() - received_s[0] < 1.0:
-                    await self._page.close(POLICY_VIOLATION, f"At most {MESSAGES_A_SECOND} messages a second.")
+                    await self._page.close(
+                        POLICY_VIOLATION, f"A page may send at most {MESSAGES_A_SECOND} messages per second."
+                    )
                     return
                 received_s.append(monotonic())
                 request = request_of(text)
@@ -129,7 +135,7 @@ class PageSocket:
             raise StateError(ONLY_LOOKS)
         if takes_over:
             self._pen.take(self)
-            self._view.say("pen", "Another page works the live view from now on.")
+            self._view.say("pen", "Another browser page controls the live view from now on.")
         self._pen.write(self)
 
     async def _answer(self, request: dict[str, Any]) -> dict[str, Any]:

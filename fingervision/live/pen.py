@@ -2,7 +2,7 @@
 
 from fingervision.domain.errors import StateError
 
-HELD = "Another page works this live view: press Take over to work it here."
+HELD = "Another browser page controls this live view: press Take over to control it from here."
 
 
 class Pen:

@@ -6,7 +6,7 @@ from fingervision.live.frame_measurement import Seen
 from fingervision.live.preview import draw_beforehand
 from fingervision.live.view import View
 
-# How often the view is looked at while any page waits: a picture comes so much later at most.
+# Time between two checks for a new picture, which is also the largest delay of a picture.
 LOOK_EVERY_S = 0.01
 
 

@@ -19,13 +19,13 @@ from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import draw_overlay
 
 JPEG_QUALITY = 85
-# Pages that look at the same picture ask within this time of one another; the next picture comes no sooner.
+# Time for which a composed state is used again: all pages that show the same picture ask within this time.
 STATE_FOR_S = 0.02
-# A page gets at most so many rows in one message.
+# Largest number of rows in one message.
 ROWS_AT_ONCE = 3000
-# So many rows are put into words within a millisecond.
+# Number of rows that can be converted to text within a millisecond.
 ROWS_IN_A_MOMENT = 100
-_NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured yet.")
+_NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known, so that nothing is measured yet.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
 def _picture(seen: Seen) -> bytes:
     """The picture with the measured points; the page itself shows frame number and value as text."""
     drawn = draw_overlay(seen.frame, _NOTHING if seen.outcome is None else seen.outcome, "")
-    # OpenCV would want blue first: to turn a whole picture's colours round takes twice as long as to code it.
+    # OpenCV would need the order blue, green, red, and reordering the colours takes twice as long as the encoding.
     return bytes(simplejpeg.encode_jpeg(drawn, JPEG_QUALITY, "RGB", "420"))
 
 

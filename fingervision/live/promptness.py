@@ -4,10 +4,11 @@ import os
 import sys
 from contextlib import suppress
 
-# While one thread runs Python, others that have come back from compiled code wait for it so long. Measuring comes back
-# many times a frame, so Python's usual 5 ms add up to several frames when the page is drawn meanwhile.
+# Longest time that a thread waits for Python's global interpreter lock when it returns from compiled code. The
+# measurement returns many times per frame, so that Python's default of 5 ms would add up to several frames while a page
+# is drawn.
 SWITCH_S = 0.0005
-# Before what people run on a desk; the system's own work stays before it.
+# Higher priority than that of a user's programs, but lower than that of the system's processes.
 NICENESS = -10
 
 
@@ -20,4 +21,4 @@ def be_prompt() -> None:
     """
     sys.setswitchinterval(SWITCH_S)
     with suppress(AttributeError, OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)  # on Linux that is this thread
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)  # on Linux, process 0 means the calling thread

@@ -9,11 +9,12 @@ from fingervision.live.free_space import minutes_left
 from fingervision.live.promptness import be_prompt
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 
-# Frames that may wait for the disk: ten seconds at 25 frames a second. The recording ends rather than wait for more.
+# Largest number of frames that wait for the disk: ten seconds at 25 frames per second. The recording ends if more
+# frames would have to wait.
 FRAMES_WAITING = 250
-# From here on the preview gives way.
+# With more waiting frames than this number, the preview is slowed down.
 FRAMES_UNTIL_HURRY = 12
-# How long the disk may take for what waits when the recording is stopped.
+# Longest time that the disk may take for the waiting frames after the recording is stopped.
 PATIENCE_S = 30.0
 DISK_EVERY_S = 1.0
 
@@ -71,8 +72,8 @@ class Recorder:
 
     def _too_slow(self) -> str:
         return (
-            f"The disk of {self.run.path} is too slow for this camera, so recording ended; what was recorded until "
-            "then is valid: name a folder on another disk with --out."
+            f"The disk of {self.run.path} is too slow for this camera, so that recording ended; the frames recorded "
+            f"before are valid: name a folder on another disk with --out."
         )
 
     def _look_at_the_disk(self) -> None:

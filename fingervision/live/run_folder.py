@@ -105,7 +105,7 @@ class RunFolder:
             raise failure
 
     def _finish(self) -> None:
-        # Without a frame there is no video.
+        # A run without frames has no video.
         there = (self.path / VIDEO).exists()
         self._about["sha256"] = {VIDEO: self._files.sha256(VIDEO)} if there else {}
         self._about["frames"] = self.frames

@@ -97,14 +97,14 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
     Raises
     ------
     DeviceError
-        Nothing could be measured to the end.
+        The source ended without a frame, and there is no browser page.
     FingervisionError
         The scale is for other frames, or the port is in use.
     """
     try:
         session = Session(capture, choices, out)
         stand_beside(session, beside or Beside())
-        # Before the camera runs: a port in use is said at once.
+        # The port is bound before the camera is started, so that a port in use is reported at once.
         page = Page(session, bound(showing.way.host, showing.way.port), showing.way) if showing.page else None
     except FingervisionError:
         capture.source.close()
@@ -146,9 +146,12 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
         broken = out_there.broken
         out_there.close()
         if out_there.left_out:
-            session.say("left_out", f"{out_there.left_out} lines were not printed: the reader was too slow.")
+            session.say(
+                "left_out",
+                f"{out_there.left_out} lines were not printed, because the reader of standard output was too slow.",
+            )
         elif broken:
-            session.say("unread", "Nobody reads standard output any more: the live view has ended.")
+            session.say("unread", "Standard output was closed by the reading program: the live view has ended.")
         said.close()
     if page is None and not session.history.count and session.ended.is_set():
         raise DeviceError(f"{session.description.name} gave no frame: check the source.")
@@ -159,9 +162,10 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
 
 def _announce(page: Page, outlet: Outlet, *, browser: bool) -> None:
     outlet.put(f"The live view is at {page.address}  (Ctrl-C ends it)\n")
-    outlet.put(f"For those who only look: {page.viewer_address}\n")
+    outlet.put(f"Address for viewers, who cannot change anything: {page.viewer_address}\n")
     if browser and is_terminal(sys.stdout):
-        # Everybody on this machine sees what stands on a command line: the browser gets a file of this user's alone.
+        # Every user of this computer can read command lines, so that the browser is given a file which only this user
+        # can read.
         webbrowser.open(page.door().as_uri())
 
 

@@ -31,7 +31,7 @@ from fingervision.live.view import View
 from fingervision.storage.out_folder import out_folder
 
 MESSAGE_BYTES = 4096
-# Looking on costs a share of a core each; connections are those of pages, and of files that are fetched meanwhile.
+# Largest number of browser pages, each of which takes a share of a core, and of connections, which also fetch files.
 PAGES_AT_ONCE, CONNECTIONS_AT_ONCE = 32, 128
 DOOR = ".live_page.html"
 
@@ -52,14 +52,14 @@ def bound(host: str, port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind(address)
-        listening.listen()  # the address is told before the server is quite up: who comes early waits
+        listening.listen()  # the address is shown before the server runs; early connections wait in the backlog
     except OSError as error:
         listening.close()
         if error.errno == errno.EADDRNOTAVAIL:
             raise UsageError(f"--host must be an address of this machine, but is {host}.") from error
         raise ProcessError(
-            f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may run there; end "
-            "it, or choose another port with --port (0 takes any free one)."
+            f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may use this "
+            f"port; end that live view, or choose another port with --port (0 takes any free one)."
         ) from error
     return listening
 
@@ -79,7 +79,7 @@ class Page:
 
     def __init__(self, view: View, listening: socket.socket, way: Access | None = None) -> None:
         way = way or Access()
-        # What commands need is loaded now, and not while pictures come: loading holds all threads up.
+        # Modules of the requests are loaded now, because loading during the measurement would delay all threads.
         modules()
         self._view, self._listening = view, listening
         self._sockets: set[PageSocket] = set()
@@ -168,8 +168,10 @@ class Page:
 
     async def _socket(self, page: WebSocket) -> None:
         if len(self._sockets) >= PAGES_AT_ONCE:
-            await page.accept()  # a socket that was never open cannot say why it closes
-            await page.close(TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} pages may look at once: close one.")
+            await page.accept()  # the reason for closing can only be sent after the connection is accepted
+            await page.close(
+                TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} browser pages may be open at once: close a page."
+            )
             return
         socket_of_page = PageSocket(page, self._view, self._watch, self._pen, self._steps)
         self._sockets.add(socket_of_page)

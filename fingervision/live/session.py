@@ -29,9 +29,9 @@ from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.gaps_csv import GapRow
 
-# Without a frame for so long, or for so many periods, the source is silent.
+# The source counts as silent after this time without a frame, or after this number of frame periods if that is longer.
 SILENT_S, SILENT_PERIODS = 0.5, 5.0
-# With more frames than this waiting for the measurement, it is late by one, and the preview gives way.
+# With more waiting frames than this number, the measurement is too slow, and the preview is slowed down.
 FRAMES_UNTIL_HURRY = 1
 
 
@@ -70,16 +70,16 @@ class Session:
         self.ended = Event()
         self.on_row: list[RowListener] = []
         self.on_picture: list[PictureListener] = []
-        """Told of every frame before it is shown, in the measuring thread: what is measured besides the gap."""
+        """Functions that the measuring thread calls with every frame, to measure more than the gap."""
         self.driven_at: DrivenAt = lambda time_s: None
-        """Who knows the gripper's input at a time of this view, where the source does not."""
+        """Function that returns the gripper's input at a time of this view, if the source gives no input."""
         self._measurement = FrameMeasurement((self.description.width_px, self.description.height_px))
         self._frame_at_s = monotonic()
         self._interrupted, self._run = False, ""
         self._recorder: Recorder | None = None
         self._beginning = False
         self.trouble = ""
-        """What went wrong and stays so until the user does something; shown where the eye is."""
+        """Fault that remains until the user acts; the page shows it prominently."""
         self._overflow = OverflowReport(capture, self.say)
         self._lock = Lock()
         self._stopped = Event()
@@ -125,7 +125,7 @@ class Session:
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row that is sent to a newly opened browser page: the row of two minutes ago."""
+        """Number of the first row that is sent to a newly opened browser page, about two minutes old."""
         return max(self.oldest_row, self.history.count - ROWS_SHOWN)
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
@@ -188,7 +188,7 @@ class Session:
                 raise StateError("These images have no times, which a recording needs: give --rate-hz.")
             self._beginning = True
         try:
-            # Not while measuring waits: a slow disk would hold it up.
+            # The folder is made without the lock, because a slow disk would otherwise delay the measurement.
             run = RunFolder(self.out, self.capture.source.description, task, self.capture.source.template)
             self._recorder = Recorder(run)
             self.trouble = ""
@@ -239,7 +239,7 @@ class Session:
         try:
             self._measure_all()
         except Exception as error:
-            # A fault of ours must be seen by whoever looks, not end in a picture that stands still.
+            # The user must see a programming error, and not merely a picture that no longer changes.
             self.trouble = "Measuring has failed: start the live view again."
             self.say("failed", f"Measuring failed ({type(error).__name__}: {error}): start the live view again.")
             self.ended.set()
@@ -269,7 +269,7 @@ class Session:
             item, outcome, row = self._measurement.measured(came, self.choices)
             driven = arrival.driven or self.driven_at(came.time_s)
             if driven is not None and driven.run != self._run:
-                # Between two runs of a bed nobody looks: that is no drop.
+                # The test bed takes no frames between two runs; this interruption is not counted as missing frames.
                 self._run = driven.run
                 self.cadence.restart()
             if row is not None and driven is not None:

@@ -12,7 +12,7 @@ from fingervision.inspection.sample import take_sample
 from fingervision.live.promptness import be_prompt
 from fingervision.live.view import View
 
-# As long as `inspect` looks at a camera, and enough frames to average noise and see vibration.
+# Duration as in the command `inspect` for a camera; enough frames to average noise and to detect vibration.
 LOOKS_FOR_S, MOST_FRAMES, FEWEST_FRAMES = 3.0, 40, 5
 LOOK_EVERY_S = 0.005
 
@@ -33,11 +33,9 @@ class SetUp:
 
     def __init__(self, view: View) -> None:
         if view.choices.task is None:
-            raise StateError(
-                "The set-up is judged by errors in micrometres, which need the scale: give the scale first."
-            )
+            raise StateError("An inspection states errors in micrometres, which needs the scale: give the scale first.")
         self.findings: list[dict[str, Any]] | None = None
-        self.words = "Looking at the picture for three seconds."
+        self.words = "Frames are collected for three seconds."
         self._view = view
         self._thread = Thread(target=self._look, name="set-up", daemon=True)
         self._thread.start()
@@ -48,27 +46,32 @@ class SetUp:
         return self._thread.is_alive()
 
     def _look(self) -> None:
-        # Not behind the others (see `promptness`): who holds Python and does not get the processor holds all up.
+        # This thread needs the same priority as the others, because a waiting thread that holds Python's interpreter
+        # lock delays all threads (see `promptness`).
         be_prompt()
         try:
             frames = self._frames()
             task = self._view.choices.task
             if task is None or len(frames) < FEWEST_FRAMES:
-                self.words = f"Only {len(frames)} pictures came in {LOOKS_FOR_S:g} s: check the camera or stream first."
+                self.words = (
+                    f"Only {len(frames)} frames arrived in {LOOKS_FOR_S:g} s: check the camera or stream first."
+                )
                 return
-            self.words = f"Judging {len(frames)} pictures."
+            self.words = f"{len(frames)} frames are being inspected."
             settings, _ = task.settings_for(self._view.description.files)
             sample = take_sample(frames, self._view.description, settings, task.scale)
             report = as_json(sample, inspect(sample))
         except FingervisionError as error:
             self.words = str(error)
             return
-        except Exception as error:  # a fault of ours must not look like a set-up without faults
-            self.words = f"The set-up could not be judged ({type(error).__name__}: {error})."
+        except Exception as error:  # a programming error must not look like a set-up without faults
+            self.words = f"The set-up could not be inspected ({type(error).__name__}: {error})."
             return
         self.findings = report["findings"]
         self.words = (
-            f"{len(frames)} frames: nothing to mend." if report["nothing_to_mend"] else f"{len(frames)} frames judged."
+            f"{len(frames)} frames inspected: nothing has to be changed."
+            if report["nothing_to_mend"]
+            else f"{len(frames)} frames inspected."
         )
 
     def _frames(self) -> list[Frame]:

@@ -9,7 +9,7 @@ from fingervision.live.outlet import Outlet
 from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 
-# In place on a terminal, line by line elsewhere.
+# Time between two lines: on a terminal, where the line is overwritten, and elsewhere.
 EVERY_S, EVERY_S_ELSEWHERE = 0.1, 1.0
 CLEARED = "\r\x1b[2K"
 DRIVE_COLUMNS = ("run", "input_mm", "force_n")
@@ -78,5 +78,5 @@ class StatusLine:
 
 def told(message: Message, outlet: Outlet, *, in_place: bool) -> None:
     """Print a message of the live measurement on the terminal."""
-    # What stands in place, and the ^C of whoever ends it, gives way.
+    # The message overwrites the status line, and the ^C that a terminal shows.
     outlet.put(f"{CLEARED if in_place else ''}fingervision: {message.words}\n")

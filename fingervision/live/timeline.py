@@ -2,7 +2,7 @@
 
 from fingervision.storage.recorded_video import TICKS_PER_S
 
-# A source whose clock runs ahead of the host's by so much in one step has jumped.
+# If the source's clock gains this time on the computer's clock between two frames, the source's clock has jumped.
 JUMP_S = 1.0
 
 
@@ -18,7 +18,8 @@ class Timeline:
     def __init__(self, started_s: float) -> None:
         self._started_s = started_s
         self._offset_s: float | None = None
-        self._last: tuple[float, float, float] | None = None  # on the source's clock, on the host's, as given
+        # Times of the last frame: on the source's clock, on the computer's clock, and as returned.
+        self._last: tuple[float, float, float] | None = None
 
     def cut(self) -> None:
         """Record an interruption of the source, after which the source's clock may start again."""
@@ -48,7 +49,7 @@ class Timeline:
         if self._offset_s is None:
             begins_s = arrived_s - self._started_s
             if self._last is not None:
-                # Never back: after a jump the host's clock says how much time has passed.
+                # Times never decrease; after a jump, the computer's clock determines how much time has passed.
                 begins_s = max(begins_s, self._last[2] + 1.0 / TICKS_PER_S)
             self._offset_s = begins_s - source_s
         time_s = round((source_s + self._offset_s) * TICKS_PER_S) / TICKS_PER_S

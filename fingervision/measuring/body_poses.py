@@ -46,8 +46,9 @@ error counts as significant. Printed parts are off by 0.2 % (mechanics.md, secti
 % the scale or the drawing is wrong."""
 BODIES, GAPS = "bodies.csv", "gaps.csv"
 LAID_BY_ALL = (
-    "no fixed body is in view: the drawing was laid by all bodies together, so that poses count from their mean place "
-    "in the first frame and not from the ground; only their motion and the angles of hinges mean something."
+    "no fixed body is in view: the drawing was placed by all bodies together, so that poses are relative to the mean "
+    "of the bodies in the first frame and not to the ground. Only the motion of the bodies and the angles of hinges "
+    "are meaningful."
 )
 
 
@@ -190,14 +191,18 @@ class BodyTracker:
                 "the scale and the lengths of the drawing."
             )
         self._shared = replace(self._shared, size_error=abs(error))
-        self.placed = replace(self.placed, notes=(*self.placed.notes, f"{words}; u of the poses holds it."))
+        self.placed = replace(
+            self.placed,
+            notes=(*self.placed.notes, f"{words}; the uncertainty u of the poses includes this difference."),
+        )
 
     def _note_shadows(self, names: Sequence[str], index: int) -> None:
         if self.placed is None or not names:
             return
         words = (
-            f"on frame {index} one side of {' and of '.join(names)} is blurred otherwise than the others: a shadow or "
-            "glare may lie along it, or the body moved; u of the poses holds it, and even light takes it away."
+            f"on frame {index} one side of {' and of '.join(names)} is blurred differently from the others, by a "
+            f"shadow, by glare, or because the body moved. The uncertainty u of the poses includes this difference; "
+            f"even light removes it."
         )
         self.placed = replace(self.placed, notes=(*self.placed.notes, words))
 

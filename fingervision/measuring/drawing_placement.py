@@ -189,8 +189,8 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     # A symmetric drawing: its front is towards the camera, turned as little as may be.
     chosen = min((top, *others), key=lambda entry: (entry[1].is_mirrored, abs(_wrapped(entry[1].angle_rad))))
     note = (
-        "the drawing is symmetric and lies on the picture in more than one way; its front was taken to be towards the "
-        "camera and turned as little as possible: --at for three points says otherwise."
+        "the drawing is symmetric and fits the picture in more than one way. The fit with the front towards the "
+        "camera and the smallest rotation was chosen; give --at for three points to choose another."
     )
     return Placed(chosen[1], chosen[2], (note,))
 

@@ -78,7 +78,7 @@ def draw_gap_axes(
             lower.plot(*_thinned(where[piece], expanded_um[piece]), ".-", color=GAP_COLOUR, linewidth=0.8, markersize=1)
         upper.legend(loc="best", framealpha=0.8, fontsize="small")
     else:
-        upper.text(0.5, 0.5, "no frame gave a number", ha="center", va="center", transform=upper.transAxes)
+        upper.text(0.5, 0.5, "no frame could be measured", ha="center", va="center", transform=upper.transAxes)
     if where_not.size:
         marks = where_not[:: max(1, where_not.size // MOST_POINTS)]
         upper.plot(

@@ -64,6 +64,6 @@ def undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[bool], whe
         return DataError(
             f"No frame lies within the drive's times ({task.drive.time_s[0]:g} to {task.drive.time_s[-1]:g} s, shifted "
             f"by {task.drive_offset_s:g} s), so no row has an input; the gaps are {where}. Give another "
-            "--drive-offset-s, or leave it out to have it found from the motion."
+            "--drive-offset-s, or leave this option out, so that the offset is found from the motion."
         )
     return None

@@ -28,10 +28,10 @@ FEWEST_CORNERS, LEAST_STEP = 2, 0.08
 REACH_PX, REACH_HEIGHTS, ASIDE_PX, BEYOND_TIP_PX = 45.0, 1.5, 64.0, 16.0
 
 WORDS = (
-    "Its picture holds squares that are not in the one before and do not move with the fingers: the recording is "
-    "damaged there."
+    "The picture of the frame contains squares that the picture before does not contain and that do not move with the "
+    "fingers: the recording is damaged there."
 )
-WORDS_BEHIND = "It is coded as a difference to a frame whose picture is damaged."
+WORDS_BEHIND = "The frame is coded as a difference from a frame whose picture is damaged."
 
 Points = NDArray[np.float64]
 

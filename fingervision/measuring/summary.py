@@ -26,28 +26,28 @@ LOSSLESS_ADVICE = (
     "pixel to pixel and frame to frame. Record losslessly (FFV1 or raw) where the last hundredth of a pixel counts."
 )
 NO_LIMITS = (
-    "The calibration {name} has no limits (its key budget.limits): a distance of the fingers from the plane of the "
-    "reference, a tilt, the lens and the temperature count as zero in u_gap_mm. Calibrate with "
+    "The calibration {name} has no limits (its key budget.limits): u_gap_mm therefore includes no uncertainty for the "
+    "distance of the fingers from the plane of the reference, tilt, lens and temperature. Calibrate with "
     "`fingervision calibrate`, or add the limits of the set-up."
 )
 # What stands beside an edge or has moved it: what it means, and what takes it away.
 BESIDE = {
-    "wall": "the side wall of a thick part stands beside the edge: which edge is measured is stated by --face; "
-    "what cannot be told apart is in u_shift_px. A longer lens, light from behind or a mask over the wall "
-    "removes it.",
-    "shadow": "a soft shadow lies beside the edges; it is taken off, and what is not sure of it is in u_shift_px. "
-    "Light from behind, or from both sides, removes it.",
-    "glare": "a bright line lies along the edges; it is taken off, and what it may be instead (a bevel) is in "
-    "u_shift_px. Diffuse light, or light from behind, removes it.",
-    "motion": "the fingers move while the shutter is open; what that may do at round tips is in u_shift_px. A "
-    "shorter exposure removes it.",
-    "sharpening": "the camera sharpens its pictures; what that moves the edges by is taken off, and what is not sure "
-    "of it is in u_shift_px. Switch sharpening off in the camera's settings.",
-    "roughness": "the edges stray from a mean line more than their noise (rough, printed, textured, or by a lossy "
-    "codec): the mean line is measured, with the scatter in the uncertainty. A rough finger's contact is made by its "
-    "crests, farther out.",
-    "interlaced": "even and odd rows were seen at two times (interlaced): the gap is that of the middle. Record "
-    "progressive pictures.",
+    "wall": "the side wall of a thick finger is visible beside the edge: --face states which edge is measured, and "
+    "u_shift_px includes what remains undecided. A longer lens, light from behind or a mask over the wall removes "
+    "this uncertainty.",
+    "shadow": "a soft shadow lies beside the edges; the edges are corrected for it, and u_shift_px includes the "
+    "uncertainty of the correction. Light from behind, or from both sides, removes the shadow.",
+    "glare": "a bright line lies along the edges; the edges are corrected for glare, and u_shift_px includes the "
+    "difference if the line is a bevel. Diffuse light, or light from behind, removes the line.",
+    "motion": "the fingers move while the shutter is open; u_shift_px includes the possible shift at round tips. A "
+    "shorter exposure removes this shift.",
+    "sharpening": "the camera sharpens its pictures; the edges are corrected for it, and u_shift_px includes the "
+    "uncertainty of the correction. Switch sharpening off in the camera's settings.",
+    "roughness": "the edges deviate from a mean line by more than their noise (by roughness, print, texture or a "
+    "lossy codec): the mean line is measured, and the uncertainty includes the deviations. A rough finger touches "
+    "a part with its crests, which lie outside the mean line.",
+    "interlaced": "even and odd rows were exposed at two times (interlaced video): the gap is that at the mean of the "
+    "two times. Record progressive pictures.",
 }
 BYTES_AT_ONCE = 1 << 20
 LEAST_BITS_A_PIXEL = 0.05
@@ -148,7 +148,7 @@ def _about_unseen(description: Description, series: GapSeries) -> list[str]:
     return [
         f"In {count} of {series.frames} frames no fingers with straight edges were found, and the recording holds "
         f"{bits:.2g} bit a pixel ({description.codec}): compression to less than {LEAST_BITS_A_PIXEL:g} smears edges "
-        "until they are none. Record at a higher bit rate, or losslessly, before you change light, focus or region."
+        f"beyond recognition. Record at a higher bit rate, or losslessly, before you change light, focus or region."
     ]
 
 
@@ -159,8 +159,9 @@ def _about_fingers(series: GapSeries) -> list[str]:
     counts = " and ".join(f"{tone} in {count}" for tone, count in series.votes.most_common())
     taken = "dark" if series.votes["dark"] >= series.votes["light"] else "light"
     return [
-        f"The first frames disagree about what the fingers are: {counts} of them. All were measured with {taken} "
-        "fingers: look at both with --steps, and state --fingers dark or --fingers light."
+        f"The first frames do not agree whether the fingers are dark or light: {counts} of these frames. All frames "
+        f"were measured with {taken} fingers: look at the pictures of --steps, and state --fingers dark or --fingers "
+        f"light."
     ]
 
 
@@ -210,29 +211,29 @@ def _scale(scale: Scale, file: Path | None) -> dict[str, Any]:
 
 def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
     response = (
-        f"the camera's response, taken as {settings.get('response', 'linear')} and not measured: what another one "
-        "would change, as far as the calibration does not share it (u_shift_px holds all of it)"
+        f"the camera's response, taken as {settings.get('response', 'linear')} and not measured: the change by "
+        f"another usual response, less the part that the calibration compensates (u_shift_px holds the whole change)"
     )
     is_assumed = not settings.get("response_known", True)
     random = (
-        "u_random_mm and u_gap_px: what changes from frame to frame - noise at both edges, both tips through the slope "
-        "of the edges, what the edge model leaves unexplained, compression"
+        "u_random_mm and u_gap_px: the part that changes from frame to frame, caused by noise at both edges, by the "
+        "tips where the edges are sloped, by deviations from the edge model, and by compression"
     )
     never = [
         "movement during the exposure",
         "change of the set-up since the calibration (focus, camera, light)",
-        "a finger's outline that is not the edge seen from above (thickness, burr)",
+        "the difference between a finger's outline and its edge seen from above (thickness, burr)",
     ]
     if not isinstance(scale, Calibration):
         return {
             "coverage_factor": COVERAGE_FACTOR,
-            "expanded": "U = k u_random_mm with k = 2; it holds the random part alone.",
+            "expanded": "U = k u_random_mm with k = 2; it includes only the random part.",
             "covers": [random],
             "not_included": [
-                f"everything of the scale: {scale.px_per_mm:g} px/mm was stated without an uncertainty, "
-                "so u_gap_mm is empty; calibrate to know it",
+                f"the uncertainty of the scale: {scale.px_per_mm:g} px/mm was stated without an uncertainty, so that "
+                f"u_gap_mm is empty; calibrate, or state --u-px-per-mm",
                 "edge bias (blooming), lens distortion, tilt, distance from the plane of the scale, temperature",
-                "bright rims, walls and shadows beside the edges, and light beyond the end of the scale",
+                "bright rims, walls and shadows beside the edges, and light beyond full scale",
                 *([response] if is_assumed else []),
                 *never,
             ],
@@ -246,14 +247,14 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
             f"unknown edge bias within +-{scale.limits.edge_bias_px:g} px"
             if is_stated(scale)
             else "scale and edge bias with their covariance, from the calibration",
-            "what the edges show of a bright rim, a wall or a shadow, or of light just beyond the end of the scale",
+            "a bright rim, a wall or a shadow that the edges show, or light just beyond full scale",
             *([response] if is_assumed else []),
             *(
                 f"{words}: {scale.how_stated(name, unit)}"
                 for name, words, unit in (
                     ("plane_mm", "distance of the fingers from the calibration plane", "mm"),
                     ("tilt_deg", "tilt of the plane", "degrees"),
-                    ("lens_relative", "lens distortion left over, relative", ""),
+                    ("lens_relative", "residual lens distortion, relative", ""),
                     ("temperature_k", "temperature", "K"),
                 )
                 if hasattr(scale.limits, name)

@@ -29,8 +29,8 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
             )
         else:
             lines.append(
-                f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; the scale was "
-                "stated without an uncertainty, which is not in it."
+                f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; it does not "
+                f"include the uncertainty of the scale, which was not stated."
             )
         lines += _assumed_response(summary, series)
     return [*lines, *summary["advice"]]
@@ -47,9 +47,9 @@ def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str
     if moved_mm <= COVERAGE_FACTOR * u_mm:
         return []
     return [
-        f"The camera's response is not known and was taken as {settings['response']}; another usual one would move the "
-        f"gap by {1e3 * moved_mm:.1f} µm (median), which is not in U: state it with --response, or measure it with "
-        "`fingervision calibrate response`."
+        f"The camera's response is not known and was taken as {settings['response']}; another usual response would "
+        f"change the gap by {1e3 * moved_mm:.1f} µm (median), which is not in U: state the response with --response, "
+        f"or measure it with `fingervision calibrate response`."
     ]
 
 
@@ -59,14 +59,14 @@ def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
     of = f"{frames} frame{'' if frames == 1 else 's'}"
     if not gap["count"]:
         counts = ", ".join(f"{count} {status.value}" for status, count in series.counts.most_common())
-        return f"no number in {of}: {counts}" if counts else "no frame"
+        return f"no gap in {of}: {counts}" if counts else "no frame"
     least, greatest = gap["least_mm"], gap["greatest_mm"]
     values = f"gap {least:.4f} mm" if gap["count"] == 1 else f"gap {least:.4f} to {greatest:.4f} mm"
     u_mm, only = gap["median_u_gap_mm"], ""
     if u_mm is None:
         u_mm, only = gap["median_u_random_mm"], ", from frame to frame alone"
     median = "" if gap["count"] == 1 else ", median"
-    found = of if gap["count"] == frames else f"{gap['count']} of {of} with a number"
+    found = of if gap["count"] == frames else f"{gap['count']} of {of} with a gap"
     bad = series.counts[Status.DAMAGED]
     damage = f", {bad} damaged" if bad else ""
     return f"{values}, U = {COVERAGE_FACTOR * 1e3 * u_mm:.2f} µm (k = 2{median}{only}), {found}{damage}"

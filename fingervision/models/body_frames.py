@@ -1,4 +1,4 @@
-"""Coordinate frames by which a meshed body is condensed: each stands for the motion of a cut or of a face."""
+"""Coordinate frames to which a meshed body is condensed: each frame has the motion of a cut or of a face."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _LEVER = 1e-6
-"""Lever arms across a tied component that are shorter than this share of the face's extent do not prevent rotation."""
+"""Lever arms shorter than this share of the face's extent do not prevent rotation (measured across a tied
+component)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,8 +118,8 @@ def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], tak
     nodes : ndarray of int
         Nodes of the face, all of one body.
     tied : sequence of str
-        Components (x, y or both) in which every node follows the frame; in the remaining component only the nodes' mean
-        does.
+        Components (x, y or both) in which every node follows the frame; in the remaining component, only the mean
+        motion of the nodes follows the frame.
     taken : set of int
         Unknowns that are already tied to another face; the unknowns of this face are added to the set.
 

@@ -1,6 +1,6 @@
 """Damping of the gripper's vibrations: four damping laws.
 
-These are a constant modal ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko & Havlik (2015).
+The laws are a constant modal ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko & Havlik (2015).
 
 PA12 at room temperature has a loss factor tan d = 0.03 to 0.08, so that zeta = tan d / 2 is about 0.025; static results
 do not depend on damping.
@@ -44,7 +44,7 @@ class LossFactor:
 
 @dataclass(frozen=True, slots=True)
 class RayleighDamping:
-    """Rayleigh damping C = a M + b K, fitted to equal ratios at two frequencies; lower between them, higher beyond.
+    """Rayleigh damping C = a M + b K: equal ratios at two frequencies, lower ratios between them, higher ones outside.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ class PaperDamping:
 
     The equation is an illustrative example of a theory (S. Adhikari, J. Sound Vib. 293 (2006) 156), not a material law.
     It adds powers of w that have different units, so that its result would depend on the unit of time; frequencies are
-    therefore taken relative to w0. Below w0 the damping would be negative, and above a few w0 more than critical. Hence
-    w0 must not exceed the lowest mode, the result is multiplied by one factor gamma, and ratios outside (0, 0.3) are
-    refused.
+    therefore taken relative to w0. Below w0 the damping would be negative, and above a few times w0 it would be more
+    than critical. Hence w0 must not exceed the lowest mode, the result is multiplied by one factor gamma, and ratios
+    outside (0, 0.3) are refused.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class PaperDamping:
 
 
 def paper_rate(w: float) -> float:
-    """Equation (4) for one mode: 2 zeta w of the dimensionless frequency w, term by term.
+    """Equation (4) for one mode: 2 zeta w as a function of the dimensionless frequency w, with zeta the damping ratio.
 
     exp(-w^4 / 2) sinh((4/3) ln(w) / w^2) + w^(3/2) cos^2(1 / w^2) atan(w / pi); for one mode, the last argument
     sqrt(M^-1 K) / pi of the paper becomes w / pi.

@@ -19,7 +19,7 @@ _DENSE_BELOW = 400
 
 
 def factorised(matrix: csr_matrix) -> SuperLU:
-    """Factorise a symmetric matrix with a suitable ordering and pivoting, a sixth faster than SuperLU's default."""
+    """Factorise a symmetric matrix with an ordering and pivoting that is a sixth faster than SuperLU's default."""
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
@@ -207,7 +207,8 @@ class DrivenBody:
     def _modes_among(self, free: Indices, count: int) -> tuple[Array, Array]:
         stiffness, mass = self.stiffness_n_mm[free][:, free], self.mass_t[free][:, free]
         if free.size < _DENSE_BELOW:
-            # The reciprocal problem: lumped masses may be zero, the stiffness is positive definite.
+            # Solve the reciprocal eigenvalue problem: lumped masses may be zero, whereas the stiffness is positive
+            # definite.
             reciprocal = (free.size - count, free.size - 1)
             inverse, kept = eigh(mass.toarray(), stiffness.toarray(), subset_by_index=reciprocal)
             squared, kept = 1.0 / inverse, kept / np.sqrt(inverse)

@@ -15,7 +15,8 @@ INPUTS = ("input_mm", "input", "u_in", "u", "position", "displacement", "stroke"
 GAPS = ("gap_mm", "gap", "opening", "y", "out", "output")
 OTHERS = ("left_mm", "right_mm", "force_n")
 FINER = 4
-"""Co-simulation steps between two given times: the FMU holds its input, read at the middle of the step, over a step."""
+"""Number of co-simulation steps between two given times. The FMU keeps its input constant during a step, at the value
+in the middle of the step."""
 MOST_STEPS = 200_000
 LONGEST_STEP_S = 0.01
 """Longest co-simulation step, however far apart the given times are: a vibration at 10 Hz is then still sampled ten
@@ -50,7 +51,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
             "is an FMU, which is read by the library FMPy: install that with `pip install fingervision[fmu]`."
         ) from None
     if not path.is_file():
-        raise ValueError("must be a file, but is not there.")
+        raise ValueError("must be a file, but does not exist.")
     try:
         description = read_model_description(str(path))
         platforms = supported_platforms(str(path))

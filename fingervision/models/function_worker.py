@@ -44,7 +44,7 @@ def _python_function(path: Path) -> Function:
     try:
         spec.loader.exec_module(module)
     except FileNotFoundError:
-        raise ValueError("must be a file, but is not there.") from None
+        raise ValueError("must be a file, but does not exist.") from None
     except (Exception, SystemExit) as error:
         raise ValueError(f"could not be loaded: {type(error).__name__}: {error}") from error
     simulate = getattr(module, "simulate", None)

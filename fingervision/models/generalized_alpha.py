@@ -100,7 +100,7 @@ def integrate(
             if left <= _SETTLED * scale or scale == 0.0:
                 break
             if solver is None or left > _SLOW * before:
-                # One factorisation serves as long as the residual falls well by it.
+                # Use one factorisation for as long as the residual falls quickly.
                 effective = (
                     (1.0 - alpha_m) / (beta * step_s**2) * mass
                     + (1.0 - alpha_f) * gamma / (beta * step_s) * damping

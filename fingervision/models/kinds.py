@@ -102,7 +102,7 @@ def by_trust(names: Iterable[str]) -> list[str]:
 
 
 def trust(kind: str) -> int:
-    """Rank by which a kind of model is trusted: the larger, the more of the drawing's outline the kind represents."""
+    """Rank by which a kind of model is trusted: a kind with a larger rank represents more of the drawing's outline."""
     return int(getattr(REGISTRY.get(kind).value, "TRUST", 0)) if kind in kinds() else 0
 
 

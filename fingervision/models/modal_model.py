@@ -77,7 +77,7 @@ class ModalModel:
         return self.rad_s / (2.0 * pi)
 
     def with_modes(self, count: int) -> "ModalModel":
-        """Keep the first modes only; the contribution of the others then follows the drive without delay."""
+        """Keep the first modes only; the contribution of the remaining modes then follows the drive without delay."""
         observed = {name: replace(seen, by_mode=seen.by_mode[:count]) for name, seen in self.observed.items()}
         return replace(self, rad_s=self.rad_s[:count], participation=self.participation[:count], observed=observed)
 

@@ -24,8 +24,8 @@ MODES = 8
 """Number of modes with the drive held. The ninth mode of the published sample is at 9.6 kHz and has a tenth of a per
 cent of the moving mass."""
 _MOST_STEPS, _MOST_UNKNOWNS = 20_000, 400
-"""Most time steps and unknowns that are integrated step by step: these take at most half a minute, and are those of a
-frame of bars."""
+"""Largest number of time steps, and of unknowns, for an integration step by step: it then takes at most half a minute,
+and only frames of bars have so few unknowns."""
 _FAST = 0.05
 """Largest vibration that still counts as small beside the motion that deforms the shape, as a share of the gap's
 travel."""
@@ -123,7 +123,9 @@ def gripper_motion(
     apart = np.ones_like(force, dtype=bool) if onset_mm is None else drive.input_mm > onset_mm
     motion = about_equilibria(small, static, force, apart)
     return GripperMotion(
-        motion, f"equilibria, and about them {small.modes_hz.size} modes at rest where the fingers do not touch"
+        motion,
+        f"equilibria, with {small.modes_hz.size} modes of the gripper at rest superposed where the fingers do not "
+        "touch",
     )
 
 

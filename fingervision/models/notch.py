@@ -73,7 +73,8 @@ class Notch:
         Each piece contributes the same amount to the mean of two fractions: that of the bending compliance (the
         integral of 1 / h^3) and that of the length.
         """
-        # x = a tan-like spacing near the neck: the bending part is sqrt(t R) long, and must be sampled finely.
+        # Space the points by a sinh, closest at the neck: the part that bends is sqrt(t R) long and must be sampled
+        # finely.
         fine = np.sinh(np.linspace(0.0, np.arcsinh(20.0 * self.reach_mm / self._bending_mm), _FINE))
         x = self.reach_mm * fine / fine[-1]
         middle = 0.5 * (x[1:] + x[:-1])

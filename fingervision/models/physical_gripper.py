@@ -67,7 +67,9 @@ class PhysicalGripper:
     def laws(self) -> Mapping[str, PhysicalLaw]:
         """Laws of the catalogue's effects that this drawing determines, by the name of the effect."""
         body = getattr(self._model, "half", None)
-        if not isinstance(body, DrivenBody):  # a model of small displacements alone: the frame of the same members
+        if not isinstance(
+            body, DrivenBody
+        ):  # for a model limited to small displacements, take a frame of the same members
             body = half_frame(self.gripper, skeleton_of(self.gripper, self.theory, 0))
         length_mm = self.gripper.lever.l2_mm
         lever = ratio_curves(

@@ -1,8 +1,8 @@
 """Render scenes as frames with known true geometry: the outline before blurring, accurate to 0.001 px.
 
-The names below suffice for most purposes; README.md explains how scenes are rendered and why the result is exact.
-Compression (`jpeg`, `clip`) and calibration objects (`targets`) are imported separately; the compression modules need
-OpenCV and PyAV.
+The names that this module exports suffice for most purposes; the README.md of this package explains how scenes are
+rendered and why the result is exact. Compression (`jpeg`, `clip`) and calibration objects (`targets`) are imported
+separately; the compression modules need OpenCV and PyAV.
 """
 
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera

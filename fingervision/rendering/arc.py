@@ -41,7 +41,8 @@ class Arc:
     @property
     def box_px(self) -> tuple[float, float, float, float]:
         """Bounding box of the arc: smallest x, smallest y, largest x, largest y."""
-        # Besides its ends, an arc is outermost where it crosses an axis through its centre.
+        # The outermost points of an arc are its ends, or points where it crosses a horizontal or vertical line through
+        # its centre.
         quarters = sorted((self.start_rad / (pi / 2), (self.start_rad + self.sweep_rad) / (pi / 2)))
         passed = [quarter * pi / 2 for quarter in range(ceil(quarters[0]), floor(quarters[1]) + 1)]
         x = [self.start[0], self.end[0]] + [self.x_px + self.radius_px * cos(angle) for angle in passed]
@@ -66,17 +67,17 @@ class Arc:
         return Arc(self.x_px, self.y_px, self.radius_px, start, (t1 - t0) * self.sweep_rad)
 
     def backwards(self) -> "Arc":
-        """Return the same piece with its direction reversed."""
+        """Return the arc with its direction reversed."""
         return Arc(self.x_px, self.y_px, self.radius_px, self.start_rad + self.sweep_rad, -self.sweep_rad)
 
     def moved(self, motion: Motion) -> "Arc":
-        """Return the piece after a rigid motion."""
+        """Return the arc after a rigid motion."""
         x, y = motion.place(self.x_px, self.y_px)
         first_x, first_y = motion.place(*self.start)
         sweep = -self.sweep_rad if motion.mirrors else self.sweep_rad
         return Arc(x, y, self.radius_px, atan2(first_y - y, first_x - x), sweep)
 
     def grown(self, by_px: float) -> "Arc":
-        """Offset the piece parallel to itself by `by_px` outwards."""
+        """Offset the arc parallel to itself by `by_px`, towards the outside of the outline."""
         outwards = 1.0 if self.sweep_rad >= 0.0 else -1.0
         return Arc(self.x_px, self.y_px, self.radius_px + outwards * by_px, self.start_rad, self.sweep_rad)

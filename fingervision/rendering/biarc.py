@@ -2,8 +2,8 @@
 
 Every rendered outline thus consists of lines and arcs, even an ellipse or the image of a line through a lens, so that
 parallel curves, intersections and areas have closed forms. Source: K. M. Bolton, Biarc curves, Computer-Aided Design
-7(2), 1975. The deviation from the curve is proportional to the third power of the spacing of the points and to the rate
-of change of the curvature.
+7(2), 1975. The approximation error is proportional to the third power of the spacing of the points, and to the rate of
+change of the curvature.
 """
 
 from itertools import pairwise
@@ -14,7 +14,8 @@ from fingervision.rendering.line import Line
 from fingervision.rendering.outline import Piece
 from fingervision.rendering.plane import Points
 
-# An arc that bulges less than this over its chord is a line: its centre would lie too far away to be computed with.
+# An arc that deviates less than this from its chord becomes a line, because its centre would be too far away for the
+# precision of the computation.
 STRAIGHT_PX = 2e-8
 
 
@@ -37,7 +38,7 @@ def biarcs(points: Points, tangents: Points) -> tuple[Piece, ...]:
         size = hypot(tx, ty)
         knots.append((x, y, tx / size, ty / size))
     for (x0, y0, tx0, ty0), (x1, y1, tx1, ty1) in pairwise(knots):
-        # Both handles have the length d that makes the tangents meet in the joint:
+        # The tangents of the two ends meet in the joint if each is followed over the length d, which solves
         # |chord|^2 - 2 d chord . (t0 + t1) - 2 d^2 (1 - t0 . t1) = 0.
         chord_x, chord_y = x1 - x0, y1 - y0
         a = 2 * (1 - (tx0 * tx1 + ty0 * ty1))

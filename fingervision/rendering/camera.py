@@ -7,7 +7,7 @@ from fingervision.domain.errors import DataError
 from fingervision.rendering.lens import RadialLens, Tilt, View
 from fingervision.rendering.outline import Outline
 
-# Below this blur the panels of the line integral become many; a real lens on real pixels has at least three times it.
+# A smaller blur would need very many panels of the line integral; real cameras have at least three times this blur.
 LEAST_BLUR_PX = 0.1
 
 
@@ -39,7 +39,7 @@ class Camera:
     Raises
     ------
     FingervisionError
-        If a blur, noise or bit depth is not possible for a camera.
+        If blur, noise, edge bias, bit depth or tint has an impossible value.
     """
 
     blur_px: float = 0.9

@@ -14,9 +14,9 @@ from av.video.reformatter import ColorRange
 from fingervision.domain.errors import DataError, OutputError
 from fingervision.domain.frame import Frame, Pixels
 
-# MPEG's clock. MP4 and QuickTime keep it to the tick; Matroska rounds every time to 1 ms.
+# Clock of MPEG. MP4 and QuickTime files store times to one tick of this clock; Matroska rounds times to 1 ms.
 CLOCK_HZ = 90_000
-# What the muxers must be told: MP4 rounds the start of a clip to its movie's own clock, 1 ms if nothing is said.
+# Options of the muxers. Without `movie_timescale`, MP4 would round the start of a clip to 1 ms.
 CONTAINERS = {
     ".mp4": {"fflags": "+bitexact", "movie_timescale": str(CLOCK_HZ)},
     ".mov": {"fflags": "+bitexact", "movie_timescale": str(CLOCK_HZ)},
@@ -103,7 +103,8 @@ def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], c
     pixel_format = _pixel_format(first.pixels, codec)
     match codec:
         case H264(crf=crf):
-            # The same frames shall give the same bytes; x264's lookahead else depends on the memory's layout.
+            # Equal frames must give equal bytes; without these options, the result of x264's look-ahead may vary
+            # between runs.
             options = {"crf": f"{crf:g}", "threads": "1", "x264-params": "threads=1:cpu-independent=1"}
             stream = container.add_stream("libx264", options=options)
         case Mjpeg(qscale=qscale):
@@ -119,7 +120,8 @@ def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], c
         tick = _tick(frame, last_tick)
         if frame.pixels.shape != first.pixels.shape or frame.pixels.dtype != first.pixels.dtype:
             msg = (
-                f"All frames of a clip must be alike, but frame {frame.index} is {frame.pixels.shape} of "
+                f"All frames of a clip must have the same shape and type, but frame {frame.index} is "
+                f"{frame.pixels.shape} of "
                 f"{frame.pixels.dtype} and the first {first.pixels.shape} of {first.pixels.dtype}."
             )
             raise DataError(msg)

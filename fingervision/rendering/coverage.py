@@ -24,14 +24,15 @@ from fingervision.rendering.line import Line
 from fingervision.rendering.outline import Outline
 from fingervision.rendering.plane import Points
 
-# Nodes of one panel and its length in sigma: together good to 1e-7 of full coverage (tests/rendering/test_coverage.py).
+# Number of nodes of a panel, and its length in sigma; the error is 1e-7 of full coverage
+# (tests/rendering/test_coverage.py).
 NODES = 12
 PANEL_SIGMAS = 6.0
-# The Gaussian's tail beyond this many sigma holds 6e-7.
+# The two tails of the Gaussian beyond this number of sigma have a probability of 6e-7.
 REACH_SIGMAS = 5.0
-# A panel whose extent across the columns is below this adds nothing.
+# A panel whose width along x is below this value has no effect on the integral.
 LEAST_WEIGHT_PX = 1e-12
-# An arc is cut so that no panel turns further than this.
+# Arcs are divided so that the direction changes by at most this angle within a panel.
 PANEL_TURN_RAD = 0.8
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(NODES)
@@ -126,14 +127,15 @@ def coverage(outlines: Sequence[Outline], blur_px: float, window: Region) -> NDA
     first = np.floor(low - reach).astype(int)
     columns, rows = (np.ceil((high - low).max(axis=0) + 2 * reach).astype(int) + 2).tolist()
 
-    # Positions of the pixels' edges about each node; differences of the primitives are integrals over pixels.
+    # Positions of the pixel borders relative to each node; differences of antiderivatives are integrals over pixels.
     x = first[:, None, :1] + np.arange(columns + 1) - 0.5 - nodes[..., :1]
     y = first[:, None, 1:] + np.arange(rows + 2) - 1.5 - nodes[..., 1:]
     kernel_x = np.diff(_gaussian_step(x, blur_px), axis=-1)
     kernel_y = np.diff(_gaussian_ramp(y, blur_px), n=2, axis=-1)
     patch = np.matmul(np.swapaxes(kernel_y, 1, 2), kernel_x * weight[..., None])
 
-    # Above the window everything adds to the first row; below it and beside it, to a border that is cut off.
+    # Contributions from above the window are added to its first row; those from below or beside it go to a border that
+    # is removed.
     row = np.clip(first[:, 1:] + np.arange(rows), 0, height)
     column = np.clip(first[:, :1] + np.arange(columns), -1, width) + 1
     index = row[:, :, None] * (width + 2) + column[:, None, :]

@@ -26,8 +26,7 @@ def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -
     Returns
     -------
     tuple of Outline
-        Closed outlines; a loop whose direction is opposite to that of the largest loop is a hole, and has the direction
-        of one.
+        Closed outlines; a loop whose direction is opposite to that of the largest loop becomes a hole.
 
     Raises
     ------
@@ -46,17 +45,20 @@ def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -
             end = int(edges[1, place])
             if end not in following:
                 x, y = nodes_px[:, end]
-                msg = f"The edges of an outline must close, but end at ({x:g}, {y:g}) px: give all of them."
+                msg = (
+                    f"The edges of an outline must form closed loops, but a loop ends at ({x:g}, {y:g}) px: give "
+                    "all edges."
+                )
                 raise DataError(msg)
             place = following[end]
         if place != first:
-            msg = "The edges of an outline must close without touching themselves, but do not."
+            msg = "The edges of an outline must form closed loops that do not touch themselves, but one loop does."
             raise DataError(msg)
         loops.append(tuple(corners))
     areas = [_area_px2(loop) for loop in loops]
     solid = np.sign(max(areas, key=abs, default=1.0))
     outlines = (polygon(loop) for loop in loops)
-    # A polygon runs one way however its corners are given; what runs against the largest loop is a hole.
+    # `polygon` always returns a solid; a loop whose direction is opposite to that of the largest loop is a hole.
     return tuple(
         outline if np.sign(area) == solid else outline.backwards()
         for outline, area in zip(outlines, areas, strict=True)
@@ -73,7 +75,8 @@ def _chords(
 ) -> list[tuple[float, float]]:
     """Points on the parabola through three points, without its last point."""
     bend = start + end - 2.0 * middle
-    # A parabola lies an eighth of its second difference beside each of n chords, over n squared.
+    # Largest distance between the parabola and n equal chords: an eighth of its second derivative, 4 `bend`, divided by
+    # n squared.
     count = int(np.clip(np.ceil(np.sqrt(0.5 * float(np.hypot(*bend)) / SAGITTA_PX)), 1, MOST_CHORDS))
     t = np.arange(count) / count
     x, y = np.outer(start, (1 - t) * (1 - 2 * t)) + np.outer(middle, 4 * t * (1 - t)) + np.outer(end, t * (2 * t - 1))

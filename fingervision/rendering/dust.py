@@ -9,7 +9,7 @@ from fingervision.rendering.plane import Motion
 from fingervision.rendering.polygon import polygon
 from fingervision.rendering.scene import Patch
 
-# A grain is up to this much longer than wide.
+# Largest ratio of length to width of a grain.
 LONGEST_RATIO = 2.0
 
 
@@ -47,7 +47,10 @@ def dust(
         If a size is not positive, or there is no level to choose from.
     """
     if not (count >= 0 and 0.0 < size_px[0] <= size_px[1] and levels):
-        msg = f"Grains must have a number, a size and a level, but these are {count}, {size_px} px and {levels}."
+        msg = (
+            "The number of grains must be at least 0, their sizes positive, and their grey levels at least one, "
+            f"but they are {count}, {size_px} px and {levels}."
+        )
         raise DataError(msg)
     grains = []
     for _ in range(count):

@@ -13,9 +13,10 @@ from fingervision.rendering.outline import Outline, Piece
 from fingervision.rendering.plane import Motion
 from fingervision.rendering.polygon import polygon
 
-# A half ellipse is drawn as this many circular arcs; they, not the ellipse, are the truth (they differ by 1e-4 px).
+# A half ellipse is approximated by this number of circular arcs, with an error of 1e-4 px; the true gap is computed
+# from the arcs.
 ELLIPSE_ARCS = 48
-# A finger that is tilted further points in another direction.
+# Largest tilt; a finger with a larger tilt would point along another image axis.
 STEEPEST_DEG = 45.0
 
 
@@ -64,7 +65,8 @@ class Highlight:
     below_tip_px : float
         Distance of the stripe's start from the tip, along the finger's own axis.
     off_axis_px : float
-        Distance of the stripe's centre line from the finger's, towards the larger coordinate across.
+        Distance between the centre lines of stripe and finger; positive if the stripe lies towards the larger
+        coordinate across.
     """
 
     level: float

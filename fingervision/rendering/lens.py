@@ -15,10 +15,12 @@ from fingervision.rendering.line import Line
 from fingervision.rendering.outline import Outline, Piece
 from fingervision.rendering.plane import Points
 
-# The distortion must still grow at this multiple of the frame's half diagonal; beyond it the factor stays the same.
+# The distorted radius must increase with the radius up to this multiple of the frame's half diagonal; beyond it the
+# distortion factor is constant.
 DISTORTED_TO = 1.5
-# Spacing of the points that are mapped exactly, along lines and (in radians) along arcs. Between them biarcs stay
-# within 5e-6 px of the mapped curve for 10 % distortion and 20 degrees of tilt (tests/rendering/test_lens.py).
+# Spacing of the points that are mapped exactly: along lines in pixels, along arcs in radians. Biarcs between these
+# points deviate by at most 5e-6 px from the mapped curve, for 10 % distortion and 20 degrees of tilt
+# (tests/rendering/test_lens.py).
 SPACING_PX = 5.0
 SPACING_RAD = 0.03
 
@@ -46,8 +48,8 @@ class RadialLens:
         q2 = np.linspace(0.0, DISTORTED_TO, 31) ** 2
         if not np.min(1 + 3 * self.k1 * q2 + 5 * self.k2 * q2**2) > 0.0:
             msg = (
-                f"A lens must not fold the picture, but k1 = {self.k1:g} with k2 = {self.k2:g} does within "
-                f"{DISTORTED_TO:g} half diagonals: choose coefficients nearer to 0."
+                f"A lens distortion must be invertible within {DISTORTED_TO:g} half diagonals of the frame, but k1 = "
+                f"{self.k1:g} with k2 = {self.k2:g} is not: choose coefficients nearer to 0."
             )
             raise DataError(msg)
 
@@ -122,7 +124,7 @@ class View:
         for piece in ideal.pieces:
             spacing = piece.length_px / SPACING_PX if isinstance(piece, Line) else abs(piece.sweep_rad) / SPACING_RAD
             t = np.linspace(0.0, 1.0, max(2, int(np.ceil(spacing)) + 1))
-            # Central difference along the piece: its own curvature and the lens's add errors of the second order only.
+            # Central difference along the piece; the curvatures of piece and lens cause errors of second order only.
             step = 1e-4 / piece.length_px
             tangents = self.points(piece.points(t + step)) - self.points(piece.points(t - step))
             pieces += biarcs(self.points(piece.points(t)), tangents)

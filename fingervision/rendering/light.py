@@ -64,7 +64,8 @@ class Light:
         factor = 1.0 if self.step is None else self.step.factor
         if not (abs(self.slope_x) <= 2.0 and abs(self.slope_y) <= 2.0 and factor >= 0.0 and self.exposure >= 0.0):
             msg = (
-                "Light must not be negative: slopes lie between -2 and 2, factors are 0 or more, but slope_x is "
+                "The light must not be negative: slopes must lie between -2 and 2, and factors must be 0 or more, but "
+                "slope_x is "
                 f"{self.slope_x:g}, slope_y {self.slope_y:g}, the step {factor:g} and the exposure {self.exposure:g}."
             )
             raise DataError(msg)

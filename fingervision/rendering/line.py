@@ -57,15 +57,15 @@ class Line:
         return Line(x0, y0, x1, y1)
 
     def backwards(self) -> "Line":
-        """Return the same piece with its direction reversed."""
+        """Return the line with its direction reversed."""
         return Line(self.x1_px, self.y1_px, self.x0_px, self.y0_px)
 
     def moved(self, motion: Motion) -> "Line":
-        """Return the piece after a rigid motion."""
+        """Return the line after a rigid motion."""
         return Line(*motion.place(*self.start), *motion.place(*self.end))
 
     def grown(self, by_px: float) -> "Line":
-        """Offset the piece parallel to itself by `by_px` outwards."""
+        """Offset the line parallel to itself by `by_px`, towards the outside of the outline."""
         heading = self.heading_rad(0.0)
         out_x, out_y = by_px * sin(heading), -by_px * cos(heading)
         return Line(self.x0_px + out_x, self.y0_px + out_y, self.x1_px + out_x, self.y1_px + out_y)

@@ -40,8 +40,9 @@ class Outline:
             hole_px = hypot(follower.start[0] - piece.end[0], follower.start[1] - piece.end[1])
             if hole_px > SAME_POINT_PX:
                 msg = (
-                    f"An outline must be closed, but a piece ends {hole_px:.3g} px away from the start of the next: "
-                    "give the pieces in the order of travel."
+                    f"An outline must be closed, but a piece ends {hole_px:.3g} px away from the start of the next "
+                    "piece: "
+                    "give the pieces in their order along the outline."
                 )
                 raise DataError(msg)
 
@@ -99,7 +100,7 @@ class Outline:
         return Outline(bridged(grown))
 
     def _vanishes(self, by_px: float, turns: list[float], cuts_px: list[float]) -> bool:
-        """Whether an offset makes two sides of the curve meet, because a stretch turns by half a turn or more."""
+        """Whether an offset makes two sides meet: pieces vanish that together turn by 180 degrees or more."""
         used = []
         for i, piece in enumerate(self.pieces):
             if isinstance(piece, Arc):
@@ -118,7 +119,7 @@ class Outline:
                 continue
             piece = self.pieces[i]
             turned += turns[i] + (piece.sweep_rad if isinstance(piece, Arc) else 0.0)
-            # Less a billionth, which is rounding.
+            # The tolerance of a billionth allows for rounding.
             if -by_px * turned > 0.0 and abs(turned) > pi * (1.0 - 1e-9):
                 return True
         return False
@@ -126,8 +127,8 @@ class Outline:
     def winding(self, points: Points) -> NDArray[np.float64]:
         """Winding number of the curve about each point: 1 inside a solid, 0 outside; shape (n,).
 
-        It is the sum of the angles that the pieces' chords subtend at the point, plus a full turn for each arc that
-        bulges past the point.
+        The winding number is the sum of the angles that the pieces' chords subtend at the point, plus a full turn for
+        each arc that has the point between itself and its chord.
         """
         x, y = points[..., 0], points[..., 1]
         angle = np.zeros(x.shape)

@@ -43,7 +43,8 @@ def exact_grey(scene: Scene, camera: Camera) -> NDArray[np.float64]:
     elif outlines and scene.rim is not None:
         rimmed = union(tuple(outline.grown(scene.rim.width_px) for outline in outlines))
         _paint(grey, rimmed, scene.rim.level, light.ground, camera)
-        # The rim reaches under the fingers and is narrow: there only the difference to it is exact where both blur.
+        # The rim's outline includes the fingers. Where both edges are blurred, the result is exact only if the fingers
+        # add the difference between their level and the rim's level.
         part, covered = _covered(grey, union(outlines), light.fingers < scene.rim.level, camera)
         part += (light.fingers - scene.rim.level) * covered
     for patch in scene.before:
@@ -79,7 +80,8 @@ def _paint(
 ) -> None:
     """Paint solids of one level; `around` is the level of their surroundings, which decides the edge bias."""
     part, covered = _covered(grey, outlines, level < around, camera)
-    # level + (part - level) (1 - covered), in place: fresh arrays of a frame's size cost more than the sums.
+    # part = level + (part - level) (1 - covered), computed in place, because new arrays of a frame's size take longer
+    # than the arithmetic.
     np.subtract(1.0, covered, out=covered)
     part -= level
     part *= covered

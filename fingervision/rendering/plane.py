@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 """Points in the picture, shape (..., 2): x and y."""
 
-# Ends that are nearer than this are the same point: far below every tolerance, far above rounding at 4K.
+# Points closer than this are regarded as the same point; the value is far below every tolerance, and far above rounding
+# errors in a 4K frame.
 SAME_POINT_PX = 1e-7
 
 

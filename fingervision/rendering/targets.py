@@ -9,7 +9,7 @@ from fingervision.rendering.polygon import polygon
 
 __all__ = ["bar", "chessboard", "disc", "needle", "slot"]
 
-# A plate or needle that leaves the frame ends this far beyond it.
+# A plate or needle that extends beyond the frame ends at this distance outside.
 BEYOND_FRAME_PX = 200.0
 
 
@@ -61,7 +61,7 @@ def slot(
     if least_x <= left or least_y <= top or greatest_x >= right or greatest_y >= low:
         msg = (
             f"A slot must lie inside its plate, which ends {BEYOND_FRAME_PX:g} px beyond the frame, but reaches from "
-            f"({least_x:g}, {least_y:g}) to ({greatest_x:g}, {greatest_y:g}): choose a shorter one."
+            f"({least_x:g}, {least_y:g}) to ({greatest_x:g}, {greatest_y:g}): choose a shorter slot."
         )
         raise DataError(msg)
     return polygon(((left, top), (right, top), (right, low), (left, low))), hole.backwards()

@@ -17,9 +17,9 @@ from fingervision.rendering.outline import Outline, Piece
 from fingervision.rendering.plane import SAME_POINT_PX
 from fingervision.rendering.scene import Scene
 
-# An extremum is bracketed by this many points on each piece before it is refined.
+# Number of points on each piece that bracket its extremum before the refinement.
 BRACKET_POINTS = 17
-# Points within this of the outermost one belong to the tip.
+# Points at most this far behind the outermost point belong to the tip.
 FLAT_PX = 1e-6
 
 
@@ -78,18 +78,18 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     """
     if len(scene.fingers) < 2:
         status = Status.ONE_FINGER if scene.fingers else Status.NO_FINGERS
-        return NoGap(status, f"The scene has {len(scene.fingers)} of two fingers.")
+        return NoGap(status, f"The scene must have two fingers, but has {len(scene.fingers)}.")
     first, second, *others = scene.fingers
     if others or first.direction is not second.direction:
         ways = ", ".join(finger.direction for finger in scene.fingers)
-        msg = f"The fingers of a scene must be two and point the same way, but point {ways}."
+        msg = f"A scene must have two fingers that point in the same direction, but the directions are {ways}."
         raise DataError(msg)
     direction = first.direction
     shapes = list(camera.sees((first.outline, second.outline), scene.width_px, scene.height_px))
     ends = [_tip(shape, direction) for shape in shapes]
     across_size = scene.width_px if direction.is_vertical else scene.height_px
     if any(end.last_px < -0.5 or end.first_px > across_size - 0.5 for end in ends):
-        return NoGap(Status.TIP_OUT_OF_VIEW, "The outermost point of a finger lies beside the frame.")
+        return NoGap(Status.TIP_OUT_OF_VIEW, "The outermost point of a finger lies outside the frame.")
     tips = [end.along_px for end in ends]
     spans = [_crossings(shape, direction, tip + below_tip_px) for shape, tip in zip(shapes, tips, strict=True)]
     if not all(spans):
@@ -148,7 +148,7 @@ def _tip(outline: Outline, direction: Direction) -> _Tip:
     outermost_px = min(starts)
     found = []
     for piece, start_px in zip(outline.pieces, starts, strict=True):
-        # No point of a piece lies further from its start than its length.
+        # No point of a piece is further from the piece's start than the piece's length.
         if start_px - piece.length_px > outermost_px:
             continue
         points = _in_axes(piece, direction, grid)
@@ -158,7 +158,8 @@ def _tip(outline: Outline, direction: Direction) -> _Tip:
         def height_px(t: float, piece: Piece = piece) -> float:
             return float(_in_axes(piece, direction, t)[1])
 
-        # The outermost point may lie between the last two places of the grid, so an end is a bracket like any other.
+        # The outermost point may lie between the last two points of the grid, so that the grid's ends can be limits of
+        # the bracket too.
         bounds = (float(grid[max(place - 1, 0)]), float(grid[min(place + 1, BRACKET_POINTS - 1)]))
         best = float(minimize_scalar(height_px, bounds=bounds, options={"xatol": 1e-10}).x)
         found.append(_in_axes(piece, direction, [best]))
@@ -180,7 +181,8 @@ def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[
             return float(_in_axes(piece, direction, t)[1] - along_px)
 
         beyond = _in_axes(piece, direction, grid)[:, 1] >= along_px
-        # A joint lies on the same side for both of its pieces, however their ends are rounded.
+        # Both pieces at a joint use the same point, so that rounding cannot place the joint on different sides of the
+        # line.
         beyond[0] = _along(piece.start, direction) >= along_px
         beyond[-1] = _along(follower.start, direction) >= along_px
         for k in np.flatnonzero(beyond[:-1] != beyond[1:]):

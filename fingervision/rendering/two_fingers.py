@@ -12,7 +12,8 @@ from fingervision.rendering.plane import Motion
 from fingervision.rendering.scene import Patch, Rim, Scene
 from fingervision.rendering.truth import measuring_point
 
-# A finger that leaves the frame ends this far beyond the border: further than any blur and any lens can fetch.
+# A finger that extends beyond the frame ends at this distance outside; neither blur nor lens distortion brings this end
+# into the frame.
 BEYOND_FRAME_PX = 200.0
 
 
@@ -45,7 +46,7 @@ def two_fingers(
     below_tip_px : float
         Distance of the measuring points from the tips, along the image axis; 0.3 mm at 34 px/mm by default.
     direction : Direction
-        Where the tips point.
+        Direction in which the tips point.
     width_px : float
         Width of each finger; 3 mm at 34 px/mm by default.
     radius_px : float
@@ -57,11 +58,11 @@ def two_fingers(
     tip_at_px : float, optional
         The left tip's coordinate along the fingers' axis; by default a quarter of the frame from the border.
     tip_step_px : float
-        How much further out the right tip lies than the left.
+        Distance by which the right tip extends beyond the left tip.
     centre_px : float
-        Where the middle of the gap lies across the fingers, counted from the frame's centre.
+        Position of the middle of the gap across the fingers, relative to the frame's centre.
     length_px : float, optional
-        Length of the fingers; without it they leave the frame at their root.
+        Length of the fingers; by default, the fingers extend beyond the frame at their root.
     frame : (int, int)
         Width and height of the frame.
     light, behind, before, rim
@@ -72,19 +73,17 @@ def two_fingers(
     Returns
     -------
     Scene
-        With two fingers, left and right (or upper and lower).
+        Scene with two fingers, left and right (or upper and lower).
 
     Raises
     ------
     DataError
-        A size is no number, the step between the tips is greater than the gap, or the tips do not reach to the
+        A size is not a number, the step between the tips is greater than the gap, or a finger does not extend to the
         measuring height.
     """
     numbers = (gap_px, below_tip_px, width_px, radius_px, tip_step_px, centre_px, *np.atleast_1d(tilt_deg))
     if not np.isfinite(numbers).all():
-        msg = (
-            f"Every size and tilt of two fingers must be a number, but among {[float(x) for x in numbers]} one is not."
-        )
+        msg = f"Every size and tilt of two fingers must be a finite number, but they are {[float(x) for x in numbers]}."
         raise DataError(msg)
     axes = axis_motion(direction)
     across_size, along_size = frame if direction.is_vertical else frame[::-1]

@@ -20,12 +20,13 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
     Parameters
     ----------
     outlines : tuple of Outline
-        Solids without holes. Where edges coincide, one of them is kept, or none if the solids lie on opposite sides.
+        Solids without holes. Of coinciding edges only one edge is kept, and no edge if the solids lie on opposite
+        sides.
 
     Returns
     -------
     tuple of Outline
-        Solids that do not overlap (and holes, if outlines enclose one). The input itself if nothing overlaps.
+        Solids that do not overlap (and holes, if outlines enclose one). If no solids overlap, the input is returned.
     """
     if not any(_boxes_meet(a, b) for a, b in combinations(outlines, 2)):
         return outlines
@@ -36,7 +37,7 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
         middles = np.array([part.points(np.array(0.5)) for part in parts])
         hidden = np.zeros(len(parts), dtype=bool)
         for j, other in others.items():
-            # On a common edge, rounding decides whether the winding counts: the edge's own rule is asked first.
+            # On a common edge the winding number depends on rounding; the rule for common edges therefore has priority.
             inside = other.winding(middles) > 0.0
             for k, part in enumerate(parts):
                 sense = _shared(part, other)
@@ -175,7 +176,7 @@ def _fraction(piece: Piece, point: tuple[float, float]) -> float | None:
 
 
 def _chained(pieces: list[Piece]) -> tuple[Outline, ...]:
-    """Join pieces, given in any order, to closed curves: each is followed by the piece starting nearest to its end."""
+    """Join unordered pieces to closed curves: each piece is followed by the piece whose start is nearest to its end."""
     left = list(pieces)
     curves = []
     while left:

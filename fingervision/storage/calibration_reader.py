@@ -45,7 +45,7 @@ class CalibrationReader:
     def __init__(self, path: Path, content: object) -> None:
         self._path = path
         if not isinstance(content, dict) or "schema" not in content:
-            self._refuse("it has no schema; make one with `fingervision calibrate`")
+            self._refuse("it has no schema; make a calibration with `fingervision calibrate`")
         self._content: dict[str, Any] = content
 
     def _refuse(self, words: str) -> NoReturn:
@@ -63,7 +63,9 @@ class CalibrationReader:
         if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
             self._refuse(f"schema must be a whole number from 1, but is {schema!r}")
         if schema > SCHEMA:
-            self._refuse(f"it has schema {schema}, and this program knows up to {SCHEMA}; use a newer fingervision")
+            self._refuse(
+                f"it has schema {schema}, but this program reads only schemas up to {SCHEMA}; use a newer fingervision"
+            )
         budget = self._object("budget")
         limits, stated = self._limits(budget.get("limits"))
         try:
@@ -197,7 +199,7 @@ class CalibrationReader:
             self._refuse(f"budget.limits must be an object of objects, but is {stated!r}")
         unknown = set(stated) - set(nothing)
         if unknown:
-            self._refuse(f"budget.limits knows no {sorted(unknown)[0]}")
+            self._refuse(f"budget.limits has an unknown limit, {sorted(unknown)[0]}")
         values = {name: self._number(limit, "value") for name, limit in stated.items()}
         try:
             limits = Limits(**(nothing | values))

@@ -85,7 +85,7 @@ def changed_tables(
     for name, by in changes.items():
         if name not in places:
             raise DataError(
-                f"There is no number called {name} in {origin}. Names of numbers in it are, for example, "
+                f"There is no number called {name} in {origin}. Numbers in this file are, for example, "
                 f"{', '.join(sorted(places)[:8])}."
             )
         path, raw = places[name]

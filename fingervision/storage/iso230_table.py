@@ -130,9 +130,9 @@ def iso230_rows(
     ]
     if words & FORWARD:
         notes.append(
-            f"The direction {sorted(words & FORWARD)[0]} was taken as the approach from below, the input increasing. "
-            "Some published reports mean the approach from above by it: if the reversal comes out with the wrong sign, "
-            "exchange the directions."
+            f"The direction {sorted(words & FORWARD)[0]} was taken as the approach from below (the input increases). "
+            f"Some published reports use this word for the approach from above: if the reversal has the wrong sign in "
+            f"the result, exchange the directions."
         )
     return Iso230Rows(rows, (*notes, *assumed))
 

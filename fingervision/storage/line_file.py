@@ -80,8 +80,8 @@ class LineFile:
                 os.ftruncate(self._file.fileno(), self._whole_bytes)
             self._file.close()
             raise OutputError(
-                f"{self._path} could not be written any further ({error.strerror}); the rows until then are in it: "
-                "free disk space and measure again."
+                f"{self._path} could not be written any further ({error.strerror}); it holds the rows written before: "
+                f"free disk space and measure again."
             ) from error
         self._whole_bytes += len(block)
 

@@ -128,7 +128,9 @@ def measured_rows(
         for run, name in zip(of_runs, run_names, strict=True):
             _check_times(times[run], name, path)
     if edges and np.median(column["right_mm"] - column["left_mm"]) < 0.0:
-        notes.append("left_mm is larger than right_mm: the two columns were taken as exchanged and swapped back.")
+        notes.append(
+            "left_mm is larger than right_mm: the two columns were taken as exchanged, and were exchanged back."
+        )
         column["left_mm"], column["right_mm"] = column["right_mm"], column["left_mm"]
     gap = column["right_mm"] - column["left_mm"] if edges else column["gap_mm"]
     for label, signal in (("input_mm", column["input_mm"]), ("gap_mm", gap)):
@@ -173,7 +175,9 @@ def _left_out(total: int, kept: int, besides: int) -> list[str]:
     """Sentences on the number of rows without a gap that count as path, and of rows that are omitted."""
     notes = []
     if besides:
-        notes.append(f"{besides} of {total} rows have an input and no gap: they count as the input's path.")
+        notes.append(
+            f"{besides} of {total} rows have an input but no gap: they are used as part of the path of the input."
+        )
     if total - kept - besides:
         notes.append(f"{total - kept - besides} of {total} rows have no value and were left out.")
     return notes
@@ -184,7 +188,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
     repeated = np.flatnonzero(np.diff(time_s) == 0.0)
     if not repeated.size:
         return
-    said = f"time_s must be unique within a run, but {time_s[repeated[0]]:g} s stands "
+    said = f"time_s must be unique within a run, but {time_s[repeated[0]]:g} s occurs "
     said += "in every row" if repeated.size == time_s.size - 1 else "twice"
     whole = bool(np.all(time_s == np.round(time_s)))
     cure = "write the times with more digits" if whole else "add a run column, or remove the repeated rows"

@@ -178,8 +178,8 @@ class RecordedVideo:
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)
         return OutputError(
-            f"{self._path} could not be written any further ({why}); what was recorded until then is in it: "
-            "free disk space, "
+            f"{self._path} could not be written any further ({why}); it holds what was recorded before: free disk "
+            f"space, "
             "or name another --out."
         )
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels
-from fingervision.tables.column_choice import CANONICAL, DIMENSION, NEEDED
-from fingervision.tables.column_names import column_name
+from fingervision.tables.column_choice import CANONICAL, NEEDED
+from fingervision.tables.column_names import DIMENSION, column_name
 from fingervision.tables.formats import read_raw
 from fingervision.tables.iso230 import iso230_rows_of
 from fingervision.tables.mapping import KINDS, Entry

@@ -22,6 +22,8 @@ TURKISH = "\u0131şğüçö"
 """Letters, each in the order of their frequency in the languages that share an encoding."""
 SIGNS = {"µ": 0.2, "°": 0.1, **dict.fromkeys("²³±·…€§«»\u00d7\u2013\u2014\u2018\u2019\u201c\u201d\xa0", 0.01)}
 """Probabilities of the signs in any table: units, quotation marks, dashes."""
+UNITS = dict.fromkeys("\u339c\u339b\u339d\u2103", 0.02)
+"""Probability of mm, µm, cm and °C as one character, which double-byte encodings have."""
 CHINESE = (
     "时间位移置力输入出隙开口度序号测量编码器夹爪行程距离速压电流通道数据值实验模拟仿真左右手指毫米秒微牛顿日期次循环"
     "目标偏差方向误载荷重驱动台平机械传感信频率温编码点名称单位备注结果"
@@ -74,7 +76,7 @@ class Language:
 
 
 def _even(letters: str) -> dict[str, float]:
-    return dict.fromkeys(letters, LIKELY / len(set(letters)))
+    return dict.fromkeys(letters, LIKELY / len(set(letters))) | UNITS
 
 
 def _by_rank(letters: str) -> dict[str, float]:

@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from fingervision.domain.errors import DataError
 from fingervision.tables.column_names import column_name
 from fingervision.tables.dialect import Dialect, is_comment, is_number, is_value, split
+from fingervision.tables.header_pairs import Header, labelled_pairs
 from fingervision.tables.mapping import Entry
 from fingervision.tables.units import is_unit, known_unit
 from fingervision.tables.words import role_of
@@ -24,27 +24,18 @@ ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
 """Pattern of a line that names a single column (data recorders of Physik Instrumente write `# NAME0 = ...`)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Header:
-    """The header lines above the numbers.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the columns; empty if there are none.
-    units : tuple of str
-        Units from a row of units; empty if there is none.
-    line : int
-        Number of the line with the names, from 0; -1 if there is none.
-    """
-
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    line: int = -1
-
-
 def _is_row(cells: Sequence[str], dialect: Dialect) -> bool:
-    return len(cells) == dialect.wide and any(is_number(cell, dialect.decimal) for cell in cells)
+    # `Points: 30` is a key and its value.
+    is_key = cells[0].endswith((":", "=")) and not is_value(cells[0], dialect.decimal)
+    return len(cells) == dialect.wide and not is_key and any(is_number(cell, dialect.decimal) for cell in cells)
+
+
+def _is_label(cells: Sequence[str], below: Sequence[str], dialect: Dialect) -> bool:
+    """Whether a line is a label with a value for each channel (`Offset 0 Offset 0`), which the next line has not."""
+    if dialect.wide < 4 or len(set(cells[::2])) > 1 or is_value(cells[0], dialect.decimal):
+        return False
+    following = next((line for line in below if line.strip()), "")
+    return split(following, dialect.separator)[:1] != cells[:1]
 
 
 def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
@@ -56,7 +47,7 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
         if is_comment(lines[at]) or not lines[at].strip():
             continue
         cells = split(lines[at], dialect.separator)
-        if not _is_row(cells, dialect):
+        if not _is_row(cells, dialect) or _is_label(cells, lines[at + 1 :], dialect):
             continue
         # A header that numbers its columns has fewer values than a row: `Position 1, Position 2` has none.
         values = sum(is_value(cell, dialect.decimal) for cell in cells)
@@ -83,8 +74,9 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
             )
         units = names_in(lines[at + 1], dialect) if at + 1 < first else None
         return Header(names, units if units is not None and _all_units(units) else (), at)
-    if (listed := _one_a_line(lines[:first], dialect.wide)) is not None:
-        return listed
+    for listed in (_one_a_line(lines[:first], dialect.wide), labelled_pairs(lines[:first], dialect)):
+        if listed is not None:
+            return listed
     found: list[tuple[int, int, tuple[str, ...]]] = []
     units, units_at = None, -1
     blanks = 0

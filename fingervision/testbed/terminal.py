@@ -39,9 +39,9 @@ class Terminal:
         Raises
         ------
         StateError
-            The run was stopped while the question stood.
+            The run was stopped before the question was answered.
         """
-        # Before the words are seen: an answer may come at once.
+        # Set the flag before the question is printed, because an answer may arrive at once.
         self._asked = self._reader is not None
         self.say(words)
         if self._reader is None:
@@ -67,7 +67,7 @@ class Terminal:
         Parameters
         ----------
         unasked : callable
-            Called with each line that is not a response to a question.
+            Function that is called with each line that is not a response to a question.
         ended : callable
             Returns whether nobody waits for responses any more.
         """

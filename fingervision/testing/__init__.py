@@ -1,7 +1,7 @@
 """Contract tests for authors of plug-ins; the built-in parts of the package pass the same tests.
 
-Derive a class whose name begins with `Test`, state the part to be tested, and run pytest. Each method is one test; a
-failure is reported by a sentence that states what the part must do and what it does::
+Derive a class whose name begins with `Test`, state the part to be tested as a class attribute, and run pytest. Each
+method is one test; a failure is reported by a sentence that states what the part must do and what it does::
 
     # tests/test_creeping_foot.py
     from fingervision.testing import EffectContract

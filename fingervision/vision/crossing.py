@@ -21,7 +21,8 @@ FROM_HEIGHTS, TO_HEIGHTS = 1.0, 4.0
 
 CROSSED = NoGap(
     Status.NO_FINGERS,
-    "Something lies across the fingers and hides their tips: take it away, or give the region that it is not in.",
+    "An object lies across the fingers and hides their tips: remove the object, or restrict the region (--roi) to "
+    "exclude it.",
 )
 
 _rows_beyond = loop("crossing_rows_beyond")

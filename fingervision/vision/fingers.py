@@ -45,11 +45,13 @@ ROOTED_HEIGHTS = 2.0
 THIRD_SHARE, THIRD_STEEPEST = 0.5, 1.0
 
 MORE_THAN_TWO = NoGap(
-    Status.NO_FINGERS, "More than two things in the picture look like fingers: give the region that holds the two."
+    Status.NO_FINGERS,
+    "More than two objects in the picture look like fingers: give the region (--roi) that contains the two fingers.",
 )
 UNLIKE = NoGap(
     Status.ONE_FINGER,
-    "Of two things that stand side by side one is far wider than the other: give the region that holds two fingers.",
+    "Of two objects side by side, one is far wider than the other: give the region (--roi) that contains the two "
+    "fingers.",
 )
 
 

@@ -65,7 +65,7 @@ BROKEN_BY = {
     Coding.INTRAFRAME: f"{BROKEN}: clean the fingers, change the light, or record losslessly.",
 }
 BROKEN_BY[Coding.INTERFRAME] = BROKEN_BY[Coding.INTRAFRAME]
-TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
+TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to locate a finger's tip and edge.")
 SMEARED = "The fingers moved while the shutter was open"
 # Motion by so many pixels (a box as broad has the variance of its square over 12) smears a rounded tip beyond use.
 SMEARED_PX = 4.0
@@ -183,8 +183,8 @@ def measure_gap(
     elif outcome is TOO_ROUGH and max(abs(m.slope) for m in measured) > FLATTEST:
         outcome = NoGap(
             Status.NO_FINGERS,
-            "The measuring height crosses the top of a finger and not its inner side: turn the camera until the tips "
-            "are level, or measure farther below them (--below-tip-mm).",
+            "The measuring height crosses the end face of a finger and not its inner edge: turn the camera until the "
+            "tips are level, or measure farther below the tips (--below-tip-mm).",
         )
     if has_part and outcome is TOO_ROUGH:
         return NoGap(
@@ -230,11 +230,11 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
         return NoGap(Status.NO_FINGERS, "Only one of the two inner edges can be seen.")
     contrast *= 1.0 if light_gap else -1.0
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
-        return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
+        return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from the background.")
     if left_tip + right_tip and abs(tip_contrast) < TIP_CONTRAST * abs(contrast):
-        return NoGap(Status.NO_FINGERS, "What is in view fades away where a finger's tip would be.")
+        return NoGap(Status.NO_FINGERS, "The objects in view have no sharp end where a finger has its tip.")
     if 2 * clipped > left + right or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT:
-        return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
+        return NoGap(Status.SATURATED, "The flanks of the edges are clipped at the end of the grey scale.")
     blur = sqrt(max(edges.blur_px[:, 0].tolist()) ** 2 + PIXEL_VARIANCE)
     if blur > BLUR_LIMIT_PX:
         return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
@@ -265,14 +265,14 @@ def _no_fingers(
     if abs(turn) > FARTHEST_TURNED and any(are_fingers):
         return NoGap(
             Status.NO_FINGERS,
-            f"The fingers are turned by {degrees(atan(abs(turn))):.0f} degrees in the picture, and at most 25 are "
-            "measured: turn the camera.",
+            f"The fingers are turned by {degrees(atan(abs(turn))):.0f} degrees in the picture, but only fingers "
+            f"turned by at most 25 degrees can be measured: turn the camera.",
         )
     if all(are_fingers):
         return None
     if any(are_fingers):
-        return NoGap(Status.ONE_FINGER, "Only one of two things in view has the straight flanks of a finger.")
-    return NoGap(Status.NO_FINGERS, "What is in view has no straight flanks, as fingers have.")
+        return NoGap(Status.ONE_FINGER, "Only one of the two objects in view has the straight flanks of a finger.")
+    return NoGap(Status.NO_FINGERS, "The objects in view have no straight flanks and are therefore not fingers.")
 
 
 def _assemble(

@@ -20,8 +20,8 @@ SAME_SIZE, FEWEST_OTHERS = 2.5, 5
 
 LETTERS = NoGap(
     Status.NO_FINGERS,
-    "What lies between the two is one of several things of its size, as in a text: give the region that holds two "
-    "fingers.",
+    "The picture contains several similar objects at similar distances, as in a printed text: give the region (--roi) "
+    "that contains the two fingers.",
 )
 
 

@@ -58,7 +58,7 @@ SMALLEST_SIDE_PX = 16
 FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
 # Beside a shadow or a pad a gap that is less sure than this (pixels) may be that of something else.
 LEAST_SURE_AGAIN_PX = 0.3
-UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
+UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: all its pixels have nearly the same grey level.")
 
 
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
@@ -200,7 +200,7 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     for split, fingers, light_gap in candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
             if fingers.status is not Status.NO_FINGERS and not has_edges(denoised, split, binary.contrast):
-                fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
+                fingers = NoGap(Status.NO_FINGERS, "The picture changes gradually from light to dark, without an edge.")
             attempt = _Attempt(fingers, split)
         else:
             attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)

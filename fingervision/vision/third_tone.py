@@ -28,8 +28,8 @@ LEAST_STEP, STEP_PX = 0.12, 6
 
 THIRD_TONE = NoGap(
     Status.NO_FINGERS,
-    "A strip of a third tone lies along the fingers, a shadow or a pad: light them from behind or from all sides, so "
-    "that fingers and ground are each of one tone.",
+    "A strip of a third grey level lies along the fingers, such as a shadow or a pad: light the fingers from behind "
+    "or from all sides, so that fingers and background each have a uniform grey level.",
 )
 
 _strips = loop("third_tone_strips")

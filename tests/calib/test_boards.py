@@ -97,7 +97,7 @@ def test_charuco_corners_are_those_of_the_drawn_board() -> None:
 
 @pytest.mark.parametrize("size", [(8, 6), (9, 5), (10, 7)])
 def test_another_chessboard_is_refused(size: tuple[int, int]) -> None:
-    words = f"board.png must show a chessboard of {size[0]}x{size[1]} inner corners, .* check --squares"
+    words = f"board.png must show a complete chessboard of {size[0]}x{size[1]} inner corners, .* check --squares"
     with pytest.raises(CalibrationError, match=words):
         find_corners(rendered(), Board(*size, 1.0, 0.001), "board.png")
 

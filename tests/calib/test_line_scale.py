@@ -104,7 +104,7 @@ def test_scale_and_bias_are_not_correlated() -> None:
     [
         (np.full((200, 200), 128, dtype=np.uint8), "lines"),
         (np.random.default_rng(1).integers(0, 256, (200, 200)).astype(np.uint8), "lines"),
-        (drawn(150.0, 40.0), "whole lines"),
+        (drawn(150.0, 40.0), "complete lines"),
         (np.tile(np.array([0, 255, 255], dtype=np.uint8), (120, 60)), "apart"),
         (np.zeros((8, 8), dtype=np.uint8), "at least"),
     ],

@@ -147,7 +147,7 @@ def test_several_objects_are_named() -> None:
         Scene(light=Light(200.0), behind=(Patch(targets, 40.0),)), Camera(noise_grey=1.0), np.random.default_rng(1)
     )
     with pytest.raises(
-        ValueError, match=r"2 candidates stand in the picture \(.*60\.0 px dark.*\): choose one with --roi"
+        ValueError, match=r"there are 2 candidates in the picture \(.*60\.0 px dark.*\): choose one of them by --roi"
     ):
         find_widths([KnownSize("two.png", "bar", 2.0, 0.001, grey)])
     (chosen,) = find_widths([KnownSize("two.png", "bar", 2.0, 0.001, grey)], region=(330, 40, 200, 400))
@@ -164,7 +164,7 @@ def test_the_shared_scale_says_which_side_of_a_rectangle_was_certified() -> None
         pictures.append(KnownSize(f"{size_mm:g}", "bar", size_mm, 0.001, grey))
     widths = [edge.width_px for edge in find_widths(pictures)]
     assert widths == pytest.approx([102.0, 272.0, 544.0], abs=0.02)
-    with pytest.raises(ValueError, match=r"shows a rectangle that is .* either could be the 8 mm"):
+    with pytest.raises(ValueError, match=r"shows a rectangle of .* either side could have the size of 8 mm"):
         find_widths(pictures[1:2])
 
 
@@ -179,7 +179,7 @@ def test_a_size_in_another_unit_is_refused(wrong: float) -> None:
 def test_pictures_of_two_scales_are_refused() -> None:
     pictures = [seen("bar", size, seed, noise_grey=1.0) for seed, size in enumerate((3.0, 8.0, 14.0))]
     pictures[2] = KnownSize("moved.png", "bar", 12.0, 0.001, pictures[2].grey)
-    with pytest.raises(ValueError, match=r"moved\.png of 12 mm gives .* px/mm where the others give 34"):
+    with pytest.raises(ValueError, match=r"moved\.png of 12 mm gives .* px/mm and the others give 34"):
         find_widths(pictures)
 
 
@@ -188,14 +188,14 @@ def test_nothing_and_half_an_object_are_refused() -> None:
     with pytest.raises(ValueError, match="there is no straight edge in the picture"):
         find_widths([KnownSize("blank.png", "bar", 5.0, 0.001, blank)])
     cut = seen("bar", 14.0, 1, noise_grey=1.0).grey[:, :320]
-    with pytest.raises(ValueError, match=r"only 1 straight edge stands in it .* away from the border"):
+    with pytest.raises(ValueError, match=r"shows 1 straight edge without a parallel edge.* away from the border"):
         find_widths([KnownSize("cut.png", "bar", 14.0, 0.001, np.ascontiguousarray(cut))])
 
 
 def test_a_rectangle_cut_by_the_border_is_not_taken_for_its_other_side() -> None:
     scene = Scene(light=Light(200.0), behind=(Patch(bar(476.0, 300.0, x_px=500.0, y_px=240.0), 40.0),))
     grey = render(scene, Camera(noise_grey=1.0), np.random.default_rng(1))
-    with pytest.raises(ValueError, match=r"shows three sides of a rectangle, .* the border may cut off an edge"):
+    with pytest.raises(ValueError, match=r"shows three sides of a rectangle, .* may extend beyond the border"):
         find_widths([KnownSize("cut.png", "bar", 14.0, 0.001, grey)])
     # The same two sides, where the user says that they are meant; and a pin that is clearly longer than it is wide.
     (meant,) = find_widths([KnownSize("cut.png", "bar", 9.0, 0.001, grey)], region=(300, 0, 340, 480))
@@ -210,5 +210,5 @@ def test_a_saturated_flank_is_refused() -> None:
         light=Light(ground=250.0, exposure=1.4), behind=(Patch(bar(170.0, 640.0, x_px=320.0, y_px=240.0), 40.0),)
     )
     grey = render(scene, Camera(blur_px=1.5, noise_grey=2.0), np.random.default_rng(1))
-    with pytest.raises(ValueError, match=r"over\.png is cut off by the sensor's full scale.*lower the exposure"):
+    with pytest.raises(ValueError, match=r"over\.png is clipped at the sensor's full scale.*reduce the exposure"):
         find_widths([KnownSize("over.png", "bar", 5.0, 0.001, grey)])

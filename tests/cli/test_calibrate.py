@@ -118,7 +118,7 @@ BAD = [
     ),
     (
         ("chessboard", BARS[0].partition("=")[0], "--squares", "9x6", "--square-mm", "1"),
-        "must show a chessboard of 9x6",
+        "must show a complete chessboard of 9x6",
     ),
     (("check", "none.json", BARS[0]), "There is no calibration file none.json"),
 ]

@@ -183,7 +183,7 @@ def test_a_calibration_for_other_frames_is_refused(run: Run, clip: Path) -> None
         (("CLIP", *SCALE, "--roi", "200,0,100,50"), 2, "--roi must lie inside the frame of 240x200 pixels"),
         (("CLIP", *SCALE, "--roi", "1,2,3"), 2, "--roi must be four whole numbers X,Y,W,H in pixels, but is '1,2,3'."),
         (("CLIP", *SCALE, "--below-tip-mm", "0"), 2, "--below-tip-mm must be positive, but is 0."),
-        (("CLIP", *SCALE, "--rate-hz", "25"), 2, "is a video with its own: leave it out."),
+        (("CLIP", *SCALE, "--rate-hz", "25"), 2, "is a video with its own times: leave --rate-hz out."),
         (("CLIP", *SCALE, "--steps", "-1"), 2, "must be the number of a frame, from 0, but is -1"),
         (("CLIP", *SCALE, "--steps", "99"), 2, "--steps must be the number of a frame that can be read, 0 to 11"),
         (("CLIP", *SCALE, "--drive", "none.csv"), 1, "There is no drive table none.csv."),
@@ -191,7 +191,7 @@ def test_a_calibration_for_other_frames_is_refused(run: Run, clip: Path) -> None
         (("CLIP", *SCALE, "--out", "taken"), 1, "--out must be a folder, but taken is a file: name another."),
         (("CLIP", *SCALE, "--out", "/proc/nowhere"), 1, "The folder /proc/nowhere cannot be written"),
         (("none.mp4", *SCALE), 1, "There is no recording none.mp4: give a video file"),
-        (("empty", *SCALE), 1, "The folder empty must hold images"),
+        (("empty", *SCALE), 1, "The folder empty must contain images"),
         (("empty/*.png", *SCALE), 1, "The pattern empty/*.png must match images"),
         (("text.mp4", *SCALE), 1, "text.mp4 must be a video, but cannot be read as one"),
         (("nothing.mp4", *SCALE), 1, "nothing.mp4 must be a video, but the file is empty"),
@@ -226,7 +226,7 @@ def test_a_clip_cut_off_in_the_middle_is_measured_and_said_to_be_damaged(run: Ru
     table = rows(Path("measured/cut.mkv/gaps.csv"))
     assert 3 <= sum(row["status"] == "ok" for row in table) < 12
     first = next(row["frame"] for row in table if row["status"] == "damaged")
-    assert f"the first is frame {first}. The recording is cut off here" in err
+    assert f"the first is frame {first}. The recording is truncated here" in err
 
 
 def test_an_mp4_without_its_end_cannot_be_opened(run: Run, tmp_path: Path) -> None:
@@ -235,7 +235,7 @@ def test_an_mp4_without_its_end_cannot_be_opened(run: Run, tmp_path: Path) -> No
     (tmp_path / "cut.mp4").write_bytes(content[: len(content) // 2])
     code, _, err = run("cut.mp4", *SCALE)
     assert code == 1
-    assert "was cut off before its index was written" in err
+    assert "was truncated before its index was written" in err
 
 
 def test_flipped_bytes_leave_the_good_frames(run: Run, clip: Path) -> None:
@@ -259,7 +259,7 @@ def test_images_that_change_size_are_damaged(run: Run, tmp_path: Path) -> None:
         cv2.imwrite(str(tmp_path / "images" / f"{frame.index}.png"), pixels)
     code, _, err = run("images", *SCALE)
     assert code == 3
-    assert "the first is frame 1. 1.png has 240x100 pixels, but the recording 240x200." in err
+    assert "the first is frame 1. 1.png has 240x100 pixels, but the recording has 240x200." in err
     assert [row["status"] for row in rows(Path("measured/images/gaps.csv"))] == ["ok", "damaged", "ok"]
 
 
@@ -268,7 +268,7 @@ def test_a_black_recording_has_a_table_and_no_number(run: Run, tmp_path: Path) -
     write_clip(tmp_path / "black.mkv", black, Ffv1())
     code, _, err = run("black.mkv", *SCALE)
     assert code == 1
-    assert "None of the 3 frames gave a number (3 low_contrast)." in err
+    assert "None of the 3 frames could be measured (3 low_contrast)." in err
     assert [row["status"] for row in rows(Path("measured/black.mkv/gaps.csv"))] == ["low_contrast"] * 3
 
 

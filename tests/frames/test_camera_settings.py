@@ -79,7 +79,8 @@ def test_a_camera_that_does_as_asked_gets_one_sentence_with_all_that_it_reads_ba
     found = set_up(camera, WISH, V4L2)
     assert camera.values[EXPOSURE] == 80.0  # steps of 0.1 ms
     assert found.notes == (
-        "The camera reads back: format YUYV, exposure 8 ms, gain 0, focus 30, white balance 4600 K, zoom 100.",
+        "The camera reports these settings: format YUYV, exposure 8 ms, gain 0, focus 30, white balance 4600 K, zoom "
+        "100.",
     )
 
 
@@ -95,16 +96,16 @@ def test_what_nobody_asks_for_stays_and_no_longer_changes_by_itself() -> None:
 @pytest.mark.parametrize(
     ("camera", "change", "sentence"),
     [
-        (UsbCamera(), {"focus": 32.0}, "The camera was asked for focus 32 and takes 30."),
-        (UsbCamera(), {"focus": 900.0}, "The camera was asked for focus 900 and takes 250."),
-        (UsbCamera(), {"exposure_ms": 0.02}, "The camera was asked for exposure 0.02 ms and takes 0.1 ms."),
-        (UsbCamera(formats=(MJPG,)), {}, "The camera was asked for the format YUYV and gives MJPG."),
-        (UsbCamera(formats=(MJPG,)), {}, "The camera compresses its pictures (MJPG) before they arrive here"),
-        (UsbCamera(lacks=FOCUS), {}, "The camera was asked for focus 30, but has no such setting."),
+        (UsbCamera(), {"focus": 32.0}, "The camera's focus was requested as 32, but is 30."),
+        (UsbCamera(), {"focus": 900.0}, "The camera's focus was requested as 900, but is 250."),
+        (UsbCamera(), {"exposure_ms": 0.02}, "The camera's exposure was requested as 0.02 ms, but is 0.1 ms."),
+        (UsbCamera(formats=(MJPG,)), {}, "The format YUYV was requested from the camera, but it gives MJPG."),
+        (UsbCamera(formats=(MJPG,)), {}, "The camera compresses its pictures (MJPG) with loss"),
+        (UsbCamera(lacks=FOCUS), {}, "The camera's focus was requested as 30, but the camera has no such setting."),
         (
             UsbCamera(stubborn=True),
             {},
-            "The camera's automatic exposure could not be switched off (it reads back 3): the edges move with the",
+            "The camera's automatic exposure could not be switched off (the camera reports the mode 3): edges",
         ),
     ],
 )
@@ -115,8 +116,13 @@ def test_what_a_camera_does_otherwise_is_said(camera: UsbCamera, change: dict[st
 
 def test_another_rate_is_said() -> None:
     wish = Wish(rate_hz=60.0)
-    assert "asked for 60 frames a second and states 30" in settled(V4L2, wish, {cv2.CAP_PROP_FPS: 30.0}).notes[0]
-    assert "asked for 60 frames a second and states no rate" in settled(V4L2, wish, {}).notes[0]
+    assert (
+        "60 frames per second was requested from the camera, but it states 30"
+        in settled(V4L2, wish, {cv2.CAP_PROP_FPS: 30.0}).notes[0]
+    )
+    assert (
+        "60 frames per second was requested from the camera, but it states no rate" in settled(V4L2, wish, {}).notes[0]
+    )
 
 
 @pytest.mark.parametrize(("value", "automatic"), [(1.0, False), (0.25, False), (3.0, True), (0.75, True), (0.0, True)])
@@ -130,7 +136,7 @@ def test_media_foundation_counts_exposure_in_powers_of_two_and_is_held_by_writin
     found = set_up(camera, Wish(camera=CameraWish(exposure_ms=8.0)), MSMF)
     assert camera.values == {EXPOSURE: -7.0, FOCUS: 40.0, cv2.CAP_PROP_TEMPERATURE: 5000.0}
     assert not any(camera.automatic.values())
-    assert found.notes[0] == "The camera was asked for exposure 8 ms and takes 7.812 ms."
+    assert found.notes[0] == "The camera's exposure was requested as 8 ms, but is 7.812 ms."
     assert found.settings["white balance"] == "5000 K"
 
 
@@ -139,8 +145,8 @@ def test_avfoundation_is_asked_for_size_and_rate_alone_and_the_rest_is_said() ->
     assert set(asked) == {cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FPS}
     found = settled("AVFOUNDATION", Wish(camera=CameraWish(exposure_ms=8.0)), dict.fromkeys(READ, 0.0))
     assert found.notes[0] == (
-        "The camera was asked for exposure 8 ms, but AVFOUNDATION lets no program set it: set it in the camera's own "
-        "program."
+        "The camera's exposure was requested as 8 ms, but AVFOUNDATION does not allow programs to change this "
+        "setting: change it in the camera's own program."
     )
     assert set(found.settings) == {"format"}
 

@@ -126,7 +126,9 @@ def test_behind_a_hole_in_an_avi_without_index_no_time_is_made_up(tmp_path: Path
     assert 19 <= whole <= 21
     behind = [item for item in found if isinstance(item, Frame) and item.time_s is None]
     assert COUNT - 25 <= len(behind) <= COUNT - 23
-    assert any("the time of those behind is not known" in item.words for item in found if isinstance(item, LostFrame))
+    assert any(
+        "the times of the following frames are not known" in item.words for item in found if isinstance(item, LostFrame)
+    )
 
 
 def test_a_chunk_whose_length_is_damaged_is_no_other_frame_of_the_index(tmp_path: Path) -> None:

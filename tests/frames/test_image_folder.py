@@ -103,7 +103,7 @@ def test_a_bad_table_of_times_is_refused_in_a_sentence(tmp_path: Path, table: st
 def test_a_rate_and_a_table_contradict_each_other(tmp_path: Path) -> None:
     save(tmp_path / "0.png", noise(0))
     (tmp_path / "times.csv").write_text("time_s\n0\n")
-    with pytest.raises(UsageError, match="leave out --rate-hz, or remove that file"):
+    with pytest.raises(UsageError, match="leave out --rate-hz, or remove that table"):
         open_source(str(tmp_path), Wish(rate_hz=25.0))
     with pytest.raises(UsageError, match="--rate-hz must be positive, but is -1"):
         open_source(str(tmp_path), Wish(rate_hz=-1.0))
@@ -127,7 +127,7 @@ def test_a_flipped_byte_in_a_png_fails_its_checksum(tmp_path: Path) -> None:
     (tmp_path / "1.png").write_bytes(content)
     items = frames_of(open_source(str(tmp_path)))
     assert isinstance(items[1], LostFrame)
-    assert items[1].words == "1.png is damaged: a part of it fails its checksum."
+    assert items[1].words == "1.png is damaged: a chunk of the file has a wrong checksum."
 
 
 def test_an_image_of_another_size_is_damaged(tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_an_image_of_another_size_is_damaged(tmp_path: Path) -> None:
     save(tmp_path / "1.png", noise(0, (10, 12)))
     items = frames_of(open_source(str(tmp_path)))
     assert isinstance(items[1], LostFrame)
-    assert items[1].words == "1.png has 12x10 pixels, but the recording 40x30."
+    assert items[1].words == "1.png has 12x10 pixels, but the recording has 40x30."
 
 
 def test_levels_that_are_no_whole_numbers_are_refused(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_a_stack_in_one_file_is_refused(tmp_path: Path) -> None:
     cv2.imwritemulti(str(tmp_path / "1.tif"), [noise(1), noise(2)])
     items = frames_of(open_source(str(tmp_path)))
     assert isinstance(items[1], LostFrame)
-    assert items[1].words == "1.tif holds several pictures: save each of them as a file of its own."
+    assert items[1].words == "1.tif contains several pictures: save each picture in a separate file."
 
 
 def test_jpeg_is_lossy_and_png_is_not(tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_jpeg_is_lossy_and_png_is_not(tmp_path: Path) -> None:
 
 
 def test_where_there_are_no_images_the_sentence_says_so(tmp_path: Path) -> None:
-    with pytest.raises(InputFileError, match=r"The folder .* must hold images .* but there is none"):
+    with pytest.raises(InputFileError, match=r"The folder .* must contain images .* but there is none"):
         open_source(str(tmp_path))
     with pytest.raises(InputFileError, match=r"The pattern .* must match images .* but there is none"):
         open_source(str(tmp_path / "*.png"))

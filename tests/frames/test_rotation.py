@@ -48,7 +48,7 @@ def test_pictures_stand_as_the_file_asks(tmp_path: Path, rotation_deg: int) -> N
     assert (source.description.width_px, source.description.height_px) == (
         (HEIGHT, WIDTH) if turned else (WIDTH, HEIGHT)
     )
-    assert any("turned by" in note for note in source.description.notes) is (rotation_deg != 0)
+    assert any("rotated by" in note for note in source.description.notes) is (rotation_deg != 0)
     for number, frame in enumerate(frames):
         assert isinstance(frame, Frame)
         assert np.array_equal(frame.pixels, np.rot90(picture(number), rotation_deg // 90))
@@ -74,4 +74,4 @@ def test_an_odd_angle_is_said_and_left_alone(tmp_path: Path) -> None:
     (first, *_) = list(source)
     assert isinstance(first, Frame)
     assert np.array_equal(first.pixels, picture(0))
-    assert any("no quarter turn" in note for note in source.description.notes)
+    assert any("not a multiple of 90 degrees" in note for note in source.description.notes)

@@ -152,7 +152,7 @@ def test_a_frame_of_another_size_is_damaged_and_the_rest_is_read(tmp_path: Path)
     found = read(tmp_path / "clip.mkv")
     assert statuses(found) == [Status.OK, Status.OK, Status.DAMAGED, Status.OK]
     assert isinstance(found[2], LostFrame)
-    assert found[2].words == "It has 32x32 pixels, but the recording 64x48."
+    assert found[2].words == "The frame has 32x32 pixels, but the recording has 64x48."
 
 
 def test_a_repeated_time_is_a_duplicate_and_equal_pictures_are_not(tmp_path: Path) -> None:
@@ -173,7 +173,7 @@ def test_what_is_there_of_a_clip_cut_off_is_read_and_then_it_is_damaged(
     assert 15 <= len(good) < 30
     assert [item.time_s for item in good] == [item.time_s for item in whole[: len(good)]]
     assert isinstance(cut[-1], LostFrame)
-    assert "The recording is cut off here: the file announces 2.00 s and holds" in cut[-1].words
+    assert "The recording is truncated here: the file states 2.00 s but contains" in cut[-1].words
 
 
 def test_flipped_bytes_in_a_lossless_clip_fail_their_checksum(tmp_path: Path) -> None:
@@ -242,13 +242,13 @@ def test_sound_alone_is_no_video(tmp_path: Path) -> None:
         sound = av.AudioFrame.from_ndarray(np.zeros((1, 800), np.int16), format="s16", layout="mono")
         sound.sample_rate = 8000
         container.mux(stream.encode(sound))
-    with pytest.raises(DataError, match="must hold a video, but has no video stream"):
+    with pytest.raises(DataError, match="must contain a video, but has no video stream"):
         open_source(str(tmp_path / "sound.wav"))
 
 
 def test_a_rate_is_refused_for_what_has_times(tmp_path: Path) -> None:
     write_clip(tmp_path / "clip.mp4", timed(smooth_pictures(2)), H264())
-    with pytest.raises(UsageError, match="is a video with its own: leave it out"):
+    with pytest.raises(UsageError, match="is a video with its own times: leave --rate-hz out"):
         open_source(str(tmp_path / "clip.mp4"), Wish(rate_hz=25.0))
 
 

@@ -32,7 +32,7 @@ def _with(line: str, instead: str) -> str:
         ("schema = 1\n[[gauge]\n" + EDGE, ["TOML"]),
         ("schema = 1\n[gauge]\n" + EDGE, ["[[gauge]]"]),
         ("schema = 1\nunits = 3\n[[gauge]]\n" + EDGE, ["units"]),
-        (f"schema = 1\n[[gauge]]\n{EDGE}[[gauge]]\n{EDGE}", ["'a'", "again", "line 10"]),
+        (f"schema = 1\n[[gauge]]\n{EDGE}[[gauge]]\n{EDGE}", ["'a'", "unique", "line 10"]),
         (_with("kind", 'kind = "egde"'), ["kind", "edge"]),
         (_with("kind", "kind = 3"), ["kind", "3"]),
         (_with("kind", ""), ["kind"]),

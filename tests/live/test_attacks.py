@@ -254,7 +254,7 @@ def test_an_oversized_message_and_a_flood_close_the_socket_and_nothing_else(page
 def test_who_only_looks_changes_nothing_and_may_stop_a_motor(page: Page, session: Session) -> None:
     with socket_of(page.viewer_address) as viewer:
         for name in ("record", "zero", "scale", "region", "calibrate", "bed_move", "take_over", "snapshot", "measure"):
-            assert "only looks" in reply(viewer, {"do": name, "px_per_mm": 3.0})["refused"]
+            assert "you can only watch" in reply(viewer, {"do": name, "px_per_mm": 3.0})["refused"]
         assert session.choices.scale == BareScale(34.0)
         # The live view has no test bed; that is another refusal.
         assert "no test bed" in reply(viewer, {"do": "bed_stop"})["refused"]

@@ -146,7 +146,7 @@ def test_a_value_is_taken_read_back_and_seen_in_the_picture(session: Session, ca
     assert put(session, "exposure", 5) == "The camera's exposure was 10 ms and is 5 ms from now on."
     assert told(session)["exposure"] == 5.0
     until(lambda: brightest(session) < 0.6 * before)
-    assert "is 4.5 ms from now on (4.3 ms was asked)" in put(session, "exposure", 4.3)
+    assert "is 4.5 ms from now on (4.3 ms was requested)" in put(session, "exposure", 4.3)
     # The driver is touched by the thread alone that reads it, after the main one opened it.
     assert cameras[0].threads <= {get_ident(), session.capture._thread.ident}
 
@@ -165,7 +165,7 @@ REFUSED: tuple[tuple[str, object, str], ...] = (
     ("gain", 3, "was set to gain 3, but stays at 1"),
     ("focus", 13, "refused to set focus 13 (OSError: VIDIOC_S_CTRL"),
     ("focus", 251, "must be 0 to 250, but is 251"),
-    ("shutter", 1, "can be changed while it runs: exposure, gain, focus, frame rate; 'shutter' is none of them"),
+    ("shutter", 1, "can be changed while this camera runs (exposure, gain, focus, frame rate), but is 'shutter'"),
     ("", 1, "name must be a text"),
     ("<script>" * 200, 1, "name must be a text"),
 )
@@ -220,7 +220,7 @@ def test_a_change_during_a_recording_stands_in_its_events_and_focus_waits(sessio
     about = json.loads((run / "run.json").read_text())
     assert about["device"]["camera"]["exposure"] == "8"
     assert "is 60 from now on" in put(session, "focus", 60.0)
-    assert any("calibrate anew" in each.words for each in session.messages)
+    assert any("calibrate again" in each.words for each in session.messages)
 
 
 def test_a_camera_that_comes_back_gets_what_was_chosen(session: Session, cameras: list[PluginCamera]) -> None:
@@ -237,7 +237,7 @@ def test_a_camera_that_is_silent_says_so_and_is_not_changed_later(
     monkeypatch.setattr("fingervision.live.adjustments.ANSWERED_WITHIN_S", 0.2)
     cameras[0].is_stuck = True
     time.sleep(0.05)
-    with pytest.raises(CameraError, match="does not answer, so its exposure was not changed"):
+    with pytest.raises(CameraError, match="does not answer, so that its exposure was not changed"):
         put(session, "exposure", 5.0)
     cameras[0].is_stuck = False
     measured = session.history.count

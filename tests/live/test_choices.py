@@ -36,7 +36,7 @@ def test_without_limits_or_gap_there_is_no_verdict() -> None:
         (Choices(scale=BareScale(34.0), below_tip_mm=-1.0), "--below-tip-mm must be positive, but is -1."),
         (
             Choices(least_mm=2.0, greatest_mm=1.0),
-            "The lower limit must be below the upper one, but they are 2",
+            "The lower limit must be below the upper limit, but the limits are 2",
         ),
     ],
 )

@@ -56,7 +56,7 @@ def refused(*arguments: str | Path) -> FingervisionError:
             ("simulated", "--host", "nowhere.invalid", "--password-file", "password"),
             "--host must be an address of this machine",
         ),
-        (("simulated", "--host", "0.0.0.0"), "--host 0.0.0.0 lets other machines connect, which needs a password"),
+        (("simulated", "--host", "0.0.0.0"), "--host 0.0.0.0 lets other computers connect, which needs a password"),
         (
             ("simulated", "--password-file", "short"),
             "The password in short must have at least 12 characters, but has 3.",

@@ -32,7 +32,7 @@ def test_every_frame_is_measured_and_a_cut_is_a_gap(
     view.until(lambda seen: time.monotonic() - began_s > WATCHED_S, within_s=6 * WATCHED_S)
     camera.stop()
     before = len(view.lines())
-    view.until(lambda seen: "cut off" in seen.text())
+    view.until(lambda seen: "is interrupted" in seen.text())
     time.sleep(CUT_S)
     camera.start()
     view.until(lambda seen: len(seen.lines()) > before + 25)
@@ -47,7 +47,7 @@ def test_every_frame_is_measured_and_a_cut_is_a_gap(
     assert min(late_s[-PROMPT_AMONG:]) == pytest.approx(min(late_s[:PROMPT_AMONG]), abs=4 * 0.04)
     longest_s = max(after["time_s"] - line["time_s"] for line, after in pairwise(lines))
     assert longest_s > CUT_S
-    assert "The source is back" in view.text()
+    assert "The source has returned" in view.text()
 
     (run,) = view.runs()
     table = (run / "gaps.csv").read_text()

@@ -178,7 +178,7 @@ def test_a_zero_does_not_outlive_the_scale_that_it_was_taken_with(session: Sessi
     assert session.choices.zero_mm == 1.25
     session.choose(scale=BareScale(20.0))
     assert session.choices.zero_mm == 0.0
-    assert session.messages[-1].words.startswith("The zero is off")
+    assert session.messages[-1].words.startswith("The zero was removed")
 
 
 def test_a_zeroed_value_and_its_tolerance_agree(session: Session) -> None:
@@ -264,7 +264,7 @@ def test_frames_that_nobody_measures_hold_up_no_capture_and_are_counted_and_said
     lost = capture.overflowed
     said: list[tuple[str, str]] = []
     OverflowReport(capture, lambda name, words: said.append((name, words))).say()
-    assert said == [("overflowed", f"{lost} frames came faster than they could be measured, and are lost.")]
+    assert said == [("overflowed", f"{lost} frames are lost, because they arrived faster than they could be measured.")]
 
 
 def test_a_disk_that_stands_still_holds_up_nobody_and_ends_the_recording_with_a_sentence(

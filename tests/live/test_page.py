@@ -153,11 +153,11 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
         page.locator("#verdict", has_text=verdict).wait_for()
     page.fill("#least", "7")
     page.press("#least", "Enter")
-    says(page, "The lower limit must be below the upper one, but they are 7 and 5 mm.")
+    says(page, "The lower limit must be below the upper limit, but the limits are 7 and 5 mm.")
     page.press("#least", "Escape")
 
     page.locator("body").press("z")
-    says(page, "Gaps are shown less")
+    says(page, "Displayed gaps are reduced by")
     off_mm = float(re.search(r"less ([\d.]+) mm", page.locator("#log li", has_text="less").inner_text())[1])
     page.locator("#unzero").wait_for()
     page.locator("body").press("p")
@@ -250,7 +250,7 @@ def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     # How soon is counted by the program, and not by a browser that waits for a busy machine.
     assert SILENT_S + STATE_EVERY_S < SAID_WITHIN_S
     camera.start()
-    says(page, "The source is back")
+    says(page, "The source has returned")
     shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
 
 
@@ -301,7 +301,7 @@ def test_a_zeroed_value_says_so_and_its_tolerance_and_table_agree(
     page.locator("#verdict", has_text="pass").wait_for()
     page.fill("#px_per_mm", "20")
     page.press("#px_per_mm", "Enter")
-    says(page, "The zero is off")
+    says(page, "The zero was removed")
     shown(page, "document.querySelector('#zeroed').hidden")
 
 

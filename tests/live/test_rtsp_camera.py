@@ -74,11 +74,11 @@ def test_an_rtsp_camera_keeps_its_clock_and_comes_back_after_a_cut(
     view = live(rtsp_camera.address, *SCALE, "--no-page", "--json")
     view.until(lambda seen: len(seen.lines()) > 30)
     rtsp_camera.stop()
-    view.until(lambda seen: f"The stream {rtsp_camera.address} is cut off" in seen.text())
+    view.until(lambda seen: f"The stream {rtsp_camera.address} is interrupted" in seen.text())
     before = len(view.lines())
     time.sleep(CUT_S)
     rtsp_camera.start()
-    view.until(lambda seen: "The source is back" in seen.text() and len(seen.lines()) > before + 25)
+    view.until(lambda seen: "The source has returned" in seen.text() and len(seen.lines()) > before + 25)
     assert view.stop() == 0
 
     lines = view.lines()

@@ -97,7 +97,7 @@ def test_refusals_say_what_must_be(tmp_path: Path) -> None:
         ([], H264(), r"at least one frame, but clip.mp4 would have none"),
         (untimed, H264(), r"must have its time, but frame 0 has none"),
         (backwards, H264(), r"increase, but frame 1 is at 0.5 s, after 1 s"),
-        (mixed, H264(), r"frames of a clip must be alike, but frame 1 is \(60, 160\)"),
+        (mixed, H264(), r"frames of a clip must have the same shape and type, but frame 1 is \(60, 160\)"),
         (odd, H264(), r"H264 needs an even width and height, but the frames have 160 x 119 pixels"),
         (wide, Mjpeg(), r"Mjpeg holds 8 bits, but the frames have 16"),
         (some_frames(Camera(bits=16, tint=(1.0, 1.0, 1.0))), Ffv1(), r"FFV1 clips hold colour with 8 bits"),
@@ -110,5 +110,5 @@ def test_refusals_say_what_must_be(tmp_path: Path) -> None:
         write_clip(tmp_path / "missing" / "clip.mp4", frames, H264())
     with pytest.raises(DataError, match=r"quality must lie between 0 and 100, but is 101"):
         through_jpeg(frames[0].pixels, 101)
-    with pytest.raises(DataError, match=r"JPEG holds 8 bits, but the frame has 16"):
+    with pytest.raises(DataError, match=r"JPEG stores 8 bits, but the frame has 16"):
         through_jpeg(wide[0].pixels, 90)

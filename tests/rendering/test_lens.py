@@ -125,7 +125,11 @@ def test_what_the_camera_sees_is_drawn_where_it_lies() -> None:
 
 
 def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(DataError, match=r"must not fold the picture, but k1 = -0.5 with k2 = 0"):
+    with pytest.raises(
+        DataError,
+        match=r"must be invertible within 1.5 half diagonals of the frame, but k1 = -0.5 "
+        "with k2 = 0",
+    ):
         RadialLens(k1=-0.5)
     with pytest.raises(DataError, match=r"at most 45 degrees, seen from a positive distance, but is 60"):
         Tilt(about_x_deg=60.0)

@@ -253,9 +253,13 @@ def test_refusals_say_what_must_be() -> None:
         Scene(light=Light(ground=300.0))
     with pytest.raises(DataError, match=r"at least one pixel each way, but is 0 x 480"):
         Scene(width_px=0)
-    with pytest.raises(DataError, match=r"Light must not be negative: slopes lie between -2 and 2"):
+    with pytest.raises(DataError, match=r"light must not be negative: slopes must lie between -2 and 2"):
         Light(slope_x=2.5)
     with pytest.raises(DataError, match=r"width_px of a rim must be positive, but is 0"):
         Rim(0.0, 250.0)
-    with pytest.raises(DataError, match=r"Grains must have a number, a size and a level"):
+    with pytest.raises(
+        DataError,
+        match=r"number of grains must be at least 0, their sizes positive, and their grey "
+        "levels at least one",
+    ):
         dust(3, np.random.default_rng(0), size_px=(0.0, 2.0))

@@ -68,5 +68,5 @@ def test_refusals_say_what_must_be() -> None:
         bar(0.0, 100.0, x_px=0.0, y_px=0.0)
     with pytest.raises(DataError, match=r"square_px must be positive, but is -3"):
         chessboard((9, 6), -3.0, x_px=0.0, y_px=0.0)
-    with pytest.raises(DataError, match=r"A slot must lie inside its plate.*choose a shorter one"):
+    with pytest.raises(DataError, match=r"A slot must lie inside its plate.*choose a shorter slot"):
         slot(100.0, 900.0, x_px=320.0, y_px=240.0)

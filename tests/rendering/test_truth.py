@@ -190,7 +190,7 @@ def test_where_there_is_no_gap_there_is_a_reason(scene: Scene, status: Status) -
 def test_refusals_say_what_must_be() -> None:
     with pytest.raises(DataError, match=r"at least the step between the tips \(30 px\), but is 20"):
         two_fingers(20.0, tip_step_px=30.0)
-    with pytest.raises(DataError, match=r"Every size and tilt of two fingers must be a number"):
+    with pytest.raises(DataError, match=r"Every size and tilt of two fingers must be a finite number"):
         two_fingers(float("nan"))
     with pytest.raises(DataError, match=r"below_tip_px must lie between 0 and the finger's length, but is -1"):
         two_fingers(20.0, below_tip_px=-1.0)
@@ -199,7 +199,11 @@ def test_refusals_say_what_must_be() -> None:
     with pytest.raises(DataError, match=r"slant must be at most 45 degrees, but is 80"):
         two_fingers(20.0, tip=SquareTip(slant_deg=80.0))
     up, left = two_fingers(20.0), two_fingers(20.0, direction=Direction.LEFT)
-    with pytest.raises(DataError, match=r"must be two and point the same way, but point up, left"):
+    with pytest.raises(
+        DataError,
+        match=r"must have two fingers that point in the same direction, but the directions "
+        "are up, left",
+    ):
         truth(replace(up, fingers=(up.fingers[0], left.fingers[0])), IDEAL_CAMERA, BELOW_TIP_PX)
     with pytest.raises(DataError, match=r"width and length must be positive, but are 0 px and"):
         two_fingers(20.0, width_px=0.0)

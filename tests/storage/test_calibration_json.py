@@ -73,7 +73,7 @@ def test_a_file_of_another_program_needs_no_budget(tmp_path: Path) -> None:
 
 
 NONSENSE: list[tuple[dict[str, Any], str]] = [
-    ({"schema": 2}, "it has schema 2, and this program knows up to 1; use a newer fingervision"),
+    ({"schema": 2}, "it has schema 2, but this program reads only schemas up to 1; use a newer fingervision"),
     ({"schema": "1"}, "schema must be a whole number from 1, but is '1'"),
     ({"px_per_mm": -3.0}, "px_per_mm must be a positive number, but is -3.0"),
     ({"px_per_mm": None}, "px_per_mm must be a positive number, but is None"),

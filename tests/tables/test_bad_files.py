@@ -81,7 +81,7 @@ def test_macros_are_not_looked_at(tmp_path: Path) -> None:
     path = rewritten(binary.excel_plain(tmp_path), xl__vbaProject_dot_bin=b"\xd0\xcf\x11\xe0 Sub Auto_Open()")
     table = read_measured_table(path.rename(tmp_path / "macros.xlsm"))
     np.testing.assert_allclose(table.gap_mm, binary.GAP_MM, atol=1e-9)
-    assert any("macros not looked at" in note for note in table.notes)
+    assert any("without its macros" in note for note in table.notes)
 
 
 def test_a_formula_that_was_never_calculated_is_told_by_its_cell(tmp_path: Path) -> None:

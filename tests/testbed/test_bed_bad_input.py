@@ -204,7 +204,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
 def test_a_demonstration_leaves_other_files_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("mine")
     for out, sentence in (
-        (tmp_path, f"--out must be a new or empty folder, but {tmp_path} holds thesis.tex: name another."),
+        (tmp_path, f"--out must be a new or empty folder, but {tmp_path} contains thesis.tex: name another folder."),
         (tmp_path / "thesis.tex", f"--out must be a folder, but {tmp_path / 'thesis.tex'} is a file: name another."),
     ):
         with pytest.raises(OutputError) as raised:

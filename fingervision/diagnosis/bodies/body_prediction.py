@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 _BENT_NODES = (-1.0, -0.5, 0.35, 0.7, 1.0)
 """Positions, as shares of the input's range on either side, at which equilibria in the deformed shape are computed."""
 _SLIP_NODES = np.geomspace(1e-3, 1e3, 121)
-"""Inputs relative to the play's radius at which the slip of a pivot is tabulated; beyond the last, the pin lies at the
-edge of its hole."""
+"""Inputs relative to the play's radius at which the slip of a pivot is tabulated; beyond the last input, the pin lies
+at the edge of its hole."""
 FORCE = "force_n"
 
 
@@ -161,7 +161,7 @@ def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float)
     def length(beyond: Array) -> Array:
         return np.asarray(np.hypot(*(nodes * (load / (stiffness + beyond[:, None])).T)))
 
-    # Newton's iteration on 1 / |s| converges from the left of the root; bisection on a bracket is as quick here.
+    # Find the root by bisection, which is as fast here as Newton's iteration on 1 / |s|.
     low = np.zeros(nodes.size)
     high = nodes * float(np.hypot(*load)) + 1e-12
     outside = length(low) > 1.0

@@ -67,11 +67,11 @@ def composed(
     share = float(np.clip(1.0 - (after_mm / max(before_mm, 1e-300)) ** 2, 0.0, 1.0))
     view = next_view(evidence, answers)
     said = set_words(members)
-    sentence = f"Poses of the bodies tell the place: {said} (95 %)."
+    sentence = f"The poses of the bodies show the place: {said} (95 %)."
     if len(keys) > 1:
-        sentence = f"Poses of the bodies tell the place but for this set: {said} (95 % each)."
+        sentence = f"The poses of the bodies leave these places possible: {said} (95 % each)."
     if rest.verdict is not Verdict.AGREES:
-        sentence += f" Beside it: {rest.sentence}"
+        sentence += f" In addition: {rest.sentence}"
     report = replace(
         rest,
         verdict=verdict,

@@ -22,12 +22,12 @@ FORCE_SLOPE_ERROR = 0.05
 """Relative uncertainty of the force: the modulus of a printed or rolled sheet is not known better (mechanics.md,
 section 5)."""
 BY_EDGES = 3.0
-"""Prior standard deviation of the coefficient of `BodyPrediction.by_edges`: it is 0 for poses of the bodies' areas, 1
-for poses from all straight edges, and may be two or three for poses from those edges that a picture shows. The table
-does not say which applies."""
+"""Prior standard deviation of the coefficient of `BodyPrediction.by_edges`: the coefficient is 0 for poses of the
+bodies' areas, 1 for poses from all straight edges, and perhaps two or three for poses from those edges that a picture
+shows. The table does not state how the poses were measured."""
 HINGE_ERROR, OWN_HINGE_ERROR = 0.01, 0.003
 """Relative errors of a hinge's stiffness: of the hinge tables compared with brick elements, including the root in the
-body (`models/README.md`); and the part not shared with the hinge's mirror image."""
+body (`models/README.md`); and the part that is not shared with the hinge's mirror image."""
 SCALE_ERROR = 3e-4
 """Relative uncertainty of the picture's scale, from a reference of 2 mm known to a micrometre and its edges
 (measuring.md)."""

@@ -92,7 +92,7 @@ class AugmentedDataset:
         before = {(name, parameter.name): parameter for name, parameter in self.first.parameters(names)}
         for name, now in self.both.parameters(names):
             if (name, now.name) not in before:
-                out[name][now.name] = 0.0  # the start of the new run
+                out[name][now.name] = 0.0  # start state of the new run
                 continue
             was = before[name, now.name]
             near = AT_END * (was.upper - was.lower)

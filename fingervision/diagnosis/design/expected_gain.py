@@ -100,7 +100,7 @@ def expected_gain(
         for values, first in zip(truths, noisy, strict=True):
             run = AugmentedDataset.of(data, first, input_mm, rezeroed=rezeroed)
             target = run.expected(values)
-            # A run after a re-zeroing is offset by as much as both runs together then say.
+            # The offset of a run after a re-zeroing is estimated from both runs together.
             sigma_mm = None if rezeroed else _offsets(first, pair[true], rng)
             after = run.score(target, pair[other], starts, sigma_mm) - run.score(target, pair[true], [values], sigma_mm)
             known = sigma_mm if first.offsets.runs > 1 else None

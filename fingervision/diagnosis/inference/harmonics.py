@@ -14,7 +14,7 @@ from fingervision.effects import catalogue
 ORDERS = (2, 3)
 """Orders of the harmonics that accompany the first harmonic of a screw or resolver."""
 LARGEST = 0.25
-"""Amplitude relative to the first harmonic above which another harmonic counts as a separate cause."""
+"""Ratio to the amplitude of the first harmonic above which another harmonic counts as a separate cause."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

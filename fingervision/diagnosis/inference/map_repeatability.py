@@ -1,4 +1,4 @@
-"""Check that a map of position errors is repeatable: a map fitted to some passes must predict the others.
+"""Check that a map of position errors is repeatable: a map fitted to some passes must predict the remaining passes.
 
 By definition, a map of position errors is the same at each visit of a position (ISO 230-2). A curve over the input can
 also be fitted to runs that differ in gain, or to a creep interrupted by stops, but such a curve does not predict a run
@@ -19,12 +19,12 @@ cost as much."""
 
 
 def foretells_other_passes(problem: Problem, explanation: Explanation, position_map: PositionMap) -> bool:
-    """Cross-validate a map: predict each part (run, or visit of the positions in a single run) from all others.
+    """Cross-validate a map: predict each part (run, or visit of the positions in a single run) from all other parts.
 
     The log predictive density of a part of the data is that of all rows minus that of the other rows (Geisser & Eddy
     1979, doi:10.1080/01621459.1979.10481632). The sum of the log predictive densities over the parts must be larger
-    with the map than without it, and no part may contradict the others by very strong evidence: the error of a single
-    run is not a map.
+    with the map than without it, and no part may contradict the other parts by very strong evidence: the error of a
+    single run is not a map.
 
     Parameters
     ----------

@@ -166,6 +166,6 @@ def admissible(
             excluded[name] = "left out by request"
         elif isinstance(searched, str):
             excluded[name] = searched
-        elif not effect.curve:  # a curve is estimated as a whole beside the others
+        elif not effect.curve:  # a curve is estimated as a whole, in addition to the effects
             able[name] = effect
     return able, excluded

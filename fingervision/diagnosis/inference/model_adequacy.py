@@ -100,7 +100,8 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     several = len(found.names) > 2
     columns, rows = shapes.columns, int(problem.measured.size)
     basis = _Basis.of(problem, columns)
-    # Where repeats tell the noise, readings at rest show of a play what a probe shows as well, with its form's errors.
+    # If the noise is known from repeats, a probe can also represent a play in readings at rest, including the
+    # inexactness of the play's formula: such probes are excluded.
     same = several or problem.form_share > SMALL_SHARE
     barred = _is_an_effect_itself(problem, found, basis) if same else np.zeros(columns.shape[1], dtype=bool)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
@@ -230,7 +231,8 @@ def remaining_structure(
     coefficient = float(dot[top]) / float(norm[top])
     if below_the_input(problem, _size_in_runs(problem, coefficient * shapes.before_whitening(top))):
         return None, words
-    # A small part of what is explained: the form of an effect, or of a map between its nodes, is no truer than that.
+    # A small part of the explained change is attributed to the inexactness of an effect's formula, or of a map between
+    # its nodes.
     if gain[top] < problem.form_share**2 * (_explained(problem, best) + problem.mapped):
         return None, words
     return words, None

@@ -10,14 +10,15 @@ from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
 
 NEEDED = 1.1
-"""Factor by which dropping an effect may increase the residual (RMS); an effect that reduces it by more is kept."""
+"""Factor by which dropping an effect may increase the residual (RMS); an effect that reduces the residual by more is
+kept."""
 AS_MUCH = 2.0**0.5
 """Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
 power, because a richer formula also fits part of that structure."""
 
 
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
-    """Drop effects that explain less than the remaining residual, because they may only imitate a part of it.
+    """Drop effects that explain less than the remaining residual: they may only imitate a part of that residual.
 
     If structure remains in addition to several effects, the fit of each effect also absorbs part of that structure.
     """

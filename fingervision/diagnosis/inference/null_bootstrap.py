@@ -41,8 +41,9 @@ def noise_doubt(problem: Problem) -> float:
     """Largest relative standard uncertainty, over the channels, of the noise power at low frequency.
 
     The power at zero frequency is proportional to (1 + rho) / (1 - rho), and an autoregression determines rho with
-    standard uncertainty sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). If a spectrum is fitted without its
-    lowest frequencies, the noise power there is less well determined (`noise_by_spectrum`).
+    standard uncertainty sqrt((1 - rho^2) / n): the relative uncertainty of the power is therefore 2 / sqrt((1 - rho^2)
+    n). If a spectrum is fitted without its lowest frequencies, the noise power there is less well determined
+    (`noise_by_spectrum`).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
@@ -92,7 +93,7 @@ def linear_thresholds(
         norm = np.einsum("ij,ij->j", kept, kept)
     usable = norm > 1e-9 if among is None else among & (norm > 1e-9)
     owner = np.array(names)
-    # The noise itself is estimated, from as many samples as there are.
+    # The noise level itself is uncertain, because it is estimated from the samples.
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
     margin = 1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))
     tail, excess = {}, np.full(LINEAR_DRAWS, -np.inf)
@@ -102,7 +103,7 @@ def linear_thresholds(
         if not mine.any():
             continue
         gains = np.max(taken[mine], axis=0) * doubt
-        # Refitting finds what lies between the shapes of the grid; a single column has no shape.
+        # Refitting also reaches values between the grid points; an effect with a single column has no grid.
         gains = gains * margin + 1.5 if mine.sum() > 1 else gains
         tail[name] = float(np.quantile(gains, OWN_QUANTILE))
         excess = np.maximum(excess, gains - tail[name])
@@ -202,7 +203,7 @@ def exceeds_noise(
     found: list[float] = []
     quantile = 0.0
     doubt = noise_doubt(problem)
-    # Jumps that went astray have to be found again as thoroughly as the measurement's were.
+    # Misplaced jumps must be searched for as thoroughly as in the measurement.
     astray = jumps_astray(problem, base.names)
     steps, draws = (MANY_STEPS, FEWEST) if astray else (5, DRAWS)
     for _ in range(draws if problem.chain.history.input_mm.size <= LONG else min(draws, LONG_DRAWS)):
@@ -214,14 +215,15 @@ def exceeds_noise(
         starts = [{**alone.values, **suspect} for suspect in suspects]
         asked = [name for suspect in suspects for name in suspect]
         for _ in range(len(asked) + REFITTED):
-            # What the measurement speaks for first, wherever it suits this draw; then what suits the draw best.
+            # First try the effects that the measurement suggests, then those that fit this draw best.
             among = owner == asked.pop(0) if asked else np.ones(owner.size, dtype=bool)
             top = int(np.argmax(np.where(among, above, -np.inf)))
             if np.isfinite(above[top]) and among[top]:
                 name = atoms.names[top]
                 starts.append({**alone.values, name: atoms.begin(top, float(coefficient[top]))})
                 above[owner == name] = -np.inf
-        # What jumps leave that went astray is noise of a level of its own, in the measurement and in every draw.
+        # After a failed jump fit, use the measured residual level as the noise level, in the measurement and in every
+        # draw.
         luck = base.score / alone.score if astray else float(np.exp(doubt * rng.standard_normal()))
         fits = [fit(shaken, tuple(start), start, target=target, iterations=6) for start in starts]
         found.append(
@@ -230,7 +232,7 @@ def exceeds_noise(
             else -min(thresholds.values(), default=0.0)
         )
         quantile = rare(found)
-        # The quantile's own error is that of a mean and of GUMBEL standard deviations together.
+        # The error of the quantile combines that of the mean and that of GUMBEL standard deviations.
         error = float(np.std(found)) * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(found)))
         if len(found) >= FEWEST and abs(excess - quantile) > SURELY * error:
             break

@@ -26,7 +26,7 @@ SCALES = (0.02, 0.1, 0.4, 1.2)
 """Step sizes of the local walk relative to the widths from the curvature: one of them is suitable if the curvature is
 misleading."""
 START_STEP = 1e-3
-"""Step for the derivative by a start state."""
+"""Step for the derivative with respect to a start state."""
 JUMPS = 0.01
 """Initial relative width of the walk for parameters on which the prediction depends discontinuously."""
 
@@ -108,11 +108,11 @@ def _widths(problem: Problem, explanation: Explanation, walk: _Coordinates, best
     step = np.maximum(1e-4 * np.abs(best), 1e-6 * span)
     covariance = np.diag(span**2)
     for _ in range(2):
-        # The difference is taken again over the width that it gave: a play's prediction is no smooth function.
+        # Repeat the differences over the width found, because the prediction of a play is not smooth.
         normal = _curvature(problem, explanation, walk, best, step) + np.diag(1.0 / span**2)
         covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         step = np.clip(np.sqrt(np.diag(covariance)), 1e-9 * span, 0.1 * span)
-    # What jumps has no derivative; the walk has to find its width from a hundredth of its size downwards.
+    # Parameters with jumps have no derivative: the walk starts with a width of a hundredth of the parameter.
     covariance[rugged] = 0.0
     covariance[:, rugged] = 0.0
     covariance[rugged, rugged] = (JUMPS * best[rugged]) ** 2
@@ -206,7 +206,7 @@ def settled(
     explanation : Explanation
         Explanation whose covariance is the mean square of the draws about its values. Noise of relative size
         `FORM_SHARE` is added for the inexactness of an effect's formula, in as many independent shapes as the catalogue
-        distinguishes. The size of a jump is not known better than the recorded input.
+        has. The size of a jump is not known better than the recorded input.
     found : tuple of dict
         The draws.
     """

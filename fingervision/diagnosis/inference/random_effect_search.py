@@ -55,7 +55,7 @@ def beside_gains(state: Searched, look: Look) -> Searched:
     beside = look.again(replace(state.data, run_gains=gains), known)
     stands = standing_of(beside.data, beside.found)
     if not stands.is_little:
-        # What all runs share is an effect, and was taken for their scatter.
+        # A common mean of the gains is an effect, and must not be part of their scatter.
         apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
         if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
             beside = apart
@@ -87,7 +87,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
     else:
         first, gain = likeliest_map(found.problem, found.best)
         if gain < LEAST_GAIN and found.best.names:
-            # What was named may itself stand for a part of the map.
+            # A named effect may represent a part of the map.
             first, gain = likeliest_map(found.problem, found.nothing)
         if gain < LEAST_GAIN and not asked:
             return state
@@ -97,7 +97,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
     plain = _without(beside.found.problem, first)
     parts = imitating_parts(plain, first, beside.found.best)
     if parts and not parts.keys() & look.forced:
-        # The map was estimated beside what stands for a part of it.
+        # The map was estimated together with effects that represent a part of it: estimate it again without them.
         names = tuple(name for name in beside.found.best.names if name not in parts)
         rest = fit(plain, names, beside.found.best.values, iterations=20) if names else plain.nothing()
         first, _ = likeliest_map(plain, rest)
@@ -114,10 +114,11 @@ def beside_map(state: Searched, look: Look) -> Searched:
     if asked:
         return beside
     if below_the_input(plain, float(np.sqrt(np.mean(second.fitted_mm**2)))):
-        # A stage that returns to its places is rounded alike there by its encoder, which is no effect.
+        # If a stage returns to the same positions, its encoder rounds them equally; these errors are no effect.
         said = _words_on_roundings(second, plain)
         return look.again(replace(state.data, roundings=second, notes=(*state.data.notes, said)), beside.found.best)
-    # Beside effects that explain the data, a map that takes none of their places is what their forms leave over.
+    # If effects explain the data and the map replaces none of them, the map only describes the inexactness of their
+    # formulas.
     stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
     worse = found.unknown is None and beside.found.unknown is not None
     return beside if not (stays or worse) and _gained(state, beside, second) > LEAST_GAIN else state
@@ -126,8 +127,8 @@ def beside_map(state: Searched, look: Look) -> Searched:
 def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
     rms_um, sigma_um = 1e3 * repeated.rms_mm.value, 1e3 * problem.chain.history.input_sigma_mm
     return (
-        f"the recorded input errs alike by {rms_um:.2g} um RMS whenever it comes to the same places: as this is less "
-        f"than its own standard uncertainty, {sigma_um:.2g} um, it is no {NAME}."
+        f"the error of the recorded input repeats at the same positions ({rms_um:.2g} um RMS): as this is less than "
+        f"its standard uncertainty, {sigma_um:.2g} um, it does not count as {NAME}."
     )
 
 
@@ -147,7 +148,7 @@ def _likelier(
     for begin in {e.names: e for e in begins if len(e.names) <= len(found.best.names)}.values():
         known, (effect, _) = begin, estimated(problem, begin)
         for _ in range(ROUNDS):
-            # What the effects stood in for is the random effect's now.
+            # Refit the effects, because the random effect now explains what they imitated.
             known = _refitted(_beside(problem, effect), known)
             effect, _ = estimated(problem, _left(problem, known))
         known = _refitted(_beside(problem, effect), known)

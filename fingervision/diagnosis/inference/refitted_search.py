@@ -23,12 +23,12 @@ from fingervision.diagnosis.input.observations import Observations
 
 BY_ACCIDENT = 1e-3
 """Probability of the observed or a larger mean of the runs' offsets by chance (Student's t), below which the offsets
-are given a common cause."""
+are assumed to have a common cause."""
 LOWERED = 0.9
 """Largest ratio of the residuals with and without such a common cause for which it is accepted."""
 MOST_SEARCHES = 3
-"""Most searches: the second is nearly always the last, and none is needed if the prediction depends linearly on the
-drawing's dimensions."""
+"""Most searches: the second search is nearly always the last, and no repetition is needed if the prediction depends
+linearly on the drawing's dimensions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,10 +13,11 @@ from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 
 QUIET = 3.0 * 2.0**0.5
-"""Square roots of the rows by which a chi-square must fall short of them before the noise was taken for too large:
-three of its standard deviations, sqrt(2 n)."""
+"""Deficit of chi-square relative to the number of rows n, in units of sqrt(n), above which the assumed noise was too
+large: three standard deviations sqrt(2 n) of chi-square."""
 MOST_REPEATS = 2
-"""Searches repeated with a smaller noise: beside the right effects its estimate hardly changes any more."""
+"""Largest number of repeated searches with a smaller noise: with the right effects, the estimate of the noise hardly
+changes any more."""
 
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:

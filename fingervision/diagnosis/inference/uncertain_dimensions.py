@@ -70,7 +70,7 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
             for step in (-STEP, STEP)
         ]
         column = (ends[1] - ends[0]) / (2.0 * STEP)
-        if np.any(np.abs(column) > 1e-12):  # a density or a yield stress moves nothing
+        if np.any(np.abs(column) > 1e-12):  # a density or a yield stress does not change the prediction
             columns.append(column)
             names.append(name)
     size = chain.stacked({}).size

@@ -6,7 +6,7 @@ from fingervision.diagnosis.inference.hypothesis import Problem
 
 OF_ROUNDING, OF_NOISE = 0.5, 0.1
 """Shares of the encoder's rounding error, and of the input's noise, that do not average out over many samples: equal
-positions are rounded equally, noise is smoothed."""
+positions are rounded equally, whereas noise is smoothed."""
 
 
 def below_the_input(problem: Problem, size_mm: float) -> bool:

@@ -65,7 +65,7 @@ class Observations:
     notes : tuple of str
         Remarks that a reader must know.
     refit : DrawingRefit
-        Effect of the drawing's uncertain dimensions on the prediction.
+        Change of the prediction by the drawing's uncertain dimensions.
     clock : ndarray of float, shape (m, p), or None
         Change of the prediction by the uncertain offset between the clocks of input and pictures.
     function : FunctionModel or None
@@ -129,7 +129,7 @@ class Observations:
             residual_mm = residual_mm if nuisance is None else residual_mm - nuisance.fitted_mm
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
-        # A reading is known to its last digit at best: rounding has the standard deviation of a step over root 12.
+        # The noise is at least the rounding of the last digit: its standard deviation is a step over root 12.
         floor = resolution(self.table.gap_mm) / float(np.sqrt(12.0))
         if self.table.u_random_mm is not None:
             floor = max(floor, float(np.median(self.table.u_random_mm)))
@@ -197,8 +197,8 @@ class Observations:
         along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
         path = input_path(self.table, self.chain.history, along_mm, commanded=commanded, overshoots=True)
         said = (
-            f"{turning_readings(self.table).size} readings repeat an outermost target: the stage was taken to have run "
-            "over beyond it in between, as in ISO 230-2, which explains the data better."
+            f"{turning_readings(self.table).size} readings repeat an outermost target: an overshoot of the stage "
+            "beyond this target, as in ISO 230-2, is assumed between them, because it explains the data better."
         )
         return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
 
@@ -241,7 +241,7 @@ class Observations:
             number = drawn.uncertain[name]
             u = number.u or 0.0
             left = self.refit.known.get(name, 1.0) * u
-            far = ": it lies farther off than the drawing states" if abs(by) > DOUBTFUL else ""
+            far = ": it differs by more than the drawing's uncertainty" if abs(by) > DOUBTFUL else ""
             out.append(
                 f"{name} was refitted to {number.value + by * u:.6g} +-{left:.2g}, "
                 f"drawn as {number.value:g} +-{u:.2g}{far}."

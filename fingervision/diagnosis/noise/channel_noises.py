@@ -56,7 +56,8 @@ def channel_noises(
     standing = () if explained else standing_still(history)
     if sum(hold.stop - hold.start for hold in standing) < FEWEST_STANDING:
         return everywhere
-    # What nothing explains yet moves with the stage and passes for noise; where the stage stands, less of it does.
+    # Unexplained changes that follow the motion of the stage would count as noise; in holds of the stage they are
+    # smaller.
     holds = over(standing)
     return holds if holds[0].total_mm < everywhere[0].total_mm else everywhere
 

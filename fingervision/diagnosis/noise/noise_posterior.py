@@ -33,7 +33,7 @@ def problems_of_drawn_noise(
     count : int
         Number of draws.
     rng : numpy Generator
-        For the draws.
+        Generator for the draws.
     """
     for noises in _noises(data, problem, explanation, count, rng):
         whitener = replace(problem.whitener, noises=noises)

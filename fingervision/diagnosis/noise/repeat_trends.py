@@ -50,7 +50,7 @@ def without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *s
 
 
 def wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of the repeats' residuals in successive rows; 0 if independent readings could show as much."""
+    """Correlation of the repeats' residuals in successive rows; 0 if it could be due to chance."""
     share, sigmas = follows_sigmas(rest, rows)
     return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
 
@@ -78,6 +78,6 @@ def trend_sigmas(groups: list[Array], pooled: float) -> float:
     neighbours = sum(float(np.sum(np.diff(group) ** 2)) for group in groups)
     pairs = sum(group.size - 1 for group in groups)
     ratio = 0.5 * neighbours / pairs / pooled
-    # Of one group of k: variance (k - 2) / (k^2 - 1); groups count by their pairs.
+    # A group of k readings has the variance (k - 2) / (k^2 - 1); groups are weighted by their numbers of pairs.
     variance = sum((group.size - 1) ** 2 * (group.size - 2) / (group.size**2 - 1) for group in groups) / pairs**2
     return (1.0 - ratio) / float(np.sqrt(variance)) if variance > 0.0 else 0.0

@@ -34,10 +34,10 @@ class _Likelihood:
 
 
 FEWEST_SAMPLES = 4
-"""Least number of samples of a run that tell more than the straight line taken from them and one correlation."""
+"""Least number of samples of a run: a straight line and one correlation are already estimated from them."""
 CORRELATIONS = np.linspace(0.0, 0.95, 39)
-"""Correlations that are tried, in steps of a quarter of what a hundred samples determine; beyond 0.95 noise cannot be
-told from a drift in so short a run."""
+"""Correlations that are tried, in steps of a quarter of the uncertainty for a hundred samples; above 0.95, noise cannot
+be distinguished from a drift in a short run."""
 
 
 def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags]) -> _Likelihood:

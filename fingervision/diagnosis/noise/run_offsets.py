@@ -87,7 +87,8 @@ class RunOffsets:
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
         found = np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
-        # Spreads come from a grid, and with one run there is only one: the searches ask for the same again and again.
+        # Results are cached, because spreads come from a grid, with one run even a single spread, and searches request
+        # the same ones repeatedly.
         found.setflags(write=False)
         self._metrics[sigma_mm] = found
         return found
@@ -162,7 +163,7 @@ class RunOffsets:
         """Scale of each channel; for all spreads, the penalty and the reduction of chi-square due to offsets."""
         shares = self.design.T @ residual
         if self.drawn:
-            # What the drawing's numbers explain is no scatter between runs.
+            # The part that the drawing's uncertain dimensions explain is not scatter between runs.
             inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
             shares = shares - self.gram[:, -self.drawn :] @ np.linalg.solve(inner, shares[-self.drawn :])
         found = []

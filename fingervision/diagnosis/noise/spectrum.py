@@ -6,8 +6,8 @@ from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
 
 SLOW, SLOW_EXPLAINED = 0.04, 0.02
-"""Frequencies, in cycles per sample, below which unexplained structure may be present, before and after effects are
-found."""
+"""Frequencies, in cycles per sample, below which unexplained structure may be present, before effects are found, and
+after."""
 TAPERED = 1.94
 """Number of neighbouring ordinates that count as one, because Hann's taper correlates them."""
 CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))

@@ -66,7 +66,7 @@ def residuals_of(found: Mapping[str, Comparison]) -> Figure:
 
 
 def _left_out(found: Mapping[str, Comparison]) -> tuple[int, ...]:
-    """Rows that no model's figure counts: what one model alone leaves out may be the other's disagreement."""
+    """Rows that are left out for every model: a row left out for one only may be a disagreement of another."""
     return tuple(sorted(set.intersection(*(set(one.left_out) for one in found.values()))))
 
 

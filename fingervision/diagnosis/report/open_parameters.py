@@ -1,4 +1,4 @@
-"""Parameters that may lie beyond the range in which they were sought: a warming slower than the table is long."""
+"""Parameters that may lie beyond their search range, such as the time constant of a warming longer than the table."""
 
 import numpy as np
 
@@ -22,9 +22,9 @@ def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Para
     Parameters
     ----------
     best : Explanation
-        The answer, with its covariance.
+        The best explanation, with its covariance.
     problem : Problem
-        Where the ranges come from.
+        Estimation problem with the search ranges.
 
     Returns
     -------

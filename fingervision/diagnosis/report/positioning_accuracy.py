@@ -141,7 +141,7 @@ def _target(place: float, up: dict[int, float], down: dict[int, float]) -> Targe
         u, freedom = float(paired.std(ddof=1) / np.sqrt(paired.size)), paired.size - 1
     elif above.s_mm is not None and below.s_mm is not None:
         u = float(np.hypot(below.s_mm / np.sqrt(below.n), above.s_mm / np.sqrt(above.n)))
-        # The smaller of the two, on the safe side of Welch and Satterthwaite.
+        # The smaller of the two degrees of freedom is a safe bound of Welch and Satterthwaite's formula.
         freedom = min(below.n, above.n) - 1
     return Target(place, below, above, below.mean_mm - above.mean_mm, u, freedom)
 
@@ -237,5 +237,7 @@ def _notes(targets: Sequence[Target]) -> tuple[str, ...]:
     single = [t.target_mm for t in targets if t.up is None or t.down is None]
     if single:
         places = ", ".join(f"{place:g}" for place in single[:8]) + (" and others" if len(single) > 8 else "")
-        notes.append(f"Approached from one side only, and not in the bidirectional figures: {places} mm.")
+        notes.append(
+            f"Approached from one side only, and therefore not included in the bidirectional values: {places} mm."
+        )
     return tuple(notes)

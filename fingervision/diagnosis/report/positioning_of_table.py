@@ -9,8 +9,8 @@ from fingervision.diagnosis.report.positioning_report import PositioningReport, 
 from fingervision.domain.effect import Array, Flags, Values
 
 STAGE_SLOPE = 0.05
-"""Largest difference of the model's slope from one for which the gap counts as the position of an axis. Scales of
-stages are off by parts in a thousand; a gripper amplifies by several times, so that position minus target has no
+"""Largest difference of the model's slope from one for which the gap counts as the position of an axis. Scale errors of
+stages are a few parts in a thousand. A gripper amplifies the input several times, so that position minus target has no
 meaning."""
 LINE = 1e-9
 """Deviation of a model from the straight line, as a share of its range, below which it counts as the line: rounding."""

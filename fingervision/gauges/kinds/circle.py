@@ -33,14 +33,15 @@ KEYS = ("x_px", "y_px", "diameter_px", "reach_px", "polarity")
 QUANTITIES = (("x", "length"), ("y", "length"), ("diameter", "length"))
 POLARITIES = {"any": 0, "light": 1, "dark": -1}
 SMALLEST_PX, LARGEST_PX = 5.0, 5000.0
-# A disc is looked for in a picture made smaller until its radius is this; the fit then starts a pixel off.
+# Radius of a disc in the reduced picture in which it is searched; the fit then starts within about a pixel.
 SEARCH_RADIUS_PX = 8.0
-# Diameters that are tried in the first frame, as shares of the stated one; and how far it may be off afterwards.
+# Diameters that are tried in the first frame, as shares of the stated diameter. Limits of the fitted diameter, also as
+# shares; largest relative change from frame to frame.
 TRIED = (0.8, 0.9, 1.0, 1.1, 1.25)
 LEAST_STATED, MOST_STATED, MOST_GROWTH = 0.7, 1.4, 0.1
-# Correlation of a disc with a picture of one, its surroundings half as wide as its radius.
+# Smallest correlation of a disc with its template, and width of the template's surroundings as a share of the radius.
 LEAST_CORRELATION, SURROUNDINGS = 0.6, 0.5
-# Sixteenths of the outline that stray from the circle by more than this share of the radius: another shape.
+# Largest deviation of a sixteenth of the outline from the circle, as a share of the radius.
 MOST_UNROUND = 0.05
 
 
@@ -124,7 +125,7 @@ class FollowedCircle:
             return refused
         reach = self._spec.reach_px * self._times
         if hypot(found.x_px - x, found.y_px - y) > reach + 1.0:
-            return GaugeStatus.NOT_FOUND, "it lies farther away than it may have moved"
+            return GaugeStatus.NOT_FOUND, "the disc is farther away than reach_px permits"
         return found
 
     def _refused(self, picture: Picture, found: Circle) -> tuple[GaugeStatus, str] | None:
@@ -135,19 +136,19 @@ class FollowedCircle:
         if found.blur_px >= LARGEST_BLUR_PX:
             return GaugeStatus.BLURRED, ""
         if abs(found.contrast) < CONTRAST_FLOOR * picture.top or found.noise > MOST_NOISE * abs(found.contrast):
-            return GaugeStatus.NOT_FOUND, "too little contrast"
+            return GaugeStatus.NOT_FOUND, "the outline has too little contrast"
         if self._spec.polarity * found.contrast < 0.0:
-            return GaugeStatus.NOT_FOUND, "of the other tone"
+            return GaugeStatus.NOT_FOUND, "the disc has the opposite polarity"
         if found.least_piece < LEAST_PIECE or found.unround_px > MOST_UNROUND * radius:
-            return GaugeStatus.NOT_FOUND, "its outline is no whole circle"
+            return GaugeStatus.NOT_FOUND, "the outline is not a complete circle"
         if not LEAST_STATED * stated <= radius <= MOST_STATED * stated:
-            return GaugeStatus.NOT_FOUND, "of another diameter"
+            return GaugeStatus.NOT_FOUND, "the diameter is too far from diameter_px"
         known = self._known
         if known is not None and not (
             abs(radius / known.radius_px - 1.0) < MOST_GROWTH
             and LEAST_OF_KNOWN <= found.contrast / known.contrast <= MOST_OF_KNOWN
         ):
-            return GaugeStatus.NOT_FOUND, "of another diameter or contrast"
+            return GaugeStatus.NOT_FOUND, "diameter or contrast differ too much from those in the previous frame"
         if not 0.0 < float(np.max(np.diag(found.covariance))) < LEAST_SURE_PX**2:
             return GaugeStatus.LOW_CONTRAST, ""
         return None
@@ -184,7 +185,7 @@ class FollowedCircle:
         if match.correlation < LEAST_CORRELATION:
             return GaugeStatus.NOT_FOUND, ""
         if not match.is_alone:
-            return GaugeStatus.AMBIGUOUS, "another disc lies within 1.5 reach_px"
+            return GaugeStatus.AMBIGUOUS, "another disc lies within 1.5 times reach_px"
         at_x, at_y = (corner + (place + 0.5) * by - 0.5 for corner, place in ((left, match.x_px), (top, match.y_px)))
         slack = 0.3 * by + (0.05 * radius if self._known is None else 0.0)
         return at_x, at_y, share * radius, min(slack, 2.5)

@@ -15,7 +15,8 @@ from fingervision.vision.pipeline import measure_frame
 
 KEYS = ("x_px", "y_px", "width_px", "height_px")
 QUANTITIES = (("gap", "length"),)
-# A region that holds two fingers and the edges between them (`fingervision.vision.pipeline` refuses smaller ones).
+# Smallest region that can contain two fingers and the edges between them (`fingervision.vision.pipeline` refuses
+# smaller regions).
 SMALLEST_PX = 16.0
 
 
@@ -64,7 +65,7 @@ class FollowedGap:
             self._middle = middle
         self._moved = (round(middle[0] - self._middle[0]), round(middle[1] - self._middle[1]))
         polarity = 1 if found.light_gap else -1
-        # The response's share is of the gap as a whole, half of it an edge's; other shifts are the picture's own.
+        # `u_picture_px` applies to the whole gap, and half of it to each edge; other shifts are part of `u_gap_px`.
         quantity = Distance(first, second, found.u_gap_px, polarity, 0.5 * found.u_picture_px)
         return Reading(GaugeStatus.OK, (quantity,), (Mark((first, second)),), zone)
 

@@ -14,7 +14,7 @@ from fingervision.storage.toml_section import Section
 
 KEYS = ("x_px", "y_px", "angle_deg", "length_px", "reach_px", "polarity")
 QUANTITIES = (("position", "length"), ("angle", "angle"))
-# The search turns with the line once it leans by this much against it: the profile is then as sharp as at first.
+# Angle between line and search zone (as a slope) above which the zone is rotated, so that the profile stays sharp.
 TURN_AT = 0.2
 
 
@@ -36,12 +36,12 @@ class FollowedLine:
     """Tracks one line through the frames of one recording.
 
     `position` is measured from the gauge's centre, perpendicular to the direction in the gauge's settings, so that its
-    direction is the same in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
+    direction is the same in all frames; `angle` is the direction of the line, within 90 degrees of `angle_deg`.
     """
 
     def __init__(self, spec: LineSpec) -> None:
         self._angle_rad = spec.direction_rad
-        # The direction across it is 90 degrees behind, so that s runs along the line as it was drawn.
+        # The axis t is perpendicular to the line, so that the axis s has the direction of the line in the settings.
         axes = Axes(*spec.middle_px, spec.direction_rad - 0.5 * pi)
         self._fixed = axes
         self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, spec.polarity)
@@ -63,7 +63,8 @@ class FollowedLine:
             cos(axes.direction_rad - self._fixed.direction_rad)
             + sin(axes.direction_rad - self._fixed.direction_rad) * found.slope
         )
-        # Where the fixed normal meets the line: away from the fit's own middle the slope's uncertainty adds.
+        # Point at which the fixed normal crosses the line; at a distance from the fit's centre, the slope's uncertainty
+        # contributes.
         x, y = place
         along = -sin(axes.direction_rad) * (x - axes.x_px) + cos(axes.direction_rad) * (y - axes.y_px)
         variance = u_place**2 + 2.0 * along * found.covariance_px + along**2 * found.u_slope**2

@@ -21,16 +21,18 @@ KEYS = ("x_px", "y_px", "size_px", "shape", "reach_px")
 QUANTITIES = (("x", "length"), ("y", "length"))
 SHAPES = ("dot", "cross", "corner")
 SMALLEST_PX, LARGEST_PX = 7.0, 301.0
-# A mark is the same after half a turn, but for noise of a third of its own spread.
+# Smallest correlation of a mark with itself after half a turn; noise of a third of the mark's standard deviation gives
+# this value.
 LEAST_SYMMETRY = 0.9
-# Rings of a dot are of one level; a cross is the same after a quarter turn and no dot; a chessboard's corner is its own
-# negative then.
+# Limits of the correlations that distinguish shapes: a dot is the same after any rotation, a cross only after a quarter
+# turn, and the corner of a chessboard becomes its negative after a quarter turn.
 LEAST_ROUND, LEAST_QUARTER = 0.9, 0.75
-# In the first frame the middle is looked for within this share of the mark's size of where it was stated.
+# Largest distance, as a share of the mark's size, between the stated centre and the centre in the first frame.
 NEAR = 0.35
-# From frame to frame it looks like itself (zero-normalised correlation, as for patches).
+# Smallest zero-normalised cross-correlation of a mark with its template from the first frame (the same limit as for
+# patches).
 LEAST_CORRELATION = 0.7
-# A middle that is less sure than this (pixels) is none.
+# Largest standard uncertainty of an accepted centre (pixels).
 LEAST_SURE_PX = 0.5
 
 
@@ -106,7 +108,7 @@ class FollowedMarker:
         away = hypot(place[0] - self._at[0], place[1] - self._at[1])
         first_reach = min(self._spec.reach_px, NEAR * self._spec.size_px)
         if away > (first_reach if self._template is None else self._spec.reach_px * self._times) + 1.0:
-            return GaugeStatus.NOT_FOUND, "it lies farther away than it may have moved"
+            return GaugeStatus.NOT_FOUND, "the mark is farther away than reach_px permits"
         if self._template is None:
             refused = self._taken(picture, place)
             if refused is not None:
@@ -156,11 +158,11 @@ class FollowedMarker:
         if found.spread < CONTRAST_FLOOR * picture.top:
             return GaugeStatus.LOW_CONTRAST, ""
         if found.half_turn < LEAST_SYMMETRY:
-            return GaugeStatus.NOT_FOUND, "it does not look the same after half a turn"
+            return GaugeStatus.NOT_FOUND, "the mark is not symmetric under half a turn"
         if not self._has_shape(found):
-            return GaugeStatus.NOT_FOUND, f"it is no {self._spec.shape}"
+            return GaugeStatus.NOT_FOUND, f"the shape of the mark is not a {self._spec.shape}"
         if not float(np.max(np.diag(found.covariance))) < LEAST_SURE_PX**2:
-            return GaugeStatus.LOW_CONTRAST, "it slides along itself"
+            return GaugeStatus.LOW_CONTRAST, "the mark does not determine its position in one direction"
         return found, (found.x_px + origin[0], found.y_px + origin[1])
 
     def _has_shape(self, found: Symmetric) -> bool:
@@ -182,6 +184,6 @@ class FollowedMarker:
         if min(levels.shape) >= 2 * (self._half + BEYOND_PX) + 3:
             match = template.best_match(levels.astype(np.float32))
             if not match.is_alone:
-                return GaugeStatus.AMBIGUOUS, "another mark like it lies within 1.5 reach_px"
+                return GaugeStatus.AMBIGUOUS, "a similar mark lies within 1.5 times reach_px"
         self._template = template
         return None

@@ -18,11 +18,12 @@ from fingervision.vision.straight_edge_fit import reach_px
 KEYS = ("x_px", "y_px", "direction_deg", "distance_px", "length_px", "reach_px", "polarity")
 QUANTITIES = (("distance", "length"),)
 POLARITIES = {"any": (0, 0), "light": (1, -1), "dark": (-1, 1), "rising": (1, 1), "falling": (-1, -1)}
-# Nearer than so many sigma two edges' blurs are one, and their contrast and distance cannot be told apart.
+# At a smaller distance (in standard deviations of the blur), contrast and distance of two edges cannot be
+# distinguished.
 NEAREST_SIGMAS = 2.5
-# In the first frame each edge is looked for nearer to its own place than to the other's (share of the distance).
+# Largest search distance of each edge in the first frame, as a share of the distance between the edges.
 NEAR_OWN = 0.4
-# Candidates of both edges' searches that are nearer than this are one and the same step.
+# Candidates from the searches of both edges that are nearer than this are regarded as the same edge.
 SAME_PX = 1.5
 
 
@@ -116,7 +117,7 @@ class FollowedPair:
                     return fitted
                 fits += fitted[0]
             return (fits[0], fits[1]), 0.0
-        # Near edges are one model: what one puts into the other's window is part of it.
+        # Edges that are near each other are fitted together, because each edge affects the window of its neighbour.
         moved = StepCandidate(right.position_px + second.at_px - first.at_px, right.contrast)
         near = [step for step in beside if abs(step.position_px - moved.position_px) > SAME_PX]
         both = fit_near(first, picture, [left, moved], near)

@@ -22,17 +22,19 @@ from fingervision.vision.template_search import BEYOND_PX, Template, chance_corr
 KEYS = ("x_px", "y_px", "width_px", "height_px", "reach_px")
 QUANTITIES = (("shift_x", "length"), ("shift_y", "length"), ("rotation", "angle"))
 SMALLEST_PX, LARGEST_PX = 9.0, 501.0
-# What correlates less is something else: noise of two thirds of the texture's own spread leaves this much.
-# Coarse textures must correlate more, because others do by chance; where that is asked for more than can be had with
-# noise, the patch is too small for its texture.
+# Smallest correlation of a patch with its template; noise of two thirds of the texture's standard deviation gives this
+# value. A coarse texture needs a higher correlation than chance would give; if chance gives more than the second value,
+# the patch is too small for its texture.
 LEAST_CORRELATION, MOST_BY_CHANCE = 0.7, 0.9
-# Nothing alike may be within so many times the reach (as for edges).
+# No similar texture may lie within this multiple of reach_px (as for edges). After frames without a value, the search
+# distance grows to at most the second multiple.
 GUARD, MOST_TIMES = 1.5, 4.0
-# The template is turned with the patch once it lags by this (radians, at a rim of 15 px a pixel and a half).
+# The template is rotated again if its rotation differs from that of the patch by this angle (radians); the displacement
+# 15 px from the centre is then 1.5 px.
 TURN_AT = 0.1
-# A patch that is less sure than this (pixels) shows too little to be measured.
+# Largest standard uncertainty of an accepted position (pixels).
 LEAST_SURE_PX = 0.3
-# Contrast below a grey level a pixel is rounding.
+# Smallest root-mean-square contrast (grey levels); a smaller contrast is mainly rounding.
 LEAST_SPREAD = 1.0
 
 Floats = NDArray[np.float32]
@@ -130,7 +132,7 @@ class FollowedPatch:
         (a, b), (x, y) = self.half, self._spec.middle_px
         column, row = round(x), round(y)
         if not picture.holds(column - a, row - b, 2 * a + 1, 2 * b + 1):
-            return self._never(GaugeStatus.OUT_OF_VIEW, "a part of it lies outside of the first frame")
+            return self._never(GaugeStatus.OUT_OF_VIEW, "a part of the patch lies outside the first frame")
         reach = ceil(GUARD * self._spec.reach_px) + BEYOND_PX + MARGIN_PX
         part = _padded(picture, column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1)
         reference = patch_reference(part, a + reach, b + reach, a, b)
@@ -138,14 +140,18 @@ class FollowedPatch:
         spread = float(np.sqrt(np.mean(reference.levels.astype(np.float64) ** 2)))
         if spread < LEAST_SPREAD or not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._never(
-                GaugeStatus.LOW_CONTRAST, "the first frame shows no texture there that tells how it moves"
+                GaugeStatus.LOW_CONTRAST, "in the first frame, the patch has too little texture to determine its motion"
             )
         template = Template(reference.template)
         if not template.best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX]).is_alone:
-            return self._never(GaugeStatus.AMBIGUOUS, "its pattern repeats within 1.5 reach_px: lower reach_px")
+            return self._never(
+                GaugeStatus.AMBIGUOUS, "the texture of the patch repeats within 1.5 times reach_px: reduce reach_px"
+            )
         chance = chance_correlation(reference.template)
         if chance > MOST_BY_CHANCE:
-            return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
+            return self._never(
+                GaugeStatus.LOW_CONTRAST, "the texture is too coarse for the size of the patch: enlarge the patch"
+            )
         self._least_correlation = max(LEAST_CORRELATION, chance)
         self.reference = reference
         self._around, self._template = part, template
@@ -171,7 +177,7 @@ class FollowedPatch:
             return self._failed(GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND)
         if not match.is_alone:
             return self._failed(GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.AMBIGUOUS)
-        # The turned patch, and what interpolation needs about it.
+        # Margin for the rotated patch, and for the interpolation.
         more = MARGIN_PX + 3 + ceil(max(a, b) * min(abs(sin(turn)) + 0.1, 1.0) * 0.5)
         middle = (left + round(match.x_px), top + round(match.y_px))
         corner = (middle[0] - a - more, middle[1] - b - more)
@@ -185,7 +191,7 @@ class FollowedPatch:
         if abs(turn - self._template_turn) > TURN_AT:
             (a, b), around = self.half, self._around
             middle = (0.5 * (around.shape[1] - 1), 0.5 * (around.shape[0] - 1))
-            # The content turns by `turn` clockwise on the screen; OpenCV counts the other way.
+            # A positive `turn` is clockwise on the screen, whereas OpenCV's angles are anticlockwise.
             turned = cv2.warpAffine(
                 around, cv2.getRotationMatrix2D(middle, -np.degrees(turn), 1.0), around.shape[::-1],
                 borderMode=cv2.BORDER_REFLECT_101,
@@ -203,11 +209,11 @@ class FollowedPatch:
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
         if hypot(x - self._at[0], y - self._at[1]) > self._spec.reach_px * self._times + 1.0:
-            return self._failed(GaugeStatus.NOT_FOUND, "it would have moved farther than it may")
+            return self._failed(GaugeStatus.NOT_FOUND, "the patch would have moved farther than reach_px permits")
         if not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._failed(GaugeStatus.LOW_CONTRAST)
         self._at, self._times = place, 1.0
-        # The point that was drawn need not be the patch's own middle, which is a pixel's.
+        # The stated point may differ from the patch's centre, which is the centre of a pixel.
         (from_x, from_y) = self._spec.middle_px
         off_x, off_y = from_x - round(from_x), from_y - round(from_y)
         to = (x + cos(turn) * off_x - sin(turn) * off_y, y + sin(turn) * off_x + cos(turn) * off_y)

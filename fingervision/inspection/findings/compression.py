@@ -9,8 +9,8 @@ from fingervision.inspection.sample import Sample
 
 REMEDY = "Record losslessly (raw or FFV1; PNG or TIFF for pictures), or at several times the bit rate."
 FORMULA = (
-    "sqrt(u^2 - u'^2), u' the random uncertainty if neither the codec's errors at the edges nor their correlation "
-    "were there; where blocks are plain, also what they make the measuring state as u_shift_px"
+    "sqrt(u^2 - u'^2 + s^2); u is the random uncertainty, u' the random uncertainty without the codec's errors at the "
+    "edges; s is u_shift_px if the blocks are clearly visible, else 0"
 )
 
 
@@ -25,9 +25,9 @@ def find(sample: Sample) -> Finding | None:
     if blocks > HEAVY:
         cost_px = float(np.hypot(cost_px, sample.u_shift_px))
     how = f"stored with loss ({sample.description.codec})" if lossy else "stored without loss"
-    seen = f"steps between blocks of {BLOCK_PX} px are {100 * max(blocks, 0.0):.0f} % larger than within them"
-    before = "" if lossy or blocks <= BLOCKY else ", but they were coded before"
-    return weighed(sample, "compression", cost_px, f"Pictures are {how}; {seen}{before}.", REMEDY, FORMULA)
+    seen = f"steps between blocks of {BLOCK_PX} px are {100 * max(blocks, 0.0):.0f} % larger than steps within blocks"
+    before = "" if lossy or blocks <= BLOCKY else ", so that they were compressed before"
+    return weighed(sample, "compression", cost_px, f"The pictures are {how}; {seen}{before}.", REMEDY, FORMULA)
 
 
 def _cost_px(look: Look, top: int) -> float:

@@ -5,8 +5,10 @@ from fingervision.inspection.finding import Finding, refusing, weighed, without
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX
 from fingervision.inspection.sample import Sample
 
-REMEDY = "Focus on the tips and fix the focus, or stop the lens down; keep automatic focus off."
-FORMULA = "sqrt(u^2 - u'^2), u' the random uncertainty with edges of sigma 1.3 px (Cramer-Rao bound)"
+REMEDY = "Focus on the tips and fix the focus, or close the aperture; keep automatic focus off."
+FORMULA = (
+    "sqrt(u^2 - u'^2); u is the random uncertainty, u' the random uncertainty with a blur of 1.3 px (Cramer-Rao bound)"
+)
 
 
 def find(sample: Sample) -> Finding | None:
@@ -16,12 +18,14 @@ def find(sample: Sample) -> Finding | None:
     if refused is not None or not sample.looks:
         return refused
     if sample.moves:
-        words = "The fingers move while the shutter is open: focus cannot be told until they do not."
+        words = (
+            "The fingers move while the shutter is open, so that the focus cannot be judged: inspect fingers at rest."
+        )
         return weighed(sample, "focus", 0.0, words, REMEDY, FORMULA)
     blur_px = sample.median(look.focus_blur_px for look in sample.looks)
     cost_px = sample.median(
         without(look.u_with(blur_px=look.focus_blur_px), look.u_with(blur_px=min(GOOD_BLUR_PX, look.focus_blur_px)))
         for look in sample.looks
     )
-    figure = f"Edges are spread over {blur_px:.2f} px (sigma; {GOOD_BLUR_PX:g} px or less is sharp)."
+    figure = f"The blur of the edges is {blur_px:.2f} px (standard deviation; {GOOD_BLUR_PX:g} px or less is sharp)."
     return weighed(sample, "focus", cost_px, figure, REMEDY, FORMULA)

@@ -4,10 +4,12 @@ from fingervision.inspection.finding import Finding, weighed
 from fingervision.inspection.sample import SURELY, Sample
 
 REMEDY = (
-    "Switch the camera's gamma off, or measure its curve (`fingervision calibrate response`) and give it to calibrate "
-    "and measure with --response."
+    "Switch the camera's gamma off, or measure the response (`fingervision calibrate response`) and give it to "
+    "calibrate and measure with --response."
 )
-FORMULA = "probability of the other response, by the edges' own shape, times the shift that it means for the gap"
+FORMULA = (
+    "probability of the other response, from the shape of the edges, times the shift of the gap that it would cause"
+)
 
 
 def find(sample: Sample) -> Finding | None:
@@ -24,12 +26,12 @@ def find(sample: Sample) -> Finding | None:
     if not 1.0 - SURELY < share < SURELY:
         more_even = seen.other if share > 0.5 else seen.assumed
         figure = (
-            f"The edges look as those of a camera with {more_even} levels do; they are taken as {seen.assumed}, and "
-            f"the other would change the gap by {abs(seen.shift_px):.2f} px."
+            f"The shape of the edges is that of a camera with {more_even} levels; the levels are assumed to be "
+            f"{seen.assumed}, and the other response would change the gap by {abs(seen.shift_px):.2f} px."
         )
     else:
         figure = (
-            f"The edges' shape does not tell {seen.assumed} from {seen.other} levels "
-            f"({100 * share:.0f} % for {seen.other}); the two differ by {abs(seen.shift_px):.2f} px."
+            f"The shape of the edges does not distinguish {seen.assumed} from {seen.other} levels (probability of "
+            f"{seen.other}: {100 * share:.0f} %); the gap would change by {abs(seen.shift_px):.2f} px."
         )
     return weighed(sample, "gamma", cost_px, figure, REMEDY, FORMULA, is_doubt=is_doubt)

@@ -11,12 +11,12 @@ from fingervision.inspection.plateaus import plateaus
 from fingervision.inspection.profile_fit import fit_step
 from fingervision.inspection.sample import Sample
 
-WEAK = "Light the ground from behind, or darken the fingers, and lower the camera's gain."
-UNEVEN = "Make the light even across the gap: a diffuser behind the fingers, farther from them."
+WEAK = "Light the background from behind, or darken the fingers, and lower the camera's gain."
+UNEVEN = "Make the light uniform across the gap: use a diffuser behind the fingers, at a larger distance from them."
 FORMULA = (
-    "sqrt(n^2 + e^2 + s^2); n = sqrt(u^2 - u'^2), u' the random uncertainty with noise of 2 % of the contrast "
-    "(Cramer-Rao bound); e the change of the gap when the plateaus beside each edge are let slope; s what noise "
-    "or uneven light makes the measuring state as u_shift_px"
+    "sqrt(n^2 + e^2 + s^2); n = sqrt(u^2 - u'^2), u the random uncertainty, u' the random uncertainty with noise of 2 "
+    "% of the contrast (Cramer-Rao bound); e is the change of the gap if the plateaus beside each edge may slope; s "
+    "is u_shift_px if noise or uneven light causes it, else 0"
 )
 
 
@@ -25,7 +25,7 @@ def find(sample: Sample) -> Finding | None:
     if not sample.looks:
         return _lost(sample)
     bright = plateaus(sample).bright
-    # What a longer exposure would mend is the exposure's.
+    # The part of the noise that a longer exposure would remove belongs to the finding "exposure".
     factor = WANTED / max(bright, 1e-3) if bright < DIM else 1.0
     noise = sample.median(look.noise / factor for look in sample.looks)
     weak_px = sample.median(
@@ -33,17 +33,17 @@ def find(sample: Sample) -> Finding | None:
         for look in sample.looks
         for each in (look.noise / factor,)
     )
-    # What is cut off, moved or coded in blocks has no profile of its own.
+    # Clipped levels, motion and block artefacts distort the profile, so that uneven light cannot be judged.
     is_spoilt = plateaus(sample).is_cut or sample.moves or sample.blockiness > HEAVY
     uneven_px = 0.0 if is_spoilt else uneven_light_px(sample)
-    # Uneven light and a soft shadow are one and the same to the measuring; noise looks like anything.
+    # The measurement cannot distinguish uneven light from a soft shadow, and noise can hide either.
     is_lights = uneven_px > 0.0 or (not sample.shows_surroundings and bright >= DIM)
     noisy_px = sample.u_shift_px if is_lights else 0.0
     cost_px = float(np.linalg.norm((weak_px, uneven_px, noisy_px)))
     contrast = sample.median(look.contrast for look in sample.looks) / sample.top_level
     figure = (
         f"Contrast is {100 * contrast:.0f} % of full scale, noise {100 * noise:.1f} % of the contrast "
-        f"({100 * GOOD_NOISE:g} % or less is good); uneven light moves the gap by {uneven_px:.3f} px."
+        f"({100 * GOOD_NOISE:g} % or less is good); uneven light changes the gap by {uneven_px:.3f} px."
     )
     return weighed(sample, "light", cost_px, figure, UNEVEN if uneven_px > weak_px else WEAK, FORMULA)
 
@@ -52,8 +52,8 @@ def _lost(sample: Sample) -> Finding | None:
     """Finding for frames without a measured gap because no contrast in them exceeds the noise."""
     if not sample.is_lost_in_noise:
         return None
-    words = "No frame gave a number, and what is in view hardly rises above the noise."
-    return Finding("light", Severity.POOR, words, None, None, WEAK, "frames without a number", 1.0)
+    words = "No frame has a gap, and the contrast in the picture hardly exceeds the noise."
+    return Finding("light", Severity.POOR, words, None, None, WEAK, "frames without a gap", 1.0)
 
 
 def uneven_light_px(sample: Sample) -> float:
@@ -68,7 +68,7 @@ def uneven_light_px(sample: Sample) -> float:
             return 0.0
         blur_px = sample.median(edges.blur_px[side, 0] for _, edges in seen)
         flat, sloping = (fit_step(profile, blur_px, sloping=slopes) for slopes in (False, True))
-        # Slopes that do not explain the profile clearly better are noise, and small ones a pattern or a codec's waves.
+        # Slopes that do not improve the fit significantly are noise; small slopes are caused by a pattern or a codec.
         if sloping.slope_share < LEAST_SLOPE:
             continue
         if flat.chi_square - sloping.chi_square < SIGNIFICANT * max(sloping.chi_square / sloping.freedom, 1.0):
@@ -77,9 +77,10 @@ def uneven_light_px(sample: Sample) -> float:
     return without(abs(moved), PATTERN_PX)
 
 
-# Chi-square of two slopes that chance gives once in ten thousand.
+# Chi-square with two degrees of freedom (two slopes) that noise exceeds once in ten thousand cases.
 SIGNIFICANT = 18.4
-# Light counts as uneven where it changes by so much of the contrast within the window of an edge.
+# The light is regarded as uneven if it changes by this share of the contrast within the window of an edge.
 LEAST_SLOPE = 0.05
-# A ground with a pattern of its own leans somewhere by as much (`tests.benchmarks.faulty_setups`, good ones).
+# A pattern on the background causes a change of the gap up to this value (good set-ups in
+# `tests.benchmarks.faulty_setups`).
 PATTERN_PX = 0.05

@@ -9,10 +9,11 @@ from fingervision.inspection.noise_bound import GOOD_BLUR_PX
 from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_choice import MOTION_RADIUS_PX
 
-REMEDY = "Expose shorter (with more light, or flashes), or move slower while frames are taken."
+REMEDY = "Shorten the exposure (with more light, or a flash), or move more slowly while frames are taken."
 FORMULA = (
-    "sqrt(c^2 + n^2); c = sum over both fingers of (sigma_flank^2 - sigma_tip^2) / (2 R sqrt(3)), R = 15 px, what is "
-    "stated for the half-level's way on a fillet; n = sqrt(u^2 - u'^2), u' the random uncertainty with a lens in focus"
+    "sqrt(c^2 + n^2); c = sum over both fingers of (sigma_flank^2 - sigma_tip^2) / (2 R sqrt(3)), the possible shift "
+    "of an edge on a corner of radius R = 15 px; n = sqrt(u^2 - u'^2), u the random uncertainty, u' the random "
+    "uncertainty without motion"
 )
 
 
@@ -36,7 +37,8 @@ def _cost_px(look: Look) -> float:
     more = look.widened_px2
     if not more.any():
         return 0.0
-    # Motion across is allowed for where the tip shows it; up to this nobody can tell, and it is stated (u_shift_px).
+    # Motion across the fingers is corrected where the blur of the tip reveals it; the remaining uncertainty is this
+    # part of u_shift_px.
     stated = float(more.sum()) / (2.0 * MOTION_RADIUS_PX * np.sqrt(3.0))
     in_focus = look.u_with(blur_px=min(look.focus_blur_px, GOOD_BLUR_PX))
     return float(np.hypot(stated, without(look.u_camera_px, in_focus)))

@@ -6,10 +6,13 @@ from calib.measured_scale import Calibration
 from fingervision.inspection.finding import Finding, weighed, without
 from fingervision.inspection.sample import FILLED, Sample
 
-CLOSER = "Bring the camera nearer or use a longer lens, until fingers and gap take most of the picture."
+CLOSER = (
+    "Bring the camera nearer, or use a lens of longer focal length, until fingers and gap fill most of the picture."
+)
 FORMULA = (
-    "sqrt(p^2 + s^2); p = sqrt(u^2 - u'^2), u' what the stated u_gap_px becomes at the scale at which fingers and gap "
-    "fill 60 % of the picture (as the power -3/2 of the scale: finer pixels, and more rows); s the calibration's share"
+    "sqrt(p^2 + s^2); p = sqrt(u^2 - u'^2), u the random uncertainty, u' the random uncertainty at the scale at which "
+    "fingers and gap fill 60 % of the picture (proportional to the power -3/2 of the scale: smaller pixels, and more "
+    "rows); s is the calibration's contribution"
 )
 
 
@@ -18,17 +21,21 @@ def find(sample: Sample) -> Finding | None:
     if not sample.looks:
         return None
     ratio = min(1.0, sample.fill / FILLED)
-    # Against the edges of a good picture: what else is wrong with this one is said by its own finding.
+    # The uncertainty is limited to that of a picture with little noise, because noise has a finding of its own.
     u_px = sample.median(min(look.u_camera_px, look.u_with(noise=min(look.noise, 0.02))) for look in sample.looks)
     fine_px = without(u_px, u_px * ratio**1.5)
     shared_px, largest = _calibration(sample)
-    figure = f"Fingers and gap take {100 * sample.fill:.0f} % of the picture across them"
+    figure = f"Across the fingers, fingers and gap fill {100 * sample.fill:.0f} % of the picture"
     if sample.scale is None:
         figure += "; the scale is not known (give --calibration or --px-per-mm), so costs are in pixels."
     else:
         figure += f", at {sample.scale.px_per_mm:.2f} px/mm"
-        figure += f"; largest in the calibration's budget: {largest}." if largest else "."
-    remedy = CLOSER if fine_px >= shared_px else f"Better the calibration; largest in its budget: {largest}."
+        figure += f"; largest contribution to the calibration's uncertainty: {largest}." if largest else "."
+    remedy = (
+        CLOSER
+        if fine_px >= shared_px
+        else f"Improve the calibration; largest contribution to its uncertainty: {largest}."
+    )
     return weighed(sample, "scale", float(np.hypot(fine_px, shared_px)), figure, remedy, FORMULA)
 
 

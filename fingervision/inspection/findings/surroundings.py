@@ -7,10 +7,12 @@ from fingervision.inspection.plateaus import plateaus
 from fingervision.inspection.sample import Sample
 
 REMEDY = (
-    "Light from behind with a diffuser and keep light off the fingers' front; use a longer lens against side walls, "
-    "paint or a mask against glare."
+    "Light from behind with a diffuser, and keep light off the front of the fingers; against visible side walls, use "
+    "a lens of longer focal length; against glare, use paint or a mask."
 )
-FORMULA = "u_shift_px: how far what stands beside the edges may have moved them (vision/profile_choice, edge_profile)"
+FORMULA = (
+    "u_shift_px: possible shift of the edges caused by structures beside them (vision/profile_choice, edge_profile)"
+)
 
 
 def find(sample: Sample) -> Finding | None:
@@ -19,8 +21,8 @@ def find(sample: Sample) -> Finding | None:
         return None
     cost_px = sample.u_shift_px if sample.shows_surroundings and sample.blockiness < HEAVY else 0.0
     motion = motion_of(sample)
-    # Levels that are cut off, and motion, are stated in the same number, and have findings of their own.
+    # Clipped levels and motion also contribute to u_shift_px, but have findings of their own.
     if plateaus(sample).is_cut or (motion is not None and (motion.cost_px or 0.0) > 0.0):
         cost_px = 0.0
-    figure = f"What stands beside the edges may have moved the gap by {cost_px:.3f} px."
+    figure = f"Structures beside the edges may have changed the gap by {cost_px:.3f} px."
     return weighed(sample, "surroundings", cost_px, figure, REMEDY, FORMULA)

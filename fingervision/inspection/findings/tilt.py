@@ -12,24 +12,24 @@ from fingervision.inspection.look import Look
 from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_lines import INNER, ROWS
 
-TURN = "Turn the camera about its own axis until the fingers stand straight in the picture."
-SQUARE = "Set the camera squarely: both fingers, if they are alike, then look equally wide."
+TURN = "Rotate the camera about its optical axis until the fingers are parallel to the picture's border."
+SQUARE = "Set the camera perpendicular to the plane of the fingers: two equal fingers then appear equally wide."
 FORMULA = (
-    "sqrt(t^2 + k^2 + f^2); t = gap - gap measured at right angles to the inner edges; k what a round corner adds "
-    "where the turn has put the other corner on top, R |cos(a) - cos(b)|, a and b the edges' slants at the points; "
-    "f = gap (1 - cos(theta)), sin(theta) = Z ln(r) / (2 d), r the ratio of the fingers' breadths, d their distance, "
-    "Z the camera's"
+    "sqrt(t^2 + k^2 + f^2); t = gap minus the gap measured perpendicular to the inner edges; k = R |cos(a) - cos(b)|, "
+    "the shift of a measuring point on a round corner of radius R, with the slants a and b of the two edges at the "
+    "measuring points; f = gap (1 - cos(theta)), sin(theta) = Z ln(r) / (2 d), with the ratio r of the fingers' "
+    "widths, their distance d, and the camera's distance Z"
 )
-# A turn's cost within so many standard uncertainties of the gap is noise.
+# A rotation whose cost is within this number of standard uncertainties of the gap is noise.
 NOISE_SIGMAS = 2.0
-# Fingers that stand straighter than this differ for reasons of their own (degrees).
+# Below this rotation (degrees), a difference between the fingers' corners is not caused by the rotation.
 LEAST_TURN_DEG = 1.0
-# Differences of breadth that ask for more than this are the fingers' own (degrees), and below so many standard
-# uncertainties there is none.
+# A width ratio that would need a larger tilt (degrees) means that the fingers differ; a ratio within this number of
+# standard uncertainties of 1 is noise.
 LARGEST_DEG, SIGMAS = 30.0, 4.0
-# A flank needs so many rows for its breadth and slope.
+# Smallest number of rows of a flank from which width and slope are computed.
 FEWEST_ROWS = 6
-# Neighbouring rows of a flank that share one error, on a ground with a pattern.
+# Number of neighbouring rows of a flank that share an error, on a background with a pattern.
 ALIKE = 3.0
 
 
@@ -43,14 +43,14 @@ def find(sample: Sample) -> Finding | None:
         hypot(_slant_px(look, turn), corner_px(look, below_px) if abs(turn) > LEAST_TURN_DEG else 0.0)
         for look, turn in zip(sample.looks, turns, strict=True)
     )
-    # Directions and slants are no surer than the gap itself.
+    # Directions and slants have at least the uncertainty of the gap.
     turn_px = without(turn_px, NOISE_SIGMAS * sample.median(look.outcome.u_gap_px for look in sample.looks))
     turn = sample.median(turns)
     tilt = tilt_deg(sample)
     gap_px = sample.median(look.outcome.gap_px for look in sample.looks)
     tilt_px = 0.0 if tilt is None else gap_px * (1.0 - cos(radians(tilt)))
-    figure = f"The fingers stand turned by {turn:+.1f} degrees in the picture"
-    figure += "" if tilt is None else f"; if they are alike, the camera looks {tilt:.0f} degrees from the side"
+    figure = f"The fingers are rotated by {turn:+.1f} degrees in the picture"
+    figure += "" if tilt is None else f"; if both fingers are equally wide, the camera is tilted by {tilt:.0f} degrees"
     remedy = TURN if turn_px >= tilt_px else SQUARE
     return weighed(sample, "tilt", hypot(turn_px, tilt_px), f"{figure}.", remedy, FORMULA)
 
@@ -113,7 +113,8 @@ def tilt_deg(sample: Sample) -> float | None:
         return None
     limits = sample.scale.limits if isinstance(sample.scale, Calibration) else Limits()
     distance_px = limits.camera_distance_mm * sample.scale.px_per_mm
-    # Across, the picture of a tilted plane grows as 1 / z^2: it is nearer, and seen less obliquely.
+    # Across the fingers, lengths in the picture of a tilted plane are proportional to 1 / z^2 (z: distance from the
+    # camera), because nearer parts are magnified more and seen less obliquely.
     sine = 0.5 * abs(middle) * distance_px / float(np.median(apart))
     return degrees(np.arcsin(sine)) if sine < np.sin(radians(LARGEST_DEG)) else None
 

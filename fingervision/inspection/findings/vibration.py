@@ -7,16 +7,18 @@ from fingervision.inspection.sample import Sample
 
 REMEDY = "Fix camera and gripper to one plate, away from fans and motors; tighten the camera's mount and cable."
 FORMULA = (
-    "sqrt(s^2 - u^2), s the standard deviation of the ground's shift across the fingers (or along them, where larger), "
-    "u that of the registration; it acts on left_mm and right_mm, and on the gap as blur"
+    "sqrt(s^2 - (3 u)^2); s is the standard deviation of the background's shift across or along the fingers, "
+    "whichever is larger; u is the registration's standard uncertainty; vibration changes left_mm and right_mm, and "
+    "blurs the gap's edges"
 )
-# Second differences of a random walk-free jitter have six times its variance; a drive's smooth motion has none.
+# Second differences of independent random positions have six times their variance; those of a smooth motion are zero.
 SECOND_DIFFERENCE = 6.0**0.5
-# Fewer frames in a row say nothing about shaking.
+# Smallest number of consecutive frames from which vibration is judged.
 FEWEST = 6
-# Fingers whose gap bends by more than this between three frames (pixels) are driven in steps: their middle jumps, too.
+# A second difference of the gap above this value (pixels) shows that the fingers are driven in steps, in which their
+# midline jumps too.
 STEADY_PX = 1.0
-# A jitter within so many standard uncertainties of the measurement's own is none.
+# A jitter within this number of standard uncertainties of the measurement is not significant.
 SIGMAS = 3.0
 
 
@@ -29,14 +31,23 @@ def find(sample: Sample) -> Finding | None:
         spread = [float(np.std(shift)) for shift in (ground.across_px, ground.along_px)]
         worst = max(spread)
         cost_px = without(worst, SIGMAS * ground.u_px) if worst > SIGMAS * ground.u_px else 0.0
-        figure = f"The ground shifts by {spread[0]:.3f} px across and {spread[1]:.3f} px along the fingers (RMS)."
+        figure = f"The background shifts by {spread[0]:.3f} px across and {spread[1]:.3f} px along the fingers (RMS)."
         return weighed(sample, "vibration", cost_px, figure, REMEDY, FORMULA)
     found = _common_jitter(sample)
     if found is None:
-        return weighed(sample, "vibration", 0.0, "Too few frames in a row to see the camera shake.", "", FORMULA)
+        return weighed(
+            sample,
+            "vibration",
+            0.0,
+            "There are too few consecutive frames to detect vibration of the camera.",
+            "",
+            FORMULA,
+        )
     jitter, u_px = found
     cost_px = without(jitter, SIGMAS * u_px) if jitter > SIGMAS * u_px else 0.0
-    figure = f"The ground is too plain to be followed; both fingers jitter together by {jitter:.3f} px (RMS)."
+    figure = (
+        f"The background has too little texture to be tracked; both fingers jitter together by {jitter:.3f} px (RMS)."
+    )
     return weighed(sample, "vibration", cost_px, figure, REMEDY, FORMULA)
 
 
@@ -53,7 +64,8 @@ def _common_jitter(sample: Sample) -> tuple[float, float] | None:
     for first, second, u in ((1, 2, 5), (3, 4, 6)):
         middle = 0.5 * (track[:, first] + track[:, second])
         bends = np.diff(middle, n=2)[in_a_row]
-        # Robust: a drive that turns round bends once, a camera that shakes bends all the time.
+        # The median is robust: a reversal of the drive causes one large second difference, a shaking camera causes
+        # many.
         own = float(1.4826 * np.median(np.abs(bends))) / SECOND_DIFFERENCE
         if own > jitter:
             jitter, u_px = own, float(np.median(track[:, u]))

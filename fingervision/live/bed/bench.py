@@ -25,9 +25,9 @@ from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 
-# Frames that may wait for the live view; the bed waits for nobody.
+# Largest number of frames that wait for the live view; further frames are dropped, because the bed does not wait.
 FRAMES_WAITING = 50
-# Runs of page and recipes are numbered on: what has a memory begins anew with each.
+# Longest wait (s) for the thread of the test bed to end.
 ENDS_WITHIN_S = 5.0
 
 Say = Callable[[str, str], None]
@@ -35,7 +35,7 @@ Say = Callable[[str, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """An action of the test bed: the name shown in the browser page, and the function that executes the action."""
+    """An action of the test bed: its name in the browser page, and the function that executes it."""
 
     name: str
     act: Callable[[], str]
@@ -102,7 +102,7 @@ class Bench:
             self._thread.join(ENDS_WITHIN_S)
         self.bed.close()
 
-    # ---- what may be asked; from any thread
+    # ---- requests, from any thread
     def stop(self) -> None:
         """Stop the motor at once, and discard all requested tasks."""
         self._stop_asked = True
@@ -156,13 +156,13 @@ class Bench:
         except FingervisionError as error:
             self.bed.actuator.stop()
             self._hand_over(str(error))
-        except Exception as error:  # a fault of ours or a driver's must stop the motor, and be seen
+        except Exception as error:  # a programming error, here or in a driver, must stop the motor and be reported
             self.bed.actuator.stop()
-            self._hand_over(f"The bed failed ({type(error).__name__}: {error}).")
+            self._hand_over(f"The test bed failed ({type(error).__name__}: {error}).")
 
     def _do(self, task: Task) -> None:
         if self._stop_asked:
-            self.say("bed", "Stopped before it began.")
+            self.say("bed", "The motion was stopped before it began.")
             return
         self.doing = task.name
         try:
@@ -221,7 +221,7 @@ class Bench:
         finally:
             self._controls = None
             self._run += 1
-            # Readings that the run took are missing in what was followed before it.
+            # The run has consumed encoder readings, so that the interpolation from before the run cannot be continued.
             self._sight = _eyes(self.bed)
         return f"{done.counts.recorded} frames, {done.counts.with_gap} with a gap: {done.folder}."
 

@@ -31,7 +31,7 @@ def _movable(view: View) -> Bench:
 
 
 def _stop(view: View, request: Request) -> Answer:
-    # Whoever sees a danger may stop, also where nothing may be moved.
+    # A user who may not move the stage may still stop it, because anybody may see a danger.
     _bench(view).stop()
     return Answer("Stopped.")
 

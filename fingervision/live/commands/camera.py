@@ -41,7 +41,9 @@ def _changed(view: View, name: str, value: float) -> Answer:
     if view.ended.is_set():
         raise StateError("The source has ended: its camera settings cannot be changed.")
     if view.recording is not None and name in MOVES_SCALE:
-        raise StateError(f"The {name} changes the scale, and a run has a single scale: end the recording first.")
+        raise StateError(
+            f"A change of {name} changes the scale, but a run has a single scale: end the recording first."
+        )
     before, after = view.capture.adjustments.ask(name, value)
     if name == FRAME_RATE:
         view.cadence.restart()
@@ -49,7 +51,7 @@ def _changed(view: View, name: str, value: float) -> Answer:
     view.say("camera", said)
     scale = view.choices.scale
     if name in MOVES_SCALE and scale is not None:
-        view.say("camera", f"The {name} moves the scale: calibrate anew before you trust a gap.")
+        view.say("camera", f"The {name} has changed the scale: calibrate again before you use a gap.")
     elif note := other_camera(scale, view.capture.source.description.camera):
         view.say("camera", note)
     return Answer(said, more={"name": name, "value": after.value})

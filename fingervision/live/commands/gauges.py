@@ -76,7 +76,7 @@ def _change(view: View, request: Request) -> Answer:
 def _remove(view: View, request: Request) -> Answer:
     name = words(request, "name")
     _board(view).remove(name)
-    return _said(view, f"The gauge {name} is removed; the file has it until it is saved.")
+    return _said(view, f"The gauge {name} is removed here; save the gauges to remove it from the file too.")
 
 
 def _load(view: View, request: Request) -> Answer:

@@ -53,8 +53,8 @@ def _height_at(view: View, request: Request) -> Answer:
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
         raise StateError(
-            "The measuring height is counted from the tips, which this frame does not show: bring both tips "
-            "into the picture."
+            "The measuring height is a distance from the tips, which this frame does not show: bring both tips into "
+            "the picture."
         )
     at_px = number(request, "y" if outcome.direction.is_vertical else "x")
     tips_px = 0.5 * (outcome.left.tip_px + outcome.right.tip_px)
@@ -63,7 +63,7 @@ def _height_at(view: View, request: Request) -> Answer:
     if below_px <= 0.0:
         raise UsageError(f"The measuring height must lie on the fingers, but is {-below_px:.0f} px beyond their tips.")
     view.choose(below_tip_mm=round(below_px / scale.px_per_mm, 3))
-    return Answer(f"Measured {view.choices.below_tip_mm:g} mm below the tips.")
+    return Answer(f"The measuring height is now {view.choices.below_tip_mm:g} mm below the tips.")
 
 
 def _height(view: View, request: Request) -> Answer:
@@ -79,7 +79,7 @@ def _zero(view: View, request: Request) -> Answer:
     if row is None or row.gap_mm is None:
         raise StateError("Setting the zero needs a measured gap, but this frame has none: bring the fingers into view.")
     view.choose(zero_mm=row.gap_mm)
-    return Answer(f"Gaps are shown less {row.gap_mm:.4f} mm; files hold them whole.")
+    return Answer(f"Displayed gaps are reduced by {row.gap_mm:.4f} mm; files contain the full gaps.")
 
 
 def _limits(view: View, request: Request) -> Answer:
@@ -130,7 +130,7 @@ def _free_name(folder: Path, stem: str) -> Path:
                 f"The folder {folder} cannot be written ({error.strerror}): name another folder with --out."
             ) from error
         return path
-    raise AssertionError("names do not end")
+    raise AssertionError("an unused name is always found")
 
 
 def _steps(view: View, request: Request) -> Answer:

@@ -45,7 +45,7 @@ def _measure(view: View, request: Request) -> Answer:
     playback = _playback(view)
     running = view.features.get(RANGE)
     if isinstance(running, RangeMeasurement) and running.is_running:
-        raise StateError("A range is being measured already: wait until it is done.")
+        raise StateError("A range is being measured already: wait until the measurement is done.")
     measurement = RangeMeasurement(playback, playback.range if request.get("marked") else None)
     view.features[RANGE] = measurement
     return Answer(f"Measuring into {measurement.folder}.")

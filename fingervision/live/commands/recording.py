@@ -13,7 +13,7 @@ from fingervision.live.view import View
 
 def _session(view: View) -> Session:
     if not isinstance(view, Session):
-        raise StateError("Only a camera or a stream can be recorded, but this source is a recording itself.")
+        raise StateError("Only a camera or a stream can be recorded, but this source is a recording.")
     return view
 
 

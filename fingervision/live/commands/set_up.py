@@ -29,7 +29,7 @@ def _inspect(view: View, request: Request) -> Answer:
         view.play(on=True, speed=1.0)
     running = view.features.get(SET_UP)
     if isinstance(running, SetUp) and running.is_busy:
-        raise StateError("The set-up is being inspected already: wait until it is done.")
+        raise StateError("The set-up is being inspected already: wait until the inspection is done.")
     view.features[SET_UP] = SetUp(view)
     return Answer()
 
@@ -73,7 +73,7 @@ def _load(view: View, request: Request) -> Answer:
     if "roi" in found:
         changes["region"] = Region(*(int(side) for side in found["roi"].split(",")))
     view.choose(**changes)
-    return Answer(f"Settings of {path} are in force{'; those of the camera at the next start' * ('camera' in found)}.")
+    return Answer(f"Settings of {path} are used{'; those of the camera at the next start' * ('camera' in found)}.")
 
 
 def section(view: View) -> dict[str, Any]:

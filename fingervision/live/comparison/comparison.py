@@ -13,9 +13,10 @@ from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.tables.read import read_model
 
-# Ten seconds at 25 frames a second: the residual's mean and scatter that the page shows.
+# Number of rows from which the page's mean and scatter of the residual are computed: ten seconds at 25 frames per
+# second.
 ROWS_SHOWN = 250
-# Once a second at 25 frames a second it is asked whether there is enough for a verdict.
+# Number of rows between checks whether there are enough rows for a verdict: one second at 25 frames per second.
 ROWS_BETWEEN = 25
 
 
@@ -70,10 +71,10 @@ class Comparison:
         self.verdicts.consider(tuple(self._rows), self._moved, at_rest=True)
 
     def _take(self, row: GapRow) -> None:
-        """Keep a measured row for the comparison.
+        """Store a measured row for the comparison.
 
-        During a long rest of the stage, only some rows are kept, because they would outweigh the motion without adding
-        information.
+        During a long rest of the stage, only some rows are stored: many rows at one position would outweigh the motion
+        without adding information.
         """
         stands = bool(self._recent) and self._recent[-1].input_mm == row.input_mm
         self._still = self._still + 1 if stands else 0

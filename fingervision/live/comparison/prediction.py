@@ -11,9 +11,10 @@ from fingervision.domain.effect import Array, History
 from fingervision.models.corrected import CorrectedModel
 from fingervision.storage.gaps_csv import GapRow
 
-# What has a memory looks back over so many rows, a minute at 25 frames a second; before that it begins at rest.
+# Number of rows of the past path on which effects with memory depend: one minute at 25 frames per second. The gripper
+# is taken as at rest before this path.
 ROWS_BEHIND = 1500
-# As many as a page is sent, several times over.
+# Number of stored predictions, several times the number of rows that a page is sent.
 PREDICTIONS_KEPT = 20_000
 
 
@@ -71,7 +72,7 @@ class Prediction:
             self._path.clear()
         self._path.extend((row.time_s or 0.0, row.input_mm or 0.0) for row in inside)
         gap_mm = self._respond()[-len(inside) :]
-        # More rows at once than are looked back over: the first of them have no path.
+        # With more new rows than the stored path has, the first of them get no prediction.
         for row, value in zip(inside[-len(gap_mm) :], gap_mm, strict=True):
             self._known[row.frame] = float(value)
 

@@ -11,15 +11,16 @@ from typing import Any
 from fingervision.live.background import BackgroundCommand
 from fingervision.storage.gaps_csv import GapRow
 
-# Of motion, four seconds at 25 frames a second: fewer tell next to nothing of what has a memory or a period.
+# Smallest number of rows during motion: four seconds at 25 frames per second. Fewer rows say almost nothing about
+# effects with memory or with a period.
 LEAST_ROWS = 100
-# A motion there and back: what differs between the two directions shows in no other.
+# Smallest number of reversals: a difference between the two directions of motion shows only in a motion forth and back.
 LEAST_TURNS = 1
-# A motion of less than this share of the model's range is noise of the stage.
+# A motion over less than this share of the model's range is regarded as noise of the stage.
 LEAST_SHARE = 0.02
-# A further verdict is asked for when there is so much more to judge by.
+# Factor by which the number of rows must grow before the next verdict: while the stage moves, and at rest.
 MORE_ROWS, MORE_AT_REST = 1.5, 1.1
-# The newest two minutes at 25 frames a second are judged: the time that a diagnosis takes grows with its rows.
+# Largest number of rows in a diagnosis, the newest two minutes at 25 frames per second; more rows would take longer.
 MOST_ROWS = 3000
 LOOK_EVERY_S = 0.1
 COLUMNS = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
@@ -52,7 +53,7 @@ class Verdict:
 
 
 class VerdictSeeker:
-    """Starts diagnoses as rows arrive.
+    """Starts a diagnosis whenever enough new rows have arrived.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ class VerdictSeeker:
         return self._thread is not None and self._thread.is_alive()
 
     def consider(self, rows: Sequence[GapRow], moved: int, *, at_rest: bool) -> None:
-        """Start a diagnosis if there are enough rows, and sufficiently more than at the last diagnosis.
+        """Start a diagnosis if there are enough rows in all, and enough new rows since the last diagnosis.
 
         Parameters
         ----------
@@ -190,7 +191,7 @@ def _in_words(parameters: dict[str, Any]) -> str:
         if isinstance(each, dict) and "value" in each:
             u = "" if each.get("u") is None else f" ± {2.0 * each['u']:.2g}"
             unit = str(each.get("unit", ""))
-            # The unit stands behind the value, and need not be said in the name again.
+            # The name's ending that states the unit is removed, because the unit follows the value.
             told = name.removesuffix(f"_{unit.lower().replace('/', '_')}").replace("_", " ")
             words.append(f"{told} {each['value']:.4g}{u} {unit}".strip())
     return ", ".join(words)

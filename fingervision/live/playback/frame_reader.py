@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.seeking import Seeking, seeking
 
-# Pictures that are kept for stepping back.
+# Memory for pictures that are stored for stepping back.
 KEPT_BYTES = 64_000_000
-# From here a frame is read on to rather than sought.
+# A frame at most this far ahead is reached by reading on, which is faster than seeking.
 NEAR_FRAMES = 12
 
 Item = Frame | LostFrame
@@ -43,7 +43,7 @@ class FrameReader:
         index : int
             Number of the frame, from 0.
         time_s : float or None
-            Time of the frame if known and unique to this frame; otherwise None.
+            Time of the frame, if the time is known and no neighbouring frame has the same time; otherwise None.
 
         Returns
         -------

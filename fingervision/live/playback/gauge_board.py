@@ -12,7 +12,7 @@ from fingervision.storage.gauges_toml import gauges_text, text_of, write_gauges_
 from fingervision.storage.toml_section import Section, read_document
 
 USUAL_FILE = Path("gauges.toml")
-# Keys that every kind has, and a frame's sides limit.
+# Keys of the position, which every kind of gauge has; the position must lie inside the frame.
 PLACE = ("x_px", "y_px")
 
 
@@ -64,7 +64,7 @@ class GaugeBoard:
     Raises
     ------
     FingervisionError
-        The file exists and cannot be read, or holds what cannot be meant for these frames.
+        The file exists but cannot be read, or its gauges do not fit these frames.
     """
 
     def __init__(self, path: Path, frame_size_px: tuple[int, int]) -> None:
@@ -74,7 +74,7 @@ class GaugeBoard:
         self._before: str | None = None
         self._kept: list[Mapping[str, Any]] = []
         self.version = 0
-        """Rises with every change."""
+        """Number that increases with every change."""
         self.load()
 
     @property
@@ -132,7 +132,7 @@ class GaugeBoard:
         Raises
         ------
         ChangedMeanwhileError
-            Somebody else has.
+            Another program has changed the file, and `over` is false.
         DataError, InputFileError, OutputError
             There is no gauge to save, or the file cannot be written; its earlier version is then kept.
         """
@@ -142,7 +142,7 @@ class GaugeBoard:
             if not over and self._now() != self._before:
                 raise ChangedMeanwhileError(
                     f"{self.path} was changed by another program since it was read here: load the changed file and "
-                    "lose the changes made here, or save over it."
+                    "lose the changes made here, or overwrite the changed file."
                 )
             text = gauges_text([(entry.table, entry.place) for entry in self._entries], self._before, SCHEMA)
             write_gauges_text(self.path, text)
@@ -154,7 +154,7 @@ class GaugeBoard:
         try:
             return text_of(self.path)
         except FingervisionError as error:
-            raise ChangedMeanwhileError(f"{error} Save over it, or correct its errors first.") from error
+            raise ChangedMeanwhileError(f"{error} Overwrite the file, or correct its errors first.") from error
 
     # ---- one gauge
     def add(self, table: Mapping[str, Any]) -> None:
@@ -163,11 +163,11 @@ class GaugeBoard:
         Raises
         ------
         DataError, FieldError, StateError
-            A value cannot be meant; a `FieldError` says in which key.
+            A value is not allowed (a `FieldError` names its key), or the file holds no more gauges.
         """
         with self._lock:
             if len(self._entries) >= MOST_GAUGES:
-                raise StateError(f"A file holds {MOST_GAUGES} gauges at most: remove one first.")
+                raise StateError(f"A gauge file holds at most {MOST_GAUGES} gauges: remove a gauge first.")
             self._entries += (self._entry(table, None, self._entries),)
             self.version += 1
 

@@ -24,9 +24,9 @@ from fingervision.measuring.task import Task
 from fingervision.storage.lost_frames import lost_frames
 
 LOOK_EVERY_S = 0.02
-# So many frames beyond the one that is shown are followed already, so that stepping on waits for nothing.
+# Number of frames that are measured ahead of the displayed frame, so that the next readings are ready at once.
 AHEAD_FRAMES = 25
-NO_SCALE = "The scale is not known: gauges can be drawn, and are read once it is given."
+NO_SCALE = "The scale is not known: gauges can be drawn, and have readings as soon as the scale is given."
 
 
 class GaugeFollowing:
@@ -51,7 +51,7 @@ class GaugeFollowing:
         self._key: tuple[int, str] | None = None
         self._told: list[bytes] = []
         self.first: int | None = None
-        """Number of the first frame that has a picture, as far as it is known."""
+        """Number of the first frame that has a picture; None until it is known."""
         self.trouble = ""
         self._thread = Thread(target=self._follow, name="gauges", daemon=True)
 
@@ -93,7 +93,7 @@ class GaugeFollowing:
                     self._read_all(key, gauges, task)
             except (FingervisionError, OSError) as error:
                 self.trouble = f"The gauges cannot be read: {error}"
-            except Exception as error:  # a fault of ours must not look like a gauge that waits
+            except Exception as error:  # a programming error must not look like a gauge that waits for its reading
                 self.trouble = f"The gauges cannot be read ({type(error).__name__}: {error})."
             while self.trouble and key == self._now() and not self._stopped.wait(LOOK_EVERY_S):
                 pass
@@ -123,9 +123,9 @@ class GaugeFollowing:
             self._told.append(_packed(gauges, readings, plane))
 
     def _status(self, frame: int, key: tuple[int, str]) -> Status | None:
-        """Wait until a frame is requested and present in the table; return its status (None if none is left).
+        """Wait until a frame is requested and present in the table, and return the frame's status.
 
-        None if there is nothing left to measure.
+        None means that the measuring thread was stopped, or that gauges or settings have changed.
         """
         playback = self._playback
         while not self._stopped.is_set() and key == self._now():

@@ -26,7 +26,7 @@ class Follows(Protocol):
 
     @property
     def trouble(self) -> str:
-        """Reason why the gauges have no readings; empty if they have."""
+        """Reason why the gauges have no readings; empty if they have readings."""
         ...
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
@@ -53,7 +53,7 @@ class GaugesBeside:
         self.board, self.following = board, following
         self.is_asked_for, self.is_live = is_asked_for, is_live
         self.is_changed_meanwhile = False
-        """Whether the last wish to save found the file changed by somebody else."""
+        """Whether the last request to save failed because another program had changed the file."""
 
 
 def put_gauges_beside(playback: Playback, path: Path, *, is_asked_for: bool = False) -> GaugesBeside:
@@ -62,7 +62,7 @@ def put_gauges_beside(playback: Playback, path: Path, *, is_asked_for: bool = Fa
     Raises
     ------
     DataError, InputFileError
-        The file exists and cannot be meant for these frames.
+        The file exists but cannot be read, or its gauges do not fit these frames.
     """
     description = playback.description
     board = GaugeBoard(path, (description.width_px, description.height_px))

@@ -82,7 +82,7 @@ def _words(output: str) -> str:
         summary = json.loads(output)
         gap = summary["gap"]
         if not gap["count"]:
-            return "No frame gave a number."
+            return "No frame has a gap."
         return (
             f"{gap['count']} frames measured: gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean "
             f"{gap['mean_mm']:.4f} mm."

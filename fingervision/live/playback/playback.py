@@ -24,9 +24,9 @@ from fingervision.measuring.marked import marked
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
 
-# Without times a recording is played at this rate.
+# Frame rate at which a recording without times is played.
 USUAL_RATE_HZ = 25.0
-# The player looks so often whether there is anything to do.
+# Time between two checks whether the displayed frame must change.
 LOOK_EVERY_S = 0.02
 SPEEDS = (0.01, 100.0)
 
@@ -51,9 +51,9 @@ class Playback:
         self.range: tuple[int, int] | None = None
         self.trouble = ""
         self.on_table: Callable[[Sequence[GapRow]], None] = lambda rows: None
-        """Told of the whole table, each time that one is made."""
+        """Function that is called with all rows whenever the table of the recording is complete."""
         self.on_stop: list[Callable[[], None]] = []
-        """Called before everything ends."""
+        """Functions that are called before the playback ends."""
         self._told: Track | None = None
         self.is_playing, self.speed, self.frame = False, 1.0, 0
         self._messages = Messages()
@@ -86,7 +86,7 @@ class Playback:
         if self._track is not None:
             self._track.close()
 
-    # ---- what the page asks for
+    # ---- requests of the browser page
     def seek(self, frame: int) -> None:
         """Show a frame; for a number beyond the ends of the recording, the first or last frame."""
         with self._changed:
@@ -100,7 +100,7 @@ class Playback:
         Raises
         ------
         LimitError
-            No recording is played so fast or slow.
+            The speed is outside the permitted range.
         """
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
             raise LimitError(f"The speed must be {SPEEDS[0]:g} to {SPEEDS[1]:g}, but is {speed:g}.")
@@ -125,8 +125,8 @@ class Playback:
             return
         if not 0 <= first <= last < self.frame_count:
             raise LimitError(
-                f"The range must lie within frames 0 to {self.frame_count - 1} and begin no later than it ends, "
-                f"but is {first} to {last}."
+                f"The range must lie within frames 0 to {self.frame_count - 1} and must not begin after its end, but "
+                f"is {first} to {last}."
             )
         self.range = (first, last)
 
@@ -145,7 +145,7 @@ class Playback:
         if MOVES_ZERO & set(changes):
             self._measure_anew()
 
-    # ---- what the page is told
+    # ---- data for the browser page
     @property
     def identity(self) -> str:
         """Number that changes when the measurement of the recording is restarted."""
@@ -284,12 +284,14 @@ class Playback:
         try:
             item = self._reader.at(frame, self._own_time(frame, row))
             if item is None:
-                item = LostFrame(frame, None, Status.DAMAGED, "The recording ends before this frame.")
+                item = LostFrame(frame, None, Status.DAMAGED, "The recording has no frame of this number.")
             self.seen = recorded_frame(item, row, self.choices, self.description)
             self.trouble = ""
         except (FingervisionError, OSError) as error:
             self.is_playing = False
-            self.trouble = f"The recording cannot be read any more: {error} Put it back, and go on."
+            self.trouble = (
+                f"The recording cannot be read any more: {error} Put the file back, and select the frame again."
+            )
             self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:

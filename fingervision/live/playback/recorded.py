@@ -72,14 +72,15 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
     video = about.get("video")
     if path.is_dir() and about:
         if not isinstance(video, str) or not (folder / video).is_file():
-            raise DataError(f"{name} must be the folder of a run with its video, but has none: name a video.")
+            raise DataError(f"{name} must be the folder of a run with its video, but has no video: name a video.")
         name = str(folder / video)
     is_of_run = isinstance(video, str) and (folder / video) == Path(name)
     if is_of_run and choices.scale is None:
         choices = _as_in_run(folder, about, choices)
     samples = about.get("samples")
     if is_of_run and not drive and isinstance(samples, str) and (folder / samples).is_file():
-        # A run of the bed: its table holds the stage's place at every frame, on the frames' own times.
+        # The table of a test-bed run states the stage's position at the time of every frame, so that no offset is
+        # needed.
         drive = ("--drive", str(folder / samples), "--drive-offset-s", "0")
     rate = () if rate_hz is None else ("--rate-hz", repr(rate_hz))
     return Recorded(name, open_source(name, Wish(rate_hz=rate_hz)), choices, (*rate, *drive))
@@ -106,7 +107,7 @@ def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices
             direction=None if tips == "auto" else Direction(tips),
             region=None if box is None else Region(*(int(side) for side in box)),
         )
-    except FingervisionError:  # a calibration that is there and is none
+    except FingervisionError:  # a file that exists but is no calibration
         raise
     except (KeyError, TypeError, ValueError, AttributeError):
         return choices

@@ -11,9 +11,9 @@ from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
 from fingervision.storage.gaps_csv import GapRow
 
-# A picture that could not be decoded is shown as an even grey.
+# Grey level of the even picture that is shown in place of a frame that could not be decoded.
 NO_PICTURE_LEVEL = 90
-IN_THE_TABLE = "As the table has it; judged by the frames before."
+IN_THE_TABLE = "This result is from the table, for which the preceding frames were used too."
 
 
 def recorded_frame(item: Frame | LostFrame, row: GapRow | None, choices: Choices, description: Description) -> Seen:

@@ -10,7 +10,7 @@ from fingervision.live.choices import Choices
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.gaps_reader import GapsReader
 
-# Exit codes of `measure` with which the table is whole: done, no frame gave a number, damaged frames in it.
+# Exit codes of `measure` after which the table is complete: done, no frame has a gap, some frames are damaged.
 WHOLE = (0, 1, 3)
 GAPS = "gaps.csv"
 
@@ -78,7 +78,7 @@ class Track:
         self.is_whole = ended in WHOLE and bool(self.rows)
         if not self.is_whole or ended == 1:
             self.failure = complaint or f"Measuring ended with exit code {ended}."
-        # At its end `measure` writes the table once more where it found the drive's clock itself.
+        # If `measure` has estimated the offset of the drive's clock, it writes the table a second time at its end.
         rows = GapsReader(self.table).fresh()
         is_other = rows != self.rows
         self.rows = rows

@@ -75,7 +75,7 @@ def sentence(clock: ClockOffset) -> str:
     """Sentence that states the clock offset and its expanded uncertainty."""
     return (
         f"Clock offset: {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion; "
-        "it was added to the drive's times. A lag that is the same at all times is part of it. This U holds at the "
+        "it was added to the drive's times. A constant lag is part of the offset. This U is valid at the "
         f"drive's first row; over the frames, with the clocks' rates, U = {2.0 * clock.u_time_s:.2g} s."
     )
 

@@ -41,8 +41,8 @@ def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset 
         return None
     return NoClockOffset(
         f"at the best offset, {found.at.offset_s:.3f} s, {left_out} of {within_log} frames do not follow the drive: "
-        "with a play as wide as the steps of a motion, another step may fit as well, or the gap moves by something "
-        "else. Record a run with longer strokes, or state --drive-offset-s."
+        f"if the play is as wide as the steps of the motion, another step may fit as well; or something other than "
+        f"the drive moves the gap. Record a run with longer strokes, or state --drive-offset-s."
     )
 
 
@@ -61,9 +61,9 @@ def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
     if share >= ARRIVED:
         return None
     return NoClockOffset(
-        f"the drive's rows jump from one place to the next, and the gap makes a share of {max(share, 0.0):.2f} of "
-        "these jumps in their time: the rows are set-points, and when the stage arrived does not stand in them. "
-        "Log the stage's positions, or state --drive-offset-s."
+        "the drive's rows jump from one position to the next, but at the time of a jump the gap moves by a share of "
+        f"only {max(share, 0.0):.2f} of it: the rows are set-points, which do not show when the stage arrived. Log the "
+        "stage's positions, or state --drive-offset-s."
     )
 
 
@@ -76,13 +76,14 @@ def unlike(motion: Motion, found: Fit) -> NoClockOffset | None:
     if gain < LEAST_GAIN:
         moved_um, noise_um = 1e3 * float(np.ptp(motion.gap_mm)), 1e3 * float(np.std(found.residual_mm))
         return NoClockOffset(
-            f"there is too little motion to find it: the gap changes by {moved_um:.3g} µm in all, of which the drive "
+            f"there is too little motion to find the offset: the gap changes by {moved_um:.3g} µm in all, of which "
+            f"the drive "
             f"explains a share of {max(share, 0.0):.2f} and {noise_um:.3g} µm RMS are noise. Record a run that moves."
         )
     if found.scale < 0.0:
         return NoClockOffset(
-            "the gap follows the drive best with its sign reversed, closing as the input grows, and a motion that "
-            "repeats can look so half a period off: check the drive's sign (positive opens)."
+            "the gap follows the drive best with its sign reversed, closing as the input grows. A periodic motion can "
+            "also cause this if the offset is wrong by half a period. Check the drive's sign (positive opens)."
         )
     if share < LEAST_SHARE:
         return NoClockOffset(

@@ -78,7 +78,7 @@ class RunnerUp:
         """Sentence that names the offset."""
         return (
             f"The next best offset, {self.offset_s:.3f} s, is rejected: the drive explains a share of {self.share:.3f} "
-            f"of the gap's variance there, and of {self.best_share:.5f} at the offset that was taken."
+            f"of the gap's variance at that offset, and a share of {self.best_share:.5f} at the chosen offset."
         )
 
 

@@ -62,53 +62,54 @@ def stated(
     u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
     if not np.isfinite(u_time_s) or u_time_s > 0.1 * float(np.ptp(motion.time_s)):
         return NoClockOffset(
-            f"the motion leaves it open by +-{2.0 * u_time_s:.3g} s (k = 2): a move at one speed, or one that is "
-            "over between two frames, looks the same at every offset near. Record a run that starts, stops or turns."
+            f"the motion determines the offset only to +-{2.0 * u_time_s:.3g} s (k = 2): a motion at one speed, or a "
+            "motion that is over between two frames, looks the same at all similar offsets. Record a run that starts, "
+            "stops or turns."
         )
     stroke_mm = float(np.ptp(motion.drive.input_mm))
     if at.play_mm > MOST_PLAY_SHARE * stroke_mm:
         return NoClockOffset(
-            f"a play of {1e3 * at.play_mm:.3g} µm takes up most of the stroke of {1e3 * stroke_mm:.3g} µm, and what is "
-            "left of the motion does not tell the offset. Record a run with a longer stroke."
+            f"a play of {1e3 * at.play_mm:.3g} µm takes up most of the stroke of {1e3 * stroke_mm:.3g} µm, and the "
+            f"rest of the motion does not determine the offset. Record a run with a longer stroke."
         )
     if abs(rate) > LARGEST_RATE:
         return NoClockOffset(
-            f"at the best offset, {offset_s:.3f} s, the clocks would differ by {1e2 * abs(rate):.2f} %, and clocks "
-            "differ by 0.1 % at the most: is this the log of this recording, and are its times in seconds?"
+            f"at the best offset, {offset_s:.3f} s, the rates of the clocks would differ by {1e2 * abs(rate):.2f} "
+            "%, but clocks differ by at most 0.1 %: is this the log of this recording, and are its times in seconds?"
         )
     notes = []
     share = explained(motion, best)
     if jumps:
         notes.append(
-            "The drive's rows jump from one place to the next: if they are set-points, and no positions, the time that "
-            "the stage takes to follow is part of the offset."
+            "The drive's rows jump from one position to the next: if the rows are set-points and not measured "
+            "positions, the delay of the stage is part of the offset."
         )
     if abs(rate) > max(SURE_RATE * u_rate, ORDINARY_RATE):
         runs = "fast" if rate > 0.0 else "slow"
         notes.append(
             f"The recording's clock runs {runs} against the drive's by {1e2 * abs(rate):.3f} % "
-            f"(U = {2e2 * u_rate:.3f} %, k = 2): allowed for."
+            f"(U = {2e2 * u_rate:.3f} %, k = 2); this difference was corrected."
         )
     crossing_s = crossed_in_s(motion.path)
     if crossing_s > COARSE * frame_s:
         notes.append(
             f"The drive's encoder has steps of {1e3 * motion.path.step_mm:.3g} µm, and the stage takes "
-            f"{crossing_s:.2g} s from one to the next: where it stood and turned within a step decides on the offset, "
-            "which may be off by more than a frame."
+            f"{crossing_s:.2g} s from one to the next: it is unknown where within a step the stage stopped and "
+            f"reversed, so that the offset may be wrong by more than a frame."
         )
     if motion.creeps:
         notes.append(
-            "The gap seems to creep after the drive: in a slow motion a creep looks like a delay, and the offset may "
-            "hold a part of it that is more than a frame."
+            "The gap seems to creep after the drive. In a slow motion creep looks like a delay, so that the offset "
+            "may be wrong by more than a frame."
         )
     if u_time_s > 0.5 * frame_s:
         notes.append(
-            f"The clock offset is known to no better than U = {2.0 * u_time_s:.3g} s (k = 2), more than one frame of "
+            f"The clock offset is known only with U = {2.0 * u_time_s:.3g} s (k = 2), more than one frame of "
             f"{frame_s:.3g} s: there is little motion that starts, stops or turns."
         )
     if share < FOLLOWED:
         notes.append(
-            f"The drive explains a share of {share:.2f} of the gap's variance: the gap moves by something else as well."
+            f"The drive explains a share of {share:.2f} of the gap's variance: something else moves the gap as well."
         )
     if runner_up is not None:
         notes.append(runner_up.words())

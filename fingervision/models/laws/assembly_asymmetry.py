@@ -13,7 +13,8 @@ _HALF = Parameter("changed_half", "", -1.0, 1.0, "half whose link differs: 1 rig
                   neutral=None, starts=2)  # fmt: skip
 
 _LEAST = 0.1
-"""Limit of the divisor 1 - 2 changed_half share: one finger then hardly opens, and the share cannot grow further."""
+"""Least value of the divisor 1 - 2 changed_half share. At this value one finger hardly opens, and the share cannot grow
+further."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:

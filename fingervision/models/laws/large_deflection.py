@@ -75,7 +75,7 @@ def _arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
 
 
 def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
-    """Openings without and with large rotation, and the ratio of the force with to that without, over the inputs."""
+    """Openings without and with large rotation, and the ratio of the forces (with over without), over the inputs."""
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     paths = []
     for end_mm, count in ((lowest_mm, _BELOW), (highest_mm, _ABOVE)):
@@ -89,6 +89,6 @@ def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
     bent_mm = 2.0 * (CubicSpline(at, right)(inputs) - body.measured_rest_mm)
     stiffness = body.equilibrium(1.0).force_n
     moving = at != 0.0
-    # The ratio is smooth through zero, where neither force can be divided by the other.
+    # The ratio is smooth through zero input, where both forces are zero and cannot be divided.
     ratio = CubicSpline(at[moving], force[moving] / (stiffness * at[moving]))(inputs)
     return opening_mm, np.asarray(bent_mm), np.asarray(ratio)

@@ -159,7 +159,9 @@ def _columns(
                 steps.append(None)
             continue
         names.append(name)
-        units.append(y_units[channel] if channel < len(y_units) else "")
+        # With an X column for each channel, the header's values stand above these, and every second cell is empty.
+        of_channel = place - 1 if x_columns == "Multi" else channel
+        units.append(y_units[of_channel] if of_channel < len(y_units) else "")
         places.append(place)
         steps.append(None)
         channel += 1

@@ -45,7 +45,7 @@ def read(path: Path, given: Entry) -> RawTable:
     passed: list[str] = []
     values = _hdf5(path, passed) if _is_hdf5(head) else _older(path, passed)
     tables = tables_of(values)
-    note = (f"Passed over, being no arrays of real numbers: {', '.join(sorted(passed))}.",) if passed else ()
+    note = (f"Not read, because they are not arrays of real numbers: {', '.join(sorted(passed))}.",) if passed else ()
     if not tables:
         held = f"only {', '.join(sorted(passed))}" if passed else "none"
         raise DataError(
@@ -59,7 +59,7 @@ def read(path: Path, given: Entry) -> RawTable:
         path,
         f"MATLAB file{' 7.3' if _is_hdf5(head) else ''}, {part}",
         tuple(columns),
-        notes=(*note, *(() if named else (f"Columns of the matrix {part} are called by their numbers.",))),
+        notes=(*note, *(() if named else (f"Columns of the matrix {part} are named by their numbers.",))),
         settings={"part": part},
         named=named,
     )

@@ -45,7 +45,7 @@ def read(path: Path, given: Entry) -> RawTable:
     passed = [table.schema.field(k).name for k, column in enumerate(columns) if column is None]
     if not kept or not len(kept[0]):
         raise DataError(f"{path} must have a numeric column with at least one row, but has none.")
-    notes = (f"Passed over, being no columns of numbers or texts: {', '.join(passed)}.",) if passed else ()
+    notes = (f"Not read, because they are not columns of numbers or texts: {', '.join(passed)}.",) if passed else ()
     return RawTable(path, "Parquet", kept, notes=notes)
 
 

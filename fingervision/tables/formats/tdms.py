@@ -53,9 +53,9 @@ def read(path: Path, given: Entry) -> RawTable:
             f"The channels of group '{name}' of {path} must have the same number of values, but have: {listed}. Save "
             "the channels of each rate in a group of their own."
         )
-    notes = (f"Passed over, being no channels of numbers: {', '.join(passed)}.",) if passed else ()
+    notes = (f"Not read, because they are not channels of numbers: {', '.join(passed)}.",) if passed else ()
     if warned:
-        notes = (*notes, f"The file is damaged or was cut off ({warned[0]}); what could be read of it was taken.")
+        notes = (*notes, f"The file is damaged or was cut off ({warned[0]}); what could be read was used.")
     return RawTable(path, f"TDMS, group '{name}'", tuple(columns), notes=notes, settings={"part": name})
 
 

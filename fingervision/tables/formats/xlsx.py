@@ -183,11 +183,11 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
     left_out = [f"{len(headers)} repeated header lines (the first is row {headers[0]})"] if headers else []
     return RawTable(
         path,
-        f"Excel workbook, sheet '{title}'" + (", its macros not looked at" if path.suffix.lower() == ".xlsm" else ""),
+        f"Excel workbook, sheet '{title}'" + (", without its macros" if path.suffix.lower() == ".xlsm" else ""),
         tuple(columns),
         lines,
         tuple(left_out),
-        () if names else ("The sheet names no columns: they are called by their numbers.",),
+        () if names else ("The sheet has no column names: its columns are named by their numbers.",),
         settings={"part": title},
         named=bool(names),
     )

@@ -16,8 +16,8 @@ def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
     """
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
         raise LimitError(
-            f"The target must lie between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but is {to_mm:g} mm: nothing "
-            "was moved."
+            f"The target must lie between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but is {to_mm:g} mm: the "
+            "stage has not moved."
         )
     if speed_mm_s == 0.0:
         raise LimitError("The speed must be positive, but is 0 mm/s: nothing was moved.")
@@ -34,7 +34,8 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
     """
     if not 0.0 <= speed_mm_s <= limits.speed_mm_s:
         raise LimitError(
-            f"The speed must be at most {limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: nothing was moved."
+            f"The speed must be at most {limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: the stage has not "
+            "moved."
         )
 
 

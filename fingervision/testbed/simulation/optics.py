@@ -7,7 +7,8 @@ from fingervision.effects import catalogue
 from fingervision.rendering import Camera, RadialLens, Tilt
 from fingervision.testbed.simulation.injected_effects import Hidden
 
-# The keystone alone, as the catalogue has it: so near a plane that the tilt which gives it does not shorten it.
+# Sine of the tilt for a keystone effect as in the catalogue: the camera is then so near that the required tilt hardly
+# shortens the plane.
 TILT_SINE = 0.01
 
 
