@@ -33,6 +33,7 @@ from fingervision.vision.residuals import (
     shape_holds,
     shared_points,
     spread,
+    top_aside_variance,
 )
 from fingervision.vision.rough_corner import with_corner_doubt
 from fingervision.vision.roughness import best_linear, roughness, with_roughness
@@ -167,6 +168,7 @@ def measure_gap(
                     return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
                 covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
                 covariance[1, 1] += beyond
+                covariance += top_aside_variance(p, end) * np.outer((1.0, found.slope), (1.0, found.slope))
                 own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
             if own is None:
                 return NoGap(Status.NO_FINGERS, BROKEN_BY[coding])

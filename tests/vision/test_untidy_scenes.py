@@ -24,7 +24,7 @@ SIGMAS, HARMLESS_PX = 3.0, 0.1
 
 
 # Kinds of which a few in a hundred are still wrong; `python -m tests.benchmarks.scenes clutter` says how many.
-NOT_YET = {"shadow-dark", "crumbs-tip"}
+NOT_YET = {"shadow-dark"}
 
 
 def is_wrong(shot: Shot, found: GapMeasurement) -> bool:
