@@ -5,7 +5,7 @@ and the MPEG family up to MPEG-4 part 2; for other codecs it is unknown.
 """
 
 import struct
-from functools import cache
+from dataclasses import dataclass
 from typing import Any
 
 import av
@@ -32,12 +32,9 @@ VP9_LOSSLESS, VP9_FIRST, VP9_GROWTH, VP9_GAIN, VP9_COUNT = 4.0, 8, 1.01975, 8.0,
 # is smaller, and a filter reduces the remaining errors. Measured with `python -m tests.benchmarks.compressed_video
 # --only mpeg4-1-upright vp9-1-upright`.
 MPEG_LEAVES, VP9_LEAVES = 2.0, 0.5
-# Parameters of 8 to 14 bits in any codec lie within these limits; what a damaged stream states beyond them is cut off.
-LEAST_PARAMETER, MOST_PARAMETER = -128, 511
-# Five numbers of four bytes (libavutil/video_enc_params.h, AVVideoBlockParams).
-BLOCK_BYTES = 20
-
-_fill = loop("quantiser_steps_fill")
+# A block that is not coded again keeps the error of the last picture that coded it, and what later pictures add. They
+# also mend some of it: an earlier step counts by so much less with every picture.
+FADES = 0.97
 
 
 def _vp9_steps() -> NDArray[np.float64]:
@@ -77,10 +74,23 @@ def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
     return Quantiser(step)
 
 
-@cache
-def _steps(kind: int, bits: int) -> NDArray[np.float32]:
-    """Step for every parameter from `LEAST_PARAMETER` to `MOST_PARAMETER`, on the scale of 8 bits."""
-    parameter = np.arange(LEAST_PARAMETER, MOST_PARAMETER + 1, dtype=np.float32)
-    if kind == H264:
-        return np.asarray(2.0 ** ((parameter - H264_UNIT) / H264_DOUBLES) / 2.0 ** (bits - 8), dtype=np.float32)
-    return np.asarray(MPEG_LEAVES * parameter, dtype=np.float32)
+@dataclass(slots=True, eq=False)
+class StepTrail:
+    """Quantiser steps that the pictures of a stream were coded with, where they show what earlier ones have coded.
+
+    A block that is copied from another picture (skipped) states no step of its own, but that of the block before it
+    (H.264's QP_Y,PRED, ITU-T H.264 (2021), 7.4.5), often that of flat ground, which is up to four times finer. What it
+    shows was coded in earlier pictures. The step of every block is therefore the largest since the last picture that
+    was coded by itself, fading slowly.
+    """
+
+    last: NDArray[np.float32] | None = None
+
+    def of(self, picture: av.VideoFrame) -> Quantiser | None:
+        """Quantiser steps of the next picture of the stream; None if its codec does not report them."""
+        found = quantiser_steps(picture)
+        if found is None or picture.key_frame or self.last is None or self.last.shape != found.step.shape:
+            self.last = None if found is None else found.step
+            return found
+        self.last = np.maximum(found.step, np.float32(FADES) * self.last)
+        return Quantiser(self.last)
