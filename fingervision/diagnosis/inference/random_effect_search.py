@@ -59,7 +59,10 @@ def beside_gains(state: Searched, look: Look) -> Searched:
         apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
         if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
             beside = apart
-    if not _does_more(beside):
+    left = standing_of(beside.data, beside.found)
+    # Gains of runs that stay at one place are no more than offsets, and may be anything: what they leave is looked at.
+    worse = not left.is_little and left.after_mm > standing_of(state.data, found).after_mm
+    if worse or not _does_more(beside):
         return state
     fewer = len(beside.found.best.names) < len(found.best.names)
     least = -LEAST_GAIN if explained and fewer else LEAST_GAIN
