@@ -17,7 +17,7 @@ from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, li
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
-from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.diagnosis.input.input_uncertainty import below_the_input, mean_slope
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
@@ -127,7 +127,8 @@ def beside_map(state: Searched, look: Look) -> Searched:
 
 
 def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
-    rms_um, sigma_um = 1e3 * repeated.rms_mm.value, 1e3 * problem.chain.history.input_sigma_mm
+    gap_mm = float(np.sqrt(np.mean(repeated.fitted_mm[: problem.chain.history.input_mm.size] ** 2)))
+    rms_um, sigma_um = 1e3 * gap_mm / mean_slope(problem), 1e3 * problem.chain.history.input_sigma_mm
     return (
         f"the recorded input errs alike by {rms_um:.2g} um RMS whenever it comes to the same places: as this is less "
         f"than its own standard uncertainty, {sigma_um:.2g} um, it is no {NAME}."
