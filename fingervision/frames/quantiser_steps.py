@@ -6,6 +6,7 @@ and the MPEG family up to MPEG-4 part 2; for other codecs it is unknown.
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import av
@@ -32,9 +33,15 @@ VP9_LOSSLESS, VP9_FIRST, VP9_GROWTH, VP9_GAIN, VP9_COUNT = 4.0, 8, 1.01975, 8.0,
 # is smaller, and a filter reduces the remaining errors. Measured with `python -m tests.benchmarks.compressed_video
 # --only mpeg4-1-upright vp9-1-upright`.
 MPEG_LEAVES, VP9_LEAVES = 2.0, 0.5
+# Parameters of 8 to 14 bits in any codec lie within these limits; a damaged stream may state values beyond them.
+LEAST_PARAMETER, MOST_PARAMETER = -128, 511
+# Five numbers of four bytes (libavutil/video_enc_params.h, AVVideoBlockParams).
+BLOCK_BYTES = 20
 # A block that is not coded again keeps the error of the last picture that coded it, and what later pictures add. They
 # also mend some of it: an earlier step counts by so much less with every picture.
 FADES = 0.97
+
+_fill = loop("quantiser_steps_fill")
 
 
 def _vp9_steps() -> NDArray[np.float64]:
@@ -72,6 +79,15 @@ def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
     step = np.empty(shape, dtype=np.float32)
     _fill(data, blocks_at, size, count, base, _steps(kind, picture.format.components[0].bits), step)
     return Quantiser(step)
+
+
+@cache
+def _steps(kind: int, bits: int) -> NDArray[np.float32]:
+    """Step for every parameter from `LEAST_PARAMETER` to `MOST_PARAMETER`, on the scale of 8 bits."""
+    parameter = np.arange(LEAST_PARAMETER, MOST_PARAMETER + 1, dtype=np.float32)
+    if kind == H264:
+        return np.asarray(2.0 ** ((parameter - H264_UNIT) / H264_DOUBLES) / 2.0 ** (bits - 8), dtype=np.float32)
+    return np.asarray(MPEG_LEAVES * parameter, dtype=np.float32)
 
 
 @dataclass(slots=True, eq=False)

@@ -23,7 +23,8 @@ AVERAGED = 0.5
 """
 RIPPLE = 0.5
 """Share of the variance of a smoothed stroke that changes from one encoder line to the next, because the windows end at
-other lines. If a whole window shared this error, the best offset would be one at which frames happen to lie on ripples."""
+other lines. If a whole window shared this error, the best offset would be one at which frames happen to lie on
+ripples."""
 LEAST_LEVERAGE = 1.0 / 241.0
 """Leverage of a row in the widest window of the smoothing."""
 
