@@ -1,1 +1,1 @@
-"""Adapters to laboratory software, one per module; each needs a library that is an optional extra."""
+"""Adapters to laboratory software, one per module. Each adapter needs a library that is an optional extra."""

@@ -28,7 +28,8 @@ FRAMES_TO_JOIN = 5
 """Number of frames to wait for after the last motion, because the stage's position is interpolated between readings
 before and after a frame."""
 JOINED_WITHIN_S = 5.0
-"""Twenty answers of a slow line; until then nothing tells which reading belongs to which frame."""
+"""Longest time for the synchronisation of the clocks: twenty answers over a slow serial line. Before synchronisation,
+readings cannot be assigned to frames."""
 
 
 class _Shared:
@@ -67,7 +68,7 @@ class _Consumer:
 
 
 class StageDevice:
-    """The stage as a bluesky device: `set(mm)` moves; `stop` stops at once; `prepare` and `kickoff` start a flight."""
+    """The stage as a bluesky device: `set(mm)` moves it, `stop` stops it; `prepare` and `kickoff` start a flight."""
 
     parent = None
 
@@ -219,7 +220,7 @@ class GapDevice:
     def read(self) -> dict[str, dict[str, Any]]:
         """Return gap, edges, stage position and force of the last triggered frame; None for a missing gap."""
         if self._newest is None:
-            raise StateError(f"{self.name} must be triggered before it is read: no frame was taken yet.")
+            raise StateError(f"{self.name} must be triggered before it is read: no frame has been measured yet.")
         at_s = self._unix_s + self._at_s
         return {key: {"value": value, "timestamp": at_s} for key, value in self._newest.items()}
 
@@ -265,7 +266,7 @@ class GapDevice:
     def _begin(self) -> float:
         """Read the stage position before the first frame to be used, and return the time from which frames are used.
 
-        That time is in seconds, on the test bed's clock.
+        The returned time is in seconds, on the test bed's clock.
         """
         instruments = [one for one in (self._sight.position, self._sight.force) if one is not None]
         until_s = self._clock.now_s() + JOINED_WITHIN_S
@@ -281,7 +282,8 @@ class GapDevice:
             self._clock.wait_until(self._clock.now_s() + POLL_S)
             for one in instruments:
                 one.read()
-        # The stage stood or moved before: its place is told between two readings, so the frame lies after the first.
+        # The position of the stage is interpolated between two readings, so that the frame must be later than the first
+        # reading.
         self._clock.wait_until(self._clock.now_s() + POLL_S)
         return self._clock.now_s()
 
@@ -324,7 +326,7 @@ class Devices(NamedTuple):
 
 
 def devices(bed: Bed, *, prefix: str = "") -> Devices:
-    """Make the bluesky devices `stage`, `force` and `gap` of an open test bed; `prefix` stands before each name."""
+    """Make the bluesky devices `stage`, `force` and `gap` of an open test bed; each name begins with `prefix`."""
     lock, unix_s = threading.RLock(), time.time() - bed.clock.now_s()
     shared = _Shared(bed.actuator, lock)
     return Devices(

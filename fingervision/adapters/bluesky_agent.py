@@ -42,12 +42,12 @@ class NextRunAgent:
         """Add rows with `input_mm` and any of `gap_mm`, `run`, `time_s`, `left_mm`, `right_mm`, `force_n`."""
         for row in rows:
             if row.get("input_mm") is None:
-                raise DataError(f"Every row must have input_mm, but one has {sorted(row)}: add it.")
+                raise DataError(f"Every row must have input_mm, but one has {sorted(row)}: add input_mm.")
             self._rows.append({"run": str(self._run), **{key: row.get(key) for key in ROW if row.get(key) is not None}})
         self._answer = None
 
     def __call__(self, name: str, document: Mapping[str, Any]) -> None:
-        """Receive the documents of a RunEngine; each of its runs becomes a run of the table."""
+        """Receive the documents of a RunEngine; each run of the RunEngine becomes a run of the table."""
         if name == "start":
             self._run += 1
         if name == "event":

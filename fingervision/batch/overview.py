@@ -42,7 +42,9 @@ def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None
         return
     replace_text(out / TABLE, table)
     _draw(out / FIGURE, reduction, outcomes)
-    replace_text(out / PAGE, stamp + _page(out, command, outcomes))  # last: its stamp says that all three are whole
+    replace_text(
+        out / PAGE, stamp + _page(out, command, outcomes)
+    )  # last: its stamp states that all three are complete
 
 
 def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> str:
@@ -86,9 +88,7 @@ def _page(out: Path, command: str, outcomes: Sequence[Outcome]) -> str:
     from base64 import b64encode
 
     bad = sum(outcome.exit_code != 0 for outcome in outcomes)
-    said = (
-        f"{len(outcomes)} inputs, {bad} of them with a sentence to read" if bad else f"{len(outcomes)} inputs, all done"
-    )
+    said = f"{len(outcomes)} inputs, {bad} of them with a message" if bad else f"{len(outcomes)} inputs, all done"
     picture = b64encode((out / FIGURE).read_bytes()).decode()
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '

@@ -39,7 +39,9 @@ def digest_of(folder: Path) -> Digest:
         "parameters": "; ".join(values),
         **rms,
     }
-    caption = f"{report['verdict']}{': ' if names else ''}{names}; {1e3 * rms['before_rms_mm']:.3g} µm, after it "
+    caption = (
+        f"{report['verdict']}{': ' if names else ''}{names}; {1e3 * rms['before_rms_mm']:.3g} µm, after correction "
+    )
     caption += f"{1e3 * rms['after_rms_mm']:.3g} µm, noise {1e3 * rms['noise_rms_mm']:.3g} µm"
     if report["disagreement"].get("rows_left_out"):
         caption += f" (all rows, with the {report['disagreement']['rows_left_out']} left out as outliers)"

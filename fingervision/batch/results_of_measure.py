@@ -35,7 +35,7 @@ def digest_of(folder: Path) -> Digest:
         gap_mm = np.array([float(row["gap_mm"]) if row["gap_mm"] else np.nan for row in csv.DictReader(file)])
     gap = summary["gap"]
     cells = {"frames": summary["frames"], "ok_frames": gap["count"], **{name: gap[name] for name in STATISTICS}}
-    caption = f"{gap['least_mm']:.4g} to {gap['greatest_mm']:.4g} mm" if gap["count"] else "no frame gave a number"
+    caption = f"{gap['least_mm']:.4g} to {gap['greatest_mm']:.4g} mm" if gap["count"] else "no frame could be measured"
     return Digest(cells, thinned(gap_mm), caption)
 
 

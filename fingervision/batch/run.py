@@ -189,9 +189,12 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
     if stopped:
         kept = sum(outcome.folder is not None for outcome in outcomes.values())
         advice = "free disk space and " if "full" in stopped else ""
-        stopped += f"; {kept} of {len(plan.tasks)} are done and kept: {advice}call again, and it goes on from there."
+        stopped += (
+            f"; {kept} of {len(plan.tasks)} inputs are done and kept: {advice}repeat the command to process the others."
+        )
     every = tuple(
-        outcomes.get(number, failure(task, "It was not reached: call again.")) for number, task in enumerate(plan.tasks)
+        outcomes.get(number, failure(task, "The batch ended before this input: repeat the command."))
+        for number, task in enumerate(plan.tasks)
     )
     batch = Batch(plan.job.out, every, fresh, stopped)
     try:

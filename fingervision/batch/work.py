@@ -44,8 +44,8 @@ def work(task: Task, perform: Perform) -> Outcome:
         where = error.filename or task.folder
         return failure(
             task,
-            f"{task.input} could not be done, because {where} could not be read or written ({error.strerror}): check "
-            "the disk and its permissions, and call again.",
+            f"{task.input} could not be processed, because {where} could not be read or written ({error.strerror}): "
+            f"check the disk and its permissions, and repeat the command.",
             perf_counter() - started,
             disk_full=error.errno in NO_ROOM,
         )
@@ -60,7 +60,7 @@ def outcome_of(name: str, folder: Path, record: Record) -> Outcome:
 
 def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcome:
     source = Path(task.input)
-    exists = source.exists()  # for what does not, the command has the sentence
+    exists = source.exists()  # the command itself reports a missing input
     settled = exists and is_settled(source)
     stamp, content = (stamp_of(source), content_hash(source)) if exists else ("", "")
     name = os.path.abspath(source)  # noqa: PTH100 - links keep their own names
@@ -78,7 +78,11 @@ def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcom
     if not ended.finished or not exists:
         return failure(task, words, seconds, ended.exit_code, disk_full=ended.disk_full)
     if stamp_of(source) != stamp or (not settled and content_hash(source) != content):
-        return failure(task, f"{task.input} was changed while it was worked on: call again when it is whole.", seconds)
+        return failure(
+            task,
+            f"{task.input} was changed while it was processed: repeat the command when the file is complete.",
+            seconds,
+        )
     digest = reduction_of(task.command).digest_of(part)
     record = Record(
         input=name,

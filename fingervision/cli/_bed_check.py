@@ -13,9 +13,9 @@ Examples:
   fingervision bed check next_run.toml --bed lab.toml
   fingervision bed check recipe.toml --json
 
-No device is opened and nothing moves. It is not tested whether a stage keeps its contract (moves at the commanded
-speed, stops, refuses): for a device that is a plug-in, the command line that tests this is printed. Exit code 0: the
-recipe fits the test bed; 1: it does not, with a message for each step that does not fit.
+No device is opened and nothing moves. The command runs no contract tests, which show whether a stage moves at
+the commanded speed, stops, and refuses what it must. For a plug-in device, the command line of these tests is printed.
+Exit codes: 0 the recipe fits the test bed; 1 it does not, with a message for each step that does not fit.
 """
 
 
@@ -56,7 +56,7 @@ def command(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
     else:
         click.echo(f"{recipe.name} on {done.bed.name}, from the reference at 0 mm:")
         click.echo(
-            f"step  {'kind':<20} {'from/mm':>8} {'to/mm':>8} {'way/mm':>18} {'mm/s':>7} {'time/s':>8} "
+            f"step  {'kind':<20} {'from/mm':>8} {'to/mm':>8} {'range/mm':>18} {'mm/s':>7} {'time/s':>8} "
             f"{'gap/mm':>16} {'force/N':>6}"
         )
         for step in done.steps:
@@ -75,8 +75,8 @@ def command(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
     if not as_json:
         for part in done.bed.plugged:
             click.echo(
-                f"not tested: whether the {part.replace('_', ' ')} keeps its contract; this line tests it"
-                f"{', and moves it' if part == 'actuator' else ''}:\n  {_contract_line(part, bed_name)}"
+                f"not tested: whether the {part.replace('_', ' ')} passes its contract tests; this command line runs "
+                f"them{', and moves the stage' if part == 'actuator' else ''}:\n  {_contract_line(part, bed_name)}"
             )
         click.echo("The test bed can execute the recipe.")
 

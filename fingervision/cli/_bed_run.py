@@ -93,7 +93,7 @@ def command(
         document = {"folder": str(done.folder), "frames": counts.recorded, "frames_with_gap": counts.with_gap}
         click.echo(json.dumps({**document, "frames_lost": counts.lost, "resumed_after": done.resumed_after}))
         return
-    went_on = f", after {done.resumed_after} that were there" if done.resumed_after else ""
+    went_on = f", after {done.resumed_after} recorded before the interruption" if done.resumed_after else ""
     click.echo(f"{done.counts.recorded} frames{went_on}, {done.counts.with_gap} with a gap: {out / 'samples.csv'}")
     if bed.model is not None:
         table = out / ("samples.csv" if after is None else "joined.csv")

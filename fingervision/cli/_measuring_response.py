@@ -28,9 +28,9 @@ def measure_response(
     Raises
     ------
     UsageError
-        The options ask for two ways at once, or an item is not of their form.
+        The options request two methods at once, or an item has the wrong form.
     CalibrationError
-        The pictures tell no response.
+        The pictures do not determine a response.
     """
     if edges and densities is not None:
         raise UsageError(
@@ -42,7 +42,8 @@ def measure_response(
         exposed = [item for item in items if "=" in item and not Path(item).exists()]
         if exposed:
             raise UsageError(
-                f"With --edges or --densities a picture must be named without exposure time, but one is {exposed[0]}."
+                f"With --edges or --densities, a picture must be named without an exposure time, but {exposed[0]} has "
+                f"one."
             )
         pictures = [grey for _, grey in read_pictures([Path(item) for item in items])]
         top = max(top_level(grey) for grey in pictures)
@@ -94,7 +95,7 @@ def _say(found: MeasuredResponse, top: int, out: Path, as_json: bool) -> None:
     known = "" if found.u_exponent is None else f" +-{2.0 * found.u_exponent:.3f} (95 %)"
     click.echo(
         f"The camera's response is nearest to a power law with an exponent of {found.exponent:.3f}{known} (1 is "
-        f"linear); it explains the pictures to {100.0 * found.rms_relative:.2f} % (RMS), over levels "
-        f"{found.covered[0] * top:.0f} to {found.covered[1] * top:.0f} of {top}."
+        f"linear). The measured response reproduces the light to {100.0 * found.rms_relative:.2f} % (RMS), for grey "
+        f"levels from {found.covered[0] * top:.0f} to {found.covered[1] * top:.0f} of {top}."
     )
     click.echo(f"Written: {out}")

@@ -13,7 +13,8 @@ from fingervision.models.mechanism_figures import MechanismModel
 from fingervision.models.mechanism_state import MechanismState
 
 _APART = 0.1
-"""Relative: kinds that differ by more beyond their stated errors are worth a sentence (the issue's own bar)."""
+"""Relative difference of two kinds of model, beyond their stated errors, from which a message is printed (a
+requirement)."""
 
 
 def print_figures(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> None:
@@ -38,8 +39,8 @@ def warn(
     if worst.stress_mpa > mechanism.material.yield_mpa:
         at_yield_mm = next(iter(table.values()))["input_at_yield_mm"]
         click.echo(
-            f"Warning: at an input of {worst.input_mm:.3g} mm the stress in the flexures must stay below the yield of "
-            f"{mechanism.material.yield_mpa:g} MPa, but is {worst.stress_mpa:.3g} MPa; stay within "
+            f"Warning: at an input of {worst.input_mm:.3g} mm the stress in the flexures must stay below the yield "
+            f"stress of {mechanism.material.yield_mpa:g} MPa, but is {worst.stress_mpa:.3g} MPa; keep the input within "
             f"{at_yield_mm:.3g} mm.",
             err=True,
         )
@@ -47,8 +48,8 @@ def warn(
     for name, at_mm in model.touch_input_mm().items():
         if not contact and min(ends) < at_mm < max(ends):
             click.echo(
-                f"Warning: the faces of contact {name} touch at an input of {at_mm:.4g} mm, and beyond it this answer "
-                "lets them pass through each other; add --contact.",
+                f"Warning: the faces of contact {name} touch at an input of {at_mm:.4g} mm; beyond this input, the "
+                f"faces pass through each other, because contact is not computed: add --contact.",
                 err=True,
             )
     if len(table) > 1:
@@ -75,8 +76,8 @@ def disagreements_of(table: Mapping[str, Mapping[str, float]]) -> list[str]:
         if abs(apart) > _APART + stated:
             of = " of the largest motion" if label in motions else ""
             found.append(
-                f"{second} differs from {first} by {100.0 * apart:.3g} %{of} in {label}, more than their model errors "
-                f"of together {100.0 * stated:.2g} % leave; trust {first}."
+                f"In {label}, {second} differs from {first} by {100.0 * apart:.3g} %{of}, but their model errors "
+                f"together explain only {100.0 * stated:.2g} %; trust {first}."
             )
     return found
 
@@ -102,6 +103,6 @@ def say_endurance(kind: str, mechanism: Mechanism, states: Sequence[MechanismSta
     if life is not None:
         click.echo(
             f"Endurance between {states[0].input_mm:.3g} and {states[-1].input_mm:.3g} mm ({kind}, the material's S-N "
-            f"line, no scatter): {life.words}; the flexures' stress swings by +-{life.amplitude_mpa:.3g} MPa about "
-            f"{life.mean_mpa:.3g} MPa."
+            f"line, no scatter): {life.words}; the stress in the flexures changes by "
+            f"+-{life.amplitude_mpa:.3g} MPa about {life.mean_mpa:.3g} MPa."
         )

@@ -43,7 +43,7 @@ def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path:
     for side in (1.0, -1.0):
         colours = draw_body(axes, plate, moved, stress, max(state.stress_mpa, 1e-9), side=side)
     limit_mpa = model.gripper.material.yield_mpa
-    touch = " (first touch: no contact beyond)" if beyond else ""
+    touch = " (first touch; no contact force is computed beyond it)" if beyond else ""
     grip = f", grip {state.grip_n:.3g} N a finger" if state.grip_n > 0.0 else ""
     axes.set_title(
         f"{name}: input {input_mm:.3g} mm{touch}, to scale{grip}\nlargest stress on a notch {state.stress_mpa:.3g} MPa "
@@ -101,6 +101,6 @@ def draw_comparison(
     lower.set_ylabel(title)
     lower.set_xlabel("input / mm")
     lower.grid(alpha=0.3)
-    chosen = "; one link length was chosen on the paper's Comsol slope: no validation" if with_published else ""
+    chosen = "; one link length was fitted to this slope: no validation" if with_published else ""
     upper.set_title(f"{name}{chosen}", fontsize="medium")
     figure.savefig(path, dpi=130)

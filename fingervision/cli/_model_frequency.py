@@ -41,7 +41,7 @@ def parse_band(text: str) -> Band:
     Raises
     ------
     UsageError
-        Where it is none.
+        The text is not a frequency band.
     """
     try:
         first, last = (float(part) for part in text.split(":"))
@@ -66,7 +66,7 @@ def answer_frequencies(
             free = gripper_free_modes(half, reduced.rad_s.size)
             found[kind] = respond_to(reduced, free, band, damping)
         elif not as_json:
-            click.echo(f"{kind} has no masses in the plane: no frequency response.")
+            click.echo(f"{kind} has no masses in the plane, and therefore no frequency response.")
     if not found:
         raise UsageError(
             "--frequency needs a kind of model that has masses, lumped or finite_element, but none is chosen "
@@ -103,8 +103,9 @@ def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -
         if known < rad_s.size and rad_s[known] / (2.0 * pi) < band.last_hz:
             raise UsageError(
                 f"--damping {damping} is valid for modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz only (beyond, "
-                f"the damping ratio is outside 0 to 0.3), but --frequency goes to {band.last_hz:g} Hz past the mode at "
-                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end the band before that mode, or take modal:0.025."
+                f"the damping ratio is outside 0 to 0.3), but --frequency goes to {band.last_hz:g} Hz and includes "
+                f"the mode at {rad_s[known] / (2.0 * pi):.4g} Hz: end the band below this mode, or use --damping "
+                "modal:0.025."
             )
     frequencies = resolved_frequencies_hz(reduced, free, law, band.first_hz, band.last_hz)
     return frequency_response(reduced, free, frequencies, law)
@@ -164,7 +165,7 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     for axes in (upper, upper_force):
         low, high = axes.get_ylim()
         if high < _LEAST_RANGE * low:
-            # A decade's ticks on a line next to constant would all read alike.
+            # All tick labels of a decade would be equal where the curve is nearly constant.
             axes.set_yscale("linear")
             axes.set_ylim(low / _LEAST_RANGE, high * _LEAST_RANGE)
     for axes in (lower, lower_force):

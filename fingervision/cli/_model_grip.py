@@ -31,7 +31,7 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
     Raises
     ------
     UsageError
-        Where it has no width or stiffness, or the fingers squeeze it at rest already by more than they open.
+        The width or the stiffness is not positive, or the part does not fit between the fingers.
     """
     if width_mm is None:
         if stiffness_n_mm is not None:
@@ -61,13 +61,16 @@ def write_grip(
     said = []
     for kind, model in models.items():
         if not (hasattr(model, "half") or hasattr(model, "grip_force_n")):
-            click.echo(f"{kind} knows no part between the fingers: it has no rows in grip.csv.", err=True)
+            click.echo(
+                f"{kind} cannot compute a part between the fingers: grip.csv has no rows of this kind of model.",
+                err=True,
+            )
             continue
         touch = first_grip_mm(model.half, part) if isinstance(getattr(model, "half", None), DrivenBody) else None
         limit = _closing_limit_mm(gripper, model, touch)
         at = np.linspace(limit, 0.3 * abs(limit) + (touch or 0.0), _ROWS) if inputs is None else np.sort(inputs)
         if touch is not None and at.min() < touch < at.max():
-            # The line bends there.
+            # The curve has a kink at this input.
             at = np.union1d(at, [touch])
         rows[kind] = np.array([_row(model, float(value), part) for value in at])
         if touch is not None:
@@ -93,7 +96,7 @@ def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism
     Raises
     ------
     UsageError
-        Where the part is none, or the drawing has no such pair.
+        The width or the stiffness of the part is not positive, or the drawing has no such pair.
     """
     if width_mm is None and stiffness_n_mm is None:
         return None
@@ -116,7 +119,9 @@ def write_pair_grip(
     """Write grip.csv and grip.png for the finite elements of a mechanism, and print how the part is held."""
     plate = models.get("finite_element")
     if not isinstance(plate, MechanismPlate):
-        click.echo("A part between probes is answered by the finite elements: add --kind finite_element.", err=True)
+        click.echo(
+            "A part between probes can be computed by finite elements only: add --kind finite_element.", err=True
+        )
         return
     gripped, part = GrippedPair(plate, asked.pair), asked.part
     touch = gripped.touch_input_mm(part)

@@ -28,7 +28,7 @@ _FILM_DPI = 80
 _LETTERS_AN_INCH = 12.0
 """Letters of a title that fit side by side."""
 _KILO = 1e4
-"""Frequency (Hz) from which on a title tells kilohertz: four digits would be a power of ten."""
+"""Frequency (Hz) from which a title states kHz: with four digits, Hz would be printed as a power of ten."""
 _MARGIN = 0.02
 _MOST_FILM_MODES = 18
 
@@ -57,9 +57,9 @@ def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, 
     (out / "modes.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     drawn = next((found[kind] for kind in by_trust(found)), ())
     if not drawn:
-        click.echo("No mode lies in what --modes asks for: nothing is drawn.", err=True)
+        click.echo("No natural mode lies in the range that --modes states: no picture is drawn.", err=True)
         return
-    title = f"{name}: natural modes in the plane, without the actuator's mass, amplitudes at will"
+    title = f"{name}: natural modes in the plane, without the actuator's mass, arbitrary amplitudes"
     figure, _ = _panels(drawn, title)
     figure.savefig(out / "modes.png", dpi=110)
     if film:
@@ -110,8 +110,8 @@ def _in_hz(frequency_hz: float) -> str:
 
 def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:
     """Write a film of every mode vibrating with a period of one second, side by side."""
-    figure, moving = _panels(shapes, f"{title}; slowed to one swing a second")
-    # H.264 with halved colour needs even sides.
+    figure, moving = _panels(shapes, f"{title}; slowed to one oscillation per second")
+    # H.264 with subsampled colour needs an even width and height.
     sides = [2 * ceil(side * _FILM_DPI / 2) / _FILM_DPI for side in figure.get_size_inches()]
     figure.set_size_inches(sides[0], sides[1])
     figure.set_dpi(_FILM_DPI)

@@ -58,7 +58,7 @@ def _between(drive: DriveHistory, more: Callable[[Array], Array]) -> DriveHistor
     times, inputs, names = [], [], []
     for name in dict.fromkeys(runs.tolist()):
         own, values = drive.time_s[runs == name], drive.input_mm[runs == name]
-        # The drive's samples stay: kinks lie at them.
+        # The drive's own samples are kept, because the input has its kinks there.
         at = np.union1d(more(own), own)
         times.append(at)
         inputs.append(np.interp(at, own, values))
@@ -121,7 +121,7 @@ def motion_asked(
     Raises
     ------
     UsageError
-        Where an option is wrong, or does nothing without another.
+        An option is wrong, or has no effect without another option.
     """
     parse_damping(damping)
     if film and modes is None:
@@ -189,7 +189,9 @@ def follow_drive(
     for kind, model in models.items():
         if not isinstance(getattr(model, "half", None), DrivenBody):
             if not as_json:
-                click.echo(f"{kind} has no masses in the plane: it answers a drive at rest alone (simulation.csv).")
+                click.echo(
+                    f"{kind} has no masses in the plane: for a drive, it gives static results only (simulation.csv)."
+                )
             continue
         found = gripper_motion(model, drive, parse_damping(damping))
         motions[kind] = found.motion
@@ -211,7 +213,7 @@ def words_of(motion: Motion, column: str) -> str:
     )
     more = ", ..." if motion.modes_hz.size > 3 else ""
     return (
-        f"damping ratio {pairs}{more}; {column.removesuffix('_mm')} leaves the static answer by at most "
+        f"damping ratio {pairs}{more}; {column.removesuffix('_mm')} differs from the static result by at most "
         f"{motion.vibration_mm(column):.3g} mm."
     )
 
@@ -289,7 +291,7 @@ def mechanism_motion(
         shown[kind] = _motion_of(model, reduced, finer, damping, curve, column) if sparse else motion
         write_motion(folders[kind] / "response.csv", drive, motion.observed_mm, motion.force_n)
         if not as_json:
-            about = " about the equilibria, where nothing touches" if kind in static else ""
+            about = " about the static equilibria, without contact" if kind in static else ""
             click.echo(f"{kind} in time by {motion.modes_hz.size} modes{about}; {words_of(motion, column)}")
     title = f"{next(iter(models.values())).mechanism.name}, damping {damping}"
     draw_motion(shown, motions, column, title, out / "response.png")
@@ -303,7 +305,7 @@ def _motion_of(
     static: PchipInterpolator | None,
     column: str,
 ) -> Motion:
-    """Vibration of the modes: about the small answer, or about the equilibria that `static` interpolates."""
+    """Vibration of the modes about the linear response, or about the equilibria that `static` interpolates."""
     motion = modal_motion(reduced, drive, parse_damping(damping))
     if static is None:
         return motion

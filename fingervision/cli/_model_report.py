@@ -54,7 +54,7 @@ def say_what_limits(
     *,
     as_json: bool,
 ) -> None:
-    """Warn of stress beyond the yield stress, of fingers that penetrate each other, and of physics not in a model."""
+    """Warn of yielding, of fingers that penetrate each other, and of physical effects that a model omits."""
     for kind in by_trust(models):
         if hasattr(models[kind], "loaded"):
             _warn_of_stress(gripper, models[kind], inputs)
@@ -64,7 +64,7 @@ def say_what_limits(
             if onset is not None and not physics.contact and inputs.min() < onset * (1.0 + 1e-9):
                 click.echo(
                     f"Warning: the fingers touch at an input of {onset:.4g} mm, and from there to {inputs.min():.4g} "
-                    "mm this answer lets them pass through each other; add --contact.",
+                    f"mm they pass through each other, because contact is not computed: add --contact.",
                     err=True,
                 )
             break
@@ -72,7 +72,7 @@ def say_what_limits(
         return
     for kind in figures:
         if small_displacements_alone(kind) and len(models) > 1 and physics != Physics():
-            click.echo(f"Note: {kind} answers by small displacements and without contact all the same.")
+            click.echo(f"Note: the model kind {kind} always computes small displacements without contact.")
         if kind == "stiffness_matrix" and figures[kind].out_of_plane_modes_hz:
             click.echo(_out_of_plane_limit(gripper, figures[kind]))
 
@@ -83,7 +83,7 @@ def _say_endurance(gripper: Gripper, kind: str, model: Any, inputs: NDArray[np.f
     if life is not None:
         click.echo(
             f"Endurance between {ends[0].input_mm:.3g} and {ends[1].input_mm:.3g} mm ({kind}, the material's S-N line, "
-            f"no scatter): {life.words}; the hinge's stress swings by +-{life.amplitude_mpa:.3g} MPa about "
+            f"no scatter): {life.words}; the stress in the hinge changes by +-{life.amplitude_mpa:.3g} MPa about "
             f"{life.mean_mpa:.3g} MPa."
         )
 
@@ -91,10 +91,10 @@ def _say_endurance(gripper: Gripper, kind: str, model: Any, inputs: NDArray[np.f
 def _out_of_plane_limit(gripper: Gripper, figures: ModelFigures) -> str:
     wide = max(notch.plate_mm / notch.thickness_mm for notch in notches_of(gripper))
     return (
-        f"Note: stiffness_matrix takes bars for joined at points and, at a width over thickness of {wide:.3g}, the "
-        f"hinges' torsion between rigid planes: its first mode out of the plane is within "
-        f"{100.0 * figures.out_of_plane_error:.2g} %, its sag within {100.0 * figures.sag_error:.2g} %; "
-        "finite_element has three dimensions and is within 1 and 2 %."
+        "Note: the model kind stiffness_matrix joins bars at points and computes the torsion of a hinge between rigid "
+        f"planes. At a width over thickness of {wide:.3g}, its first frequency out of the plane is exact within "
+        f"{100.0 * figures.out_of_plane_error:.2g} %, its sag within {100.0 * figures.sag_error:.2g} %. The model kind "
+        "finite_element has three dimensions: its first frequency is exact within 1 %, its sag within 2 %."
     )
 
 

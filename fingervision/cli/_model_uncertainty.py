@@ -62,7 +62,7 @@ def write_uncertainty(
     _draw(stated, rows[best], f"{name}: {best}", out / "uncertainty.png")
     if as_json:
         return
-    click.echo(f"Standard uncertainties by the numbers that the drawing states them of ({best}):")
+    click.echo(f"Standard uncertainties of the results, caused by the uncertain numbers of the drawing ({best}):")
     width = max((len(figure) for figure in stated), default=0) + 2
     for figure, own in stated.items():
         most = ", ".join(f"{n} {100.0 * share:.0f} %" for n, share in own.shares if share >= 0.005)

@@ -20,5 +20,6 @@ def hide_option(command: Command) -> Command:
     """Add `--hide`: effects that are injected into the simulated parts of the test bed."""
     return click.option(
         "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]|SEALED.toml",
-        help="Add an effect of the catalogue to the simulated parts, untold to measurement and diagnosis; repeatable.",
+        help="Hide an effect of the catalogue in the simulated parts: measurement and diagnosis do not know it; "
+            "repeatable.",
     )(command)  # fmt: skip

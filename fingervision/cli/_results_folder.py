@@ -26,7 +26,7 @@ def results_folder(out: Path, source: Path) -> Path:
     named = context.get_parameter_source("out") is not click.core.ParameterSource.DEFAULT
     found = own_folder(out, source, named=named)
     if found != out:
-        click.echo(f"{out} holds the results of another input: these go to {found}.", err=True)
+        click.echo(f"{out} holds the results of another input: the new results are written to {found}.", err=True)
     return found
 
 

@@ -173,7 +173,7 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
         raise InputFileError(f"{path} could not be read ({why(error)}): check the options.") from error
     place = path.resolve()
     if not (isinstance(base, str) and base.isprintable()) or (path.parent / base).resolve() in (*inside, place):
-        return found  # a model that rests on itself is said where it is read
+        return found  # a model that is based on itself is refused when it is read
     return hashlib.sha256(f"{found}\n{_content(path.parent / str(base), (*inside, place))}".encode()).hexdigest()
 
 
@@ -255,14 +255,18 @@ def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
         click.echo(json.dumps(document, indent=2, allow_nan=False))
     else:
         there = sum(one.folder is not None for one in batch.outcomes)
-        what = "nothing to do" if not batch.fresh else f"{batch.fresh} worked on by this call"
-        click.echo(f"{there} of {len(batch.outcomes)} inputs have their result ({what}).")
+        what = "nothing to do" if not batch.fresh else f"{batch.fresh} processed by this call"
+        click.echo(f"{there} of {len(batch.outcomes)} inputs have a result ({what}).")
         click.echo(f"Written: {batch.out / 'batch.csv'}, {batch.out / 'batch.png'}, {batch.out / 'index.html'}")
     for one in batch.bad[:BAD_SHOWN] if not batch.stopped else ():
         subject = "" if one.words.startswith(one.input) else f"{one.input}: "
         click.echo(f"fingervision: {subject}{one.words}", err=True)
     if len(batch.bad) > BAD_SHOWN and not batch.stopped:
-        click.echo(f"fingervision: {len(batch.bad) - BAD_SHOWN} more are in {batch.out / 'batch.csv'}.", err=True)
+        click.echo(
+            f"fingervision: {len(batch.bad) - BAD_SHOWN} more inputs without a result are listed in "
+            f"{batch.out / 'batch.csv'}.",
+            err=True,
+        )
     if batch.stopped:
         click.echo(f"fingervision: {batch.stopped}", err=True)
 

@@ -295,7 +295,7 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
         for table, each in zip(tables, recordings, strict=True):
             for part in parts:
                 refuse_moving(each[part], str(table) if part is None else f"{table} at input {part:g} mm")
-        # Every cell of the study holds the same number of readings: as many as the shortest offers.
+        # Every cell of the study holds the same number of readings: as many as the shortest recording has.
         trials = min(len(each[part]) for each in recordings for part in parts)
         study = gauge_study([[each[part][:trials] for part in parts] for each in recordings])
         percent = None if tolerance_mm is None else study.percent_of(tolerance_mm)
@@ -322,6 +322,6 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
         if study.percent_of_total is not None:
             click.echo(f"%GRR of the total variation: {study.percent_of_total:.2f} %")
         if percent is not None:
-            click.echo(f"%GRR of {tolerance_mm:g} mm: {percent:.2f} % (6 s): {verdict(percent)}")
+            click.echo(f"%GRR of {tolerance_mm:g} mm: {percent:.2f} % (six standard deviations): {verdict(percent)}")
         else:
-            click.echo("State --tolerance-mm to see which part of it the gauge takes up.")
+            click.echo("State --tolerance-mm to see which share of the tolerance the gauge takes up.")

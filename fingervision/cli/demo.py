@@ -14,6 +14,7 @@ Examples:
   fingervision demo --hide backlash:play_mm=0.15 --out backlash
   fingervision demo --seed 5 --out shown
 """
+UNSEPARATED = "one of several explanations that no proposed run separates"
 
 
 @click.command(epilog=EXAMPLES)
@@ -33,13 +34,13 @@ def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
     from fingervision.testbed.simulation.parse_injected_effects import hidden_from
 
     hidden = hidden_from(hide) if hide else drawn(seed)
-    click.echo("An effect is hidden in the simulated bed; nobody looks at which until the end.")
+    click.echo("An effect is hidden in the simulated test bed; its name is shown at the end.")
     shown = demonstrate(hidden, seed, out, click.echo)
     truth = " and ".join(
         f"{name} ({', '.join(f'{key} = {value:.4g}' for key, value in values.items())})"
         for name, values in hidden.effects.items()
     )
-    ending = "found" if shown.found else "among what no further run was proposed for" if shown.among else "not found"
+    ending = "found" if shown.found else UNSEPARATED if shown.among else "not found"
     runs = "one run" if shown.runs == 1 else f"{shown.runs} runs"
-    click.echo(f"Hidden was {truth or 'nothing'}: {ending} after {runs}.")
+    click.echo(f"Hidden effect: {truth or 'none'}. It was {ending} after {runs}.")
     click.echo(f"Report: {shown.page}")

@@ -57,8 +57,10 @@ def command(name: str | None, figure: Path | None) -> None:
     click.echo(
         f"  needs     {', '.join(needs) or 'input and gap'}{'; starts each run at rest' if effect.memory else ''}"
     )
-    place = f"{effect.order:g} within its stage" if effect.order < float("inf") else "last of its stage"
-    click.echo(f"  acts      {place}\n  from      {origin_of(name)}")
+    place = f"{effect.order:g}" if effect.order < float("inf") else "last"
+    click.echo(
+        f"  order     {place}, in the section {effect.stage} of the measuring chain\n  from      {origin_of(name)}"
+    )
     for p in effect.parameters:
         click.echo(f"  {p.words}: {p.name}, {p.unit or 'ratio'}, {p.lower:g} to {p.upper:g}, narrowed by the data")
     if figure is not None:

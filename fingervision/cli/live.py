@@ -117,7 +117,7 @@ port_of_page = click.option(
     "--hide",
     multiple=True,
     metavar="EFFECT[:PARAMETER=VALUE,...]",
-    help="Add an effect to the simulated test bed, untold to the measurement.",
+    help="Hide an effect in the simulated test bed: the measurement does not know it.",
 )
 @click.option(
     "--allow-motion",

@@ -158,7 +158,7 @@ def command(
     if mechanism is not None:
         from fingervision.cli._measure_bodies import body_follower
 
-        # What is wrong with the drawing or its points is said before the recording is measured.
+        # Errors of the drawing or its points are reported before the recording is measured.
         follow = body_follower(mechanism, points)
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)
@@ -226,21 +226,21 @@ def _report(measured: "Measured", as_json: bool) -> None:
     elif not series.frames and (asked := summary["settings"]["frames"]) is not None and asked[0]:
         _complain(
             f"--frames must begin within the recording, but {summary['recording']['name']} ends before frame "
-            f"{asked[0]}: give an earlier one."
+            f"{asked[0]}: give an earlier first frame."
         )
     elif not series.frames:
         _complain(f"{summary['recording']['name']} must have at least one picture, but has none: record it again.")
     elif not series.counts[Status.OK] and not measured.has_gauge_numbers:
         first = min(series.first_without.values(), key=lambda bad: bad.frame)
         _complain(
-            f"None of the {series.frames} frames gave a number ({counts}). Frame {first.frame}: {first.words} "
-            f"See --steps {first.frame}; the table is {folder.gaps}."
+            f"None of the {series.frames} frames could be measured ({counts}). Frame {first.frame}: {first.words} To "
+            f"see why, add --steps {first.frame}; the table of all frames is {folder.gaps}."
         )
     elif series.first_damaged is not None:
         bad = series.first_damaged
         _complain(
             f"The recording is damaged: {series.counts[Status.DAMAGED]} of {series.frames} frames could not be read, "
-            f"the first is frame {bad.frame}. {bad.words} Everything else is measured."
+            f"the first is frame {bad.frame}. {bad.words} All other frames were measured."
         )
 
 

@@ -45,7 +45,7 @@ def command(every: bool, as_json: bool) -> None:
     for row in shown:
         click.echo(f"{row['group'].removeprefix('fingervision.'):14} {row['name']:24} {row['from']}")
     if not rows or (not shown and not refused):
-        click.echo("No plug-in is installed: what there is is built in (--all lists it).")
+        click.echo("No plug-in is installed; --all also lists the built-in parts.")
 
 
 def _registries() -> list[Any]:

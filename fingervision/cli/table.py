@@ -80,7 +80,7 @@ def command(
     if found.question is not None:
         raise found.question
     if found.own:
-        _say("It needs no columns.toml.", quiet=as_json)
+        _say("The table needs no columns.toml.", quiet=as_json)
         return
     changed = write_entry(target, _name_for(file, target), None if found.also else found.kind, found.entry)
     _say(f"{'Written' if changed else 'Unchanged'}: {target}", quiet=as_json)
@@ -108,7 +108,7 @@ def _print(found: "Account") -> None:
     rate = "" if found.rate_hz is None else f", {found.rate_hz:.6g} rows a second"
     words = {"drive": "a drive"}.get(found.kind, f"a {found.kind} table")
     if found.also:
-        words = f"a {found.kind} or {found.also} table (nothing in it says which; it is read alike as either)"
+        words = f"a {found.kind} or {found.also} table (the file does not say which; both are read in the same way)"
     click.echo(f"read as {words}, {found.rows} rows{rate}")
     if document["columns"]:
         rows = [("column", "unit in file", "read as", "range")]

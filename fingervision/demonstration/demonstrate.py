@@ -25,9 +25,9 @@ from fingervision.testbed.run.run_metadata import JOINED, SAMPLES, SIMULATION
 from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.testbed.simulation.parse_injected_effects import usual_values
 
-# Sizes are drawn between these multiples of the usual one.
+# The size of an effect is drawn at random between these multiples of its usual size.
 SIZES = (0.6, 1.4)
-# One way only at first, as at a bench where nobody knows yet what to look for.
+# The first run has one opening and closing only, as for a gripper about which nothing is known yet.
 FIRST_RUN: tuple[dict[str, object], ...] = (
     {"kind": "triangle", "from_mm": -0.4, "to_mm": 1.3, "speed_mm_s": 0.5, "cycles": 1, "frames": "continuous"},
 )
@@ -78,8 +78,8 @@ def drawn(seed: int) -> Hidden:
     """Choose, by a seed, an effect and its size for the demonstration, among the effects declared suitable.
 
     A random number is drawn for each effect from the seed and the effect's name, and the effect with the highest number
-    is chosen (rendezvous hashing: Thaler & Ravishankar 1998, doi:10.1109/90.663936). A new effect therefore changes
-    only the choice for seeds by which the new effect itself is chosen.
+    is chosen (rendezvous hashing: Thaler & Ravishankar 1998, doi:10.1109/90.663936). If an effect is added to the
+    catalogue, the choice changes only for those seeds that choose the new effect.
     """
     rng = np.random.default_rng([seed, 7])
     name = max(demonstrated(), key=lambda name: float(np.random.default_rng([seed, crc32(name.encode())]).random()))
@@ -97,7 +97,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
     Parameters
     ----------
     hidden : Hidden
-        Effects hidden in the test bed; the demonstration does not use them before the end.
+        Effects hidden in the test bed; the demonstration does not use these effects before the end.
     seed : int
         Seed of all random numbers.
     out : Path
@@ -119,14 +119,17 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
     before: Path | None = None
     for number in range(1, MOST_RUNS + 1):
         folder, asked = out / f"run-{number}", read_recipe(recipe)
-        say(f"Run {number}, {asked.name}: the stage moves, a camera looks on, every picture is measured.")
+        say(f"Run {number}, {asked.name}: the stage moves, a camera films the gripper, and every picture is measured.")
         rows = [] if before is None else rows_before(before)
         bed = open_bed(SIMULATED, hidden, seed=seed, earlier_s=times_of(rows))
         try:
             done = run_recipe(asked, bed, folder, hidden, before=rows)
         finally:
             bed.close()
-        say(f"{done.counts.with_gap} gaps in {done.counts.recorded} pictures. They are compared with the simulation.")
+        say(
+            f"{done.counts.with_gap} gaps were measured in {done.counts.recorded} pictures. The gaps are compared with "
+            "the simulation."
+        )
         table = folder / (SAMPLES if before is None else JOINED)
         answer, page = _answer(table, folder / SIMULATION, out / f"diagnosis-{number}", seed)
         say(f"{answer.report.verdict}: {answer.report.sentence}")

@@ -42,9 +42,9 @@ class Comparison:
     places : tuple of Place
         Regions, largest first.
     rms_mm, noise_mm : float
-        RMS disagreement over all rows, of each finger's edge if both were measured, else of the gap; and an upper bound
-        of the noise of one gap reading: fast changes of the disagreement count as noise here, so that the bound is
-        larger for a model that deviates more.
+        RMS disagreement over all rows, of each finger's edge if both edges were measured, else of the gap; and an upper
+        bound of the noise of one gap reading. Fast changes of the disagreement count as noise here, so that this bound
+        is larger for a model that deviates more.
     counted_rms_mm : float
         RMS disagreement without the rows in `left_out`.
     left_out : tuple of int
@@ -63,7 +63,7 @@ class Comparison:
         """Return disagreement and noise as a part of a sentence."""
         of = EDGES if self.data.chain.history.both_edges else ""
         rows = f"{len(self.left_out)} of {self.data.table.gap_mm.size} rows"
-        without = f" ({self.counted_rms_mm:.3g} mm without {rows} set aside as outliers)" if self.left_out else ""
+        without = f" ({self.counted_rms_mm:.3g} mm without {rows} left out as outliers)" if self.left_out else ""
         return f"RMS disagreement {self.rms_mm:.3g} mm{of}{without}, noise of the gap at most {self.noise_mm:.2g} mm"
 
     def document(self) -> dict[str, object]:
@@ -94,7 +94,7 @@ class Comparison:
 
 
 def rough(residual_mm: Array, history: History) -> Array:
-    """Residual minus straight segments that extend from reversal to reversal in each run; same shape as the residual.
+    """Residual minus straight segments from reversal to reversal in each run; same shape as the residual.
 
     A jump at a reversal contains all frequencies, so that a spectrum would count it as noise.
     """
@@ -132,7 +132,7 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         data = over
     residual = data.stacked_mm - data.chain.stacked({})
     problem = data.problem(residual, 0, explained=False)
-    # A delay that the model has is read as its diagnosis reads it.
+    # If the model includes a delay, interpolate the input as in a diagnosis.
     data = likelier_interpolation(data, problem, problem.nothing())
     residual = data.stacked_mm - data.chain.stacked({})
     for _ in range(MOST_REFITS if data.refit.moved else 0):
@@ -144,7 +144,7 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         if settled:
             break
     history = data.chain.history
-    # Nothing was explained yet: what the disagreement itself does within seconds is no noise.
+    # Nothing has been explained yet, so that changes of the disagreement over seconds must not count as noise.
     problem = data.problem(rough(residual, history), 0, explained=False)
     found = places(data, problem, residual, np.random.default_rng(seed))
     answers = drawing_of(model) if table.channels else None

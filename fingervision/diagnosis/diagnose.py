@@ -44,7 +44,7 @@ class Diagnosis:
     bodies : BodyEvidence or None
         Results from the poses of bodies, if there are any.
     left_out : tuple of int
-        Rows that stand alone far off the others, which the verdict does not count.
+        Isolated outliers, which the verdict does not count.
     """
 
     report: DiagnosisReport

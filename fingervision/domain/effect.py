@@ -92,7 +92,7 @@ class History:
     def times(self) -> Array:
         """Times of the samples (s), shape (n,); only for effects that declare `needs_times`."""
         if self.time_s is None:
-            message = "an effect that needs times was run on a table without them."
+            message = "An effect that needs times was computed for a table without times."
             raise ValueError(message)
         return self.time_s
 
@@ -173,12 +173,12 @@ class Effect:
     name : str
         Name of the effect in the catalogue, as used in all files.
     stage : Stage
-        Stage of the measuring chain in which the effect acts: drive, mechanism or camera.
+        Section of the measuring chain in which the effect acts: drive, mechanism or camera.
     order : float
-        Position in the chain within the stage: effects act in ascending order. The built-in effects have multiples of
-        ten (`fingervision effects NAME` prints the number), so that a user-defined effect may be put between two of
-        them: an effect that acts after the play (60) and before the jumps (70) has, for example, 65. By default, the
-        effect acts last in its stage.
+        Position in the section of the chain: effects act in ascending order. The built-in effects have multiples of ten
+        (`fingervision effects NAME` prints the number), so that a user-defined effect may be put between two of them:
+        an effect that acts after the play (60) and before the jumps (70) has, for example, 65. By default, the effect
+        acts last in its section.
     words : str
         Short description of the effect.
     formula : str
@@ -204,7 +204,7 @@ class Effect:
         Function for bounds that depend on the data: `narrow(history)` returns the parameters to search, or the reason
         why these data cannot show the effect.
     foretold : mapping of str to (float, float)
-        Ranges of the effect's parameters that a drawing predicts; empty if a drawing predicts nothing.
+        Ranges of the effect's parameters that follow from a drawing; empty if the drawing determines none.
     checks : mapping of FurtherCheck to bool
         Checks without a motion of the stage in which the effect is visible (True) or not visible (False); checks that
         are not listed give no information on the effect.
@@ -276,7 +276,7 @@ class Effect:
         if self.needs_force and not history.force:
             return "the table has no force_n, and the gap hardly shows it"
         if self.needs_bodies and not history.bodies:
-            return "it is told by poses of bodies beside a drawing, and not by the gap alone"
+            return "only measured poses of bodies, compared with a drawing, show this effect; the gap alone does not"
         found = self.parameters if self.narrow is None else self.narrow(history)
         if isinstance(found, str) or not self.start:
             return found

@@ -11,21 +11,31 @@ class FurtherCheck(Enum):
     distinguishes two effects when one of them is visible in it and the other is not.
     """
 
-    SLOT = "measure a slot of known width in the fingers' place: what the camera adds shows in it, the gripper does not"
+    SLOT = (
+        "measure a slot of known width in place of the fingers: an error of the camera changes the measured width, an "
+        "error of the gripper does not"
+    )
     """Visible: an effect that moves the edges of a resting slot in the picture's middle as it moves the fingers."""
-    TURN = "turn the part by 180 degrees in the picture: what the part does turns with it, what the camera does stays"
+    TURN = (
+        "turn the part by 180 degrees in the picture: an error of the part turns with it, an error of the camera "
+        "does not"
+    )
     """Visible: an effect that turns with the part."""
-    SHIFT = "shift the picture: what the lens adds depends on the place in it, what the part does goes along"
+    SHIFT = "shift the part in the picture: an error of the lens changes with the place, an error of the part does not"
     """Visible: an effect that depends on the position in the picture."""
-    REZERO = "re-zero the stage: an offset that came from its zeroing changes with it, the rest gap stays"
+    REZERO = "re-zero the stage: an offset of its zero changes, the rest gap does not"
     """Visible: an effect that disappears when the stage's zero is set anew."""
-    TRAVEL = "measure the stage's travel with a gauge: the input's scale shows in it, the lever's ratio does not"
+    TRAVEL = (
+        "measure the stage's travel with a gauge: an error of the input's scale shows, an error of the lever "
+        "ratio does not"
+    )
     """Visible: an effect that changes the travel of the stage itself."""
     LIGHT = (
-        "let the camera see a light that is switched with the drive: a late picture shows it late, a late drive in time"
+        "film a light that is switched with the drive: if the camera is late, the light appears late; if the drive "
+        "lags, it does not"
     )
     """Visible: an effect by which the picture is late."""
-    FORCE = "measure the force, or look at the fingers where the motion ends: fingers that meet press on each other"
+    FORCE = "measure the force, or look at the fingers where the motion ends: fingers that touch press on each other"
     """Visible: an effect by which the fingers press on each other."""
 
 

@@ -73,7 +73,7 @@ def _library() -> ModuleType:
         return _loaded(place / name)
     msg = (
         f"The loops in C must be built once, and kept in one of {', '.join(map(str, places[1:]))}, but none of these "
-        "can be written to: set XDG_CACHE_HOME to a folder that can."
+        f"can be written to: set XDG_CACHE_HOME to a folder that can be written to."
     )
     raise InstallationError(msg)
 
@@ -91,14 +91,14 @@ def _forget_others(place: Path, name: str) -> None:
     """Delete libraries that were built from older sources."""
     for path in place.glob(f"{NAME}-*"):
         if path.name != name:
-            with suppress(OSError):  # another process uses it, or has thrown it away
+            with suppress(OSError):  # another process uses the file, or has deleted it
                 path.unlink()
 
 
 def _loaded(path: Path) -> ModuleType:
     spec = spec_from_file_location(NAME, path, loader=ExtensionFileLoader(NAME, str(path)))
     if spec is None or spec.loader is None:
-        msg = f"{path} must be a library of this Python, but is not: delete it, and it is built anew."
+        msg = f"{path} must be a library of this Python, but is not: delete the file, and it is built again."
         raise InstallationError(msg)
     module = module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Codecs state a quantiser for every so many pixels.
+# Side of a block in pixels for which codecs state a quantiser step.
 BLOCK_PX = 16
 
 
@@ -34,6 +34,12 @@ class Quantiser:
         left, right = (self._block(x_px + way - self.first_px[0], columns) for way in (-across_px, across_px))
         top, bottom = (self._block(y_px + way - self.first_px[1], rows) for way in (-along_px, along_px))
         return float(self.step[top : bottom + 1, left : right + 1].max())
+
+    def at(self, x_px: NDArray[np.float64], y_px: NDArray[np.float64]) -> float:
+        """Largest step of the blocks in which any of the given points lies."""
+        rows, columns = self.step.shape
+        x, y = ((p - first + 0.5) // BLOCK_PX for p, first in zip((x_px, y_px), self.first_px, strict=True))
+        return float(self.step[np.clip(y, 0, rows - 1).astype(int), np.clip(x, 0, columns - 1).astype(int)].max())
 
     def seen_from(self, x_px: int, y_px: int) -> "Quantiser":
         """Return the quantiser steps of the part of the picture that begins at this column and row."""

@@ -73,7 +73,8 @@ class Disagreement:
     Parameters
     ----------
     before_rms_mm, after_rms_mm, noise_rms_mm : float
-        RMS without and with the named effects, and that of the random noise.
+        RMS without and with the named effects, and that which a true explanation would leave: the random noise of the
+        gap, and of the recorded input.
     unseen_before_rms_mm, unseen_after_rms_mm : float or None
         The same from cross-validation: each run is predicted from a fit to the other runs.
     by_channel : mapping

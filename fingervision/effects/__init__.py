@@ -47,7 +47,7 @@ def origin_of(name: str) -> Origin:
 
 
 def that_show(check: FurtherCheck) -> tuple[str, ...]:
-    """Names of the effects that are visible in a given check, in the order of the catalogue."""
+    """Names of the effects that are visible in a given check of the set-up, in the order of the catalogue."""
     return tuple(name for name, effect in catalogue().items() if effect.checks.get(check) is True)
 
 
@@ -96,5 +96,5 @@ def _place(effect: Effect, *, built_in: bool) -> tuple[int, float, bool, str]:
     return list(Stage).index(effect.stage), effect.order, not built_in, effect.name
 
 
-# `fingervision.effects` itself can be iterated and asked by name.
+# The package `fingervision.effects` can itself be iterated and indexed by name.
 sys.modules[__name__].__class__ = EffectList

@@ -20,7 +20,7 @@ EFFECT = DriveEffect(
     stage=Stage.DRIVE,
     order=60,
     words="after a reversal, the mechanism moves only once the play is taken up",
-    formula="play operator of full width play_mm, anywhere within it at the start of each run",
+    formula="play operator of full width play_mm; each run starts anywhere within the play",
     source="Prandtl play; Visintin 1994",
     residual="two parallel branches, one for each direction, half the play to either side of the simulation",
     parameters=(Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", starts=8, logarithmic=True),),

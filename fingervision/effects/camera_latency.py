@@ -38,7 +38,7 @@ EFFECT = PointEffect(
     stage=Stage.CAMERA,
     order=250,
     words="the time stamps of the frames are too late",
-    formula="everything at t - delay_s",
+    formula="every position at time t - delay_s",
     source="a pure delay",
     residual="proportional to the speed of the measuring points, including their drifts",
     parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay of the picture", starts=8, logarithmic=True),),

@@ -22,8 +22,8 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     moving = steps[steps > max(4.0 * history.input_sigma_mm, 1e-3 * history.input_span_mm / len(steps))]
     shortest_mm = 4.0 * float(np.median(moving)) if moving.size else np.inf
     if shortest_mm >= 0.5 * history.input_span_mm:
-        return "the input's steps are too wide to resolve a period within half its range"
-    # Neighbouring starts differ by half a cycle over the range, so that none is missed.
+        return "the steps of the input are too wide to resolve a period of half the input's range or less"
+    # Neighbouring starting values of the period differ by half a cycle over the range, so that no period is missed.
     starts = int(np.clip(2.0 * history.input_span_mm / shortest_mm, 8, 300))
     amplitude, period, phase = EFFECT.parameters
     return amplitude, replace(period, lower=shortest_mm, upper=0.5 * history.input_span_mm, starts=starts), phase

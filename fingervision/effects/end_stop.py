@@ -31,7 +31,7 @@ EFFECT = DriveEffect(
     words="the stage stops at an end stop before it reaches the recorded input",
     formula="min(u, upper_mm), max(., lower_mm)",
     source="definition",
-    residual="zero up to the stop; beyond it, the missing input times the slope of the model",
+    residual="zero up to the stop; beyond the stop, the missing input times the slope of the model",
     parameters=(
         Parameter("upper_mm", "mm", -1e3, 1e3, "input at the upper stop", neutral=1e3, starts=10),
         Parameter("lower_mm", "mm", -1e3, 1e3, "input at the lower stop", neutral=-1e3, starts=10),

@@ -22,7 +22,7 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     if history.closing_mm <= 0.0:
         return "the gripper is never closed below its rest gap"
     if history.rest_gap_mm <= lowest_mm:
-        return "the gap at rest is not above zero, so there are no fingers that could meet"
+        return "the gap at rest is not above zero, so that the fingers cannot move towards each other"
     floor, slope = EFFECT.parameters
     return replace(floor, lower=lowest_mm, upper=history.rest_gap_mm, neutral=lowest_mm), slope
 

@@ -7,7 +7,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Reduce the opening by the ratio by which the lever's short arm is longer: tables do not describe single links."""
+    """Divide the opening by 1 + ratio, as for a lever with a longer short arm: a table does not describe links."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     return response.with_gap(history.rest_gap_mm + opening_mm / (1.0 + values["ratio"]))
 

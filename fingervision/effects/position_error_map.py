@@ -58,7 +58,7 @@ def curve_points(values: Values) -> tuple[Array, Array]:
 def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float) -> tuple[Array, Array]:
     """Return a representative curve for a map of which only RMS and correlation length are known.
 
-    The same arguments always give the same curve.
+    The curve is random, but the same for the same arguments.
     """
     at = np.linspace(low_mm, high_mm, TYPICAL_NODES)
     root = np.linalg.cholesky(covariance(at, length_mm) + 1e-9 * np.eye(at.size))
@@ -67,7 +67,7 @@ def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: add the stage's error at each position; beyond its ends, the curve is constant."""
+    """Apply the effect: add the stage's error at each position; beyond the ends of its curve, the error is constant."""
     at, errors = curve_points(values)
     if not at.size:
         if values["rms_mm"] == 0.0:
@@ -81,7 +81,7 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of the parameters to what the given data can show."""
     places = np.unique(np.round(history.input_mm / max(1e-6 * history.input_span_mm, 1e-300)))
     if places.size < FEWEST_PLACES:
-        return f"a map must be seen at {FEWEST_PLACES} different inputs at least, but the table has {places.size}"
+        return f"a map needs readings at {FEWEST_PLACES} or more different inputs, but the table has {places.size}"
     return EFFECT.parameters
 
 

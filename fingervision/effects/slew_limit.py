@@ -17,8 +17,8 @@ displacement over these samples must reach."""
 JUMP_RANGE = 0.01
 """Lowest speed limit that is searched with step commands, relative to the fastest commanded speed."""
 APART = 1.5
-"""Ratio of fastest to slowest motion above which a speed limit between both can be distinguished from a record of a
-single speed with errors."""
+"""Ratio of fastest to slowest motion above which a speed limit between the two speeds can be distinguished from a
+record of a single speed with errors."""
 
 _follow = loop("slew_limit_follow")
 
@@ -26,7 +26,7 @@ _follow = loop("slew_limit_follow")
 def follow(input_mm: Array, time_s: Array, speed_mm_s: float) -> Array:
     """Output of a stage that follows the input of one run at a speed of at most `speed_mm_s`; shape (n,).
 
-    The result is exact for an input that is linear between its samples.
+    The computed output is exact for an input that is linear between its samples.
     """
     return filled(_follow, input_mm, np.ascontiguousarray(time_s), speed_mm_s)
 
@@ -58,12 +58,12 @@ def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
 def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of the parameters to what the given data can show."""
     if history.dwell_s > 0.0:
-        return "the stage is taken to have arrived and waited before each reading, however slowly it went"
+        return "the stage is assumed to have arrived before each reading, so that its speed has no effect"
     moving: list[Array] = []
     jumping: list[Array] = []
     for run in history.runs:
         move = np.abs(np.diff(history.input_mm[run]))
-        # A single move between two stands is a command's jump: it asks for a speed, and shows none.
+        # A move over a single sample between two rests is a step command: it demands a speed but does not show one.
         stands = np.pad(move <= 4.0 * history.input_sigma_mm, 1, constant_values=True)
         jumps = ~stands[1:-1] & stands[:-2] & stands[2:]
         jumping.append((move / np.diff(history.times[run]))[jumps])
@@ -74,7 +74,10 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     fastest = float(np.max(np.concatenate([steady, asked])))
     slowest, fast = np.quantile(steady, (SLOWEST_SHARE, FASTEST_SHARE)) if steady.size else (JUMP_RANGE * fastest, 0.0)
     if max(float(fast), float(np.max(asked, initial=0.0))) < APART * slowest:
-        return f"the input moves at one speed only, about {fastest:.3g} mm/s: a limit below it would follow nothing"
+        return (
+            f"the input moves at one speed only, about {fastest:.3g} mm/s: a stage with a lower limit could follow no "
+            "move"
+        )
     (speed_limit,) = EFFECT.parameters
     return (replace(speed_limit, lower=float(slowest), upper=fastest, neutral=fastest),)
 

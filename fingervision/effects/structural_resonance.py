@@ -15,7 +15,7 @@ _ring = loop("structural_resonance_ring")
 def ring(signal: Array, time_s: Array, frequency_hz: float, damping_ratio: float) -> Array:
     """Response of a second-order system to one run's signal, at rest at the first sample; shape (n,).
 
-    The result is exact for a signal that is linear between its samples.
+    The computed response is exact for a signal that is linear between its samples.
     """
     return filled(_ring, signal, np.ascontiguousarray(time_s), frequency_hz, min(damping_ratio, 0.9999))
 

@@ -20,7 +20,7 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Exclude time constants so short that the drift ends before the second reading and would be a constant offset."""
     amplitude, tau = EFFECT.parameters
     if history.sample_time_s >= tau.upper:
-        return f"readings are {history.sample_time_s:.3g} s apart, and a warming would be over between two of them"
+        return f"readings are {history.sample_time_s:.3g} s apart, so that warming would end between two readings"
     return amplitude, replace(tau, lower=max(tau.lower, history.sample_time_s))
 
 

@@ -47,12 +47,11 @@ def late(signal: Array, history: History, delay_s: float, *, curved: bool = Fals
 def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of a delay to what the data can show; delays shorter than the stage's rests are invisible.
 
-    With step commands, the prediction changes in jumps as a function of the delay, whenever the delay passes a sample
-    time.
+    With step commands, the prediction jumps as a function of the delay, whenever the delay passes a sample time.
     """
     if history.dwell_s <= delay.upper:
         return (replace(delay, rugged=True, starts=COMMANDED_STARTS) if history.commanded else delay,)
     return (
-        f"the stage is taken to have stood for {history.dwell_s:.3g} s or longer before each reading, "
-        f"and a delay of at most {delay.upper:g} s is over by then"
+        f"the stage is assumed to have rested for {history.dwell_s:.3g} s or longer before each reading, and a delay "
+        f"of at most {delay.upper:g} s is over by then"
     )

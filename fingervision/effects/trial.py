@@ -44,7 +44,7 @@ def effects_in(held: object) -> dict[str, Effect]:
     """
     found: list[object] = [held]
     if isinstance(held, ModuleType):
-        # What a module imports from the package is no effect of its own.
+        # Effects that a module imports from the package are not its own.
         ours = {id(effect) for effect in BUILT_IN}
         own = {id(value): value for value in vars(held).values() if isinstance(value, Effect) and id(value) not in ours}
         found = list(own.values())
@@ -65,7 +65,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
     Raises
     ------
     MisfitError
-        The rest of a sentence that says what it must be and what it is.
+        If the object is not a valid effect; the message states what it must be and what it is.
     """
     if not isinstance(effect, DriveEffect | PointEffect):
         raise MisfitError(f"must be a DriveEffect or a PointEffect, but is of type {type(effect).__name__}")
@@ -90,7 +90,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
     history = trial_history()
     searched = effect.search(history)
     if isinstance(searched, str):
-        return effect  # these few samples cannot show it
+        return effect  # the effect cannot be seen in so few samples
     values = {p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) for p in searched}
     try:
         _answer(effect, history, values)
@@ -136,7 +136,9 @@ def _checked_drive(effect: DriveEffect, input_mm: Array, history: History, value
         raise EffectAnswerError(effect.name, _raised(error, values)) from error
     _same(effect.name, "input", answer, input_mm.shape, values)
     if not np.array_equal(asked, input_mm, equal_nan=True):
-        raise EffectAnswerError(effect.name, "must leave the input that it is given as it is, but changed it in place")
+        raise EffectAnswerError(
+            effect.name, "must not change the array of inputs that it is given, but changed it in place"
+        )
     return answer
 
 
@@ -150,7 +152,7 @@ def _checked_points(effect: PointEffect, response: Response, history: History, v
     for side in ("left_mm", "right_mm"):
         _same(effect.name, side, getattr(answer, side), response.left_mm.shape, values)
     if (answer.force_n is None) != (response.force_n is None):
-        raise EffectAnswerError(effect.name, "must return a force where it is given one, and only there, but does not")
+        raise EffectAnswerError(effect.name, "must return a force if, and only if, it is given a force, but does not")
     if answer.force_n is not None:
         _same(effect.name, "force_n", answer.force_n, response.left_mm.shape, values)
     return answer
@@ -162,15 +164,15 @@ def _same(name: str, what: str, answer: object, shape: tuple[int, ...], values: 
         raise EffectAnswerError(name, f"must return {what} as an array of float, but returned a {kind}")
     if answer.shape != shape:
         raise EffectAnswerError(
-            name, f"must return {what} of shape {shape}, as it is given, but returned {answer.shape}"
+            name, f"must return {what} in the shape {shape} of its input, but returned the shape {answer.shape}"
         )
     if not np.all(np.isfinite(answer)):
-        raise EffectAnswerError(name, f"must return finite numbers, but returned others at {_told(values)}")
+        raise EffectAnswerError(name, f"must return finite numbers, but returned NaN or infinity at {_told(values)}")
 
 
 def _raised(error: Exception, values: Values) -> str:
     words = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-    return f"must answer for every value within its bounds, but raised {words} at {_told(values)}"
+    return f"must return a result for all parameter values within their bounds, but raised {words} at {_told(values)}"
 
 
 def _told(values: Values) -> str:

@@ -7,8 +7,8 @@ from fingervision.effects.low_pass import low_pass
 
 TAUS_S = (1, 4, 16, 64)
 SLOWER = 2.0
-"""Times the dwell before a reading that a time constant must be to show: the dwell is taken for half of the time
-between two readings, and what relaxes faster than between them depends on when the stage arrived."""
+"""Smallest ratio of time constant to dwell at which creep is visible. The dwell before a reading is assumed to be half
+of the time between two readings; creep with a shorter time constant depends on when exactly the stage arrived."""
 
 
 def act(response: Response, history: History, values: Values) -> Response:
@@ -19,7 +19,7 @@ def act(response: Response, history: History, values: Values) -> Response:
         fraction = values.get(f"fraction_{tau_s}s", 0.0)
         if fraction != 0.0:
             for index, run in enumerate(history.runs):
-                # What was held before the run is somewhere within the openings of the record.
+                # The opening that was held before the run is assumed to lie within the recorded openings.
                 relaxed_mm = opening_mm[run][0] + values.get(start_key(index), 0.0) * history.opening_mm
                 crept_mm[run] -= fraction * (
                     opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s), relaxed_mm)
@@ -31,7 +31,10 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Exclude time constants much shorter than the stage's rest before each reading, whose creep would be complete."""
     kept = tuple(p for p, tau_s in zip(EFFECT.parameters, TAUS_S, strict=True) if tau_s >= SLOWER * history.dwell_s)
     if not kept:
-        return f"the stage stood for {history.dwell_s:.3g} s or longer before each reading: creep is over by then"
+        return (
+            f"the stage is assumed to have rested for {history.dwell_s:.3g} s or longer before each reading, when "
+            "creep has ended"
+        )
     return kept
 
 

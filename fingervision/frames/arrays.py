@@ -54,7 +54,7 @@ class ArrayFrames:
     def __post_init__(self) -> None:
         stack = stated_shape(self.pictures)
         if self.rate_hz is not None and self.times_s is not None:
-            raise ArgumentError("rate_hz", "be left out where times_s is given", "both are given")
+            raise ArgumentError("rate_hz", "be left out if times_s is given", "both are given")
         if self.rate_hz is not None and not 0.0 < self.rate_hz < float("inf"):
             raise ArgumentError("rate_hz", "be positive", f"is {self.rate_hz:g}")
         times_s = None if self.times_s is None else _checked_times(self.times_s, len(stack))

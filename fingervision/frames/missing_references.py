@@ -53,7 +53,7 @@ FEWEST_LENGTHS, KEYS_SHARE = 3, 0.9
 # The bit is regarded as toggling if it toggles in 95 % of at least ten pictures; a random bit toggles in half of them.
 FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
-OWN_RECORDING = "Recorded by fingervision, with a list of its lost frames beside it."
+OWN_RECORDING = "Recorded by fingervision, with a list of the lost frames in the same folder."
 """Comment in a container whose packets were checked during the recording, and whose list of lost frames is stored with
 it."""
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from calib.scale_from_lines import LineScaleFit
     from calib.scale_from_sizes import ScaleFit
 
-# The budget is printed for a gap of this size in the middle of the picture, found as surely as 20 rows allow.
+# The budget is printed for a gap of this size in the middle of the picture, measured over 20 rows.
 TABLE_GAP_MM, TABLE_U_PX = 1.0, 0.0106
 
 
@@ -38,7 +38,7 @@ def budget_lines(calibration: "Calibration") -> list[str]:
         f"Budget of a light gap of {TABLE_GAP_MM:g} mm in the middle of the picture (standard uncertainties):",
         *table.splitlines(),
         "Not included: motion blur, a change of focus, aperture or exposure since the calibration, edges that are not",
-        "the gripper's outline (dirt, burrs, reflections). What is marked default was not stated: see --help.",
+        "the gripper's outline (dirt, burrs, reflections). Limits marked default were not stated: see --help.",
     ]
 
 
@@ -57,11 +57,11 @@ def sizes_lines(fit: "ScaleFit", edges: Sequence["ParallelEdges"]) -> list[str]:
         )
     if not fit.bias_known:
         lines.append(
-            "Too few sizes for the edge bias: it is taken as 0, and its limit stays in the budget as an uncertainty. "
-            "Three sizes, or a bar and a slot, would find it."
+            "The sizes do not determine the edge bias, which is therefore taken as 0; its limit is included in the "
+            "budget. Three sizes, or a bar and a slot, determine the edge bias."
         )
     elif fit.freedom == 0:
-        lines.append("Two sizes leave nothing to check the straight line with; a third would.")
+        lines.append("With two sizes the straight line cannot be checked; a third size checks it.")
     else:
         lines.append(
             f"Linearity: largest residual {1e3 * float(np.max(np.abs(fit.residual_mm))):.3f} um; chi square "
@@ -70,13 +70,13 @@ def sizes_lines(fit: "ScaleFit", edges: Sequence["ParallelEdges"]) -> list[str]:
     if any(part.source.startswith("misfit") for part in fit.calibration.parts):
         lines.append(
             "The sizes do not lie on a straight line within their uncertainties, which were enlarged to match. "
-            "Check certificates, dirt, and that nothing moved."
+            "Check the certificates, remove dirt, and make sure that nothing moved."
         )
     for reference, edge in zip(fit.calibration.references, edges, strict=True):
         if abs(edge.taper) > 3.0 * edge.u_taper and abs(edge.taper) * edge.count > 0.05:
             lines.append(
                 f"{reference.what} tapers by {edge.taper:+.4f} px per {edge.profiles[:-1]}: its width depends on the "
-                f"{edge.profiles} used; choose them with --roi where the certificate says where it holds."
+                f"{edge.profiles} used; choose with --roi those for which the certificate is valid."
             )
     return lines
 
@@ -85,7 +85,7 @@ def board_lines(fit: "BoardFit") -> list[str]:
     """Lines about the lens, the plane, and how straight the board's rows are."""
     lines = [""]
     if fit.lens is None:
-        lines.append("lens       not calibrated: one picture gives the plane alone")
+        lines.append("lens       not calibrated: one picture determines only the plane")
     else:
         names = ("f_x px", "f_y px", "c_x px", "c_y px", "k1", "k2", "p1", "p2", "k3")
         values = zip(names, fit.lens.lens.parameters, fit.lens.u_parameters, strict=True)
@@ -94,7 +94,8 @@ def board_lines(fit: "BoardFit") -> list[str]:
     lines.append(f"plane      {fit.calibration.references[0].what}: tilted by {fit.plane.tilt_deg:.2f} degrees")
     lines.append(f"straight   rows and columns of corners to {fit.straightness_px:.4f} px RMS after correction")
     lines.append(
-        "Distances hold in the plane of the first picture: put the board where the gripper moves for that one."
+        "The calibration is valid in the plane of the first picture: in that picture, the board must lie where the "
+        "gripper moves."
     )
     return lines
 
@@ -135,21 +136,23 @@ def line_lines(fit: "LineScaleFit", lines: "ScaleLines") -> list[str]:
         "",
         f"lines      {int(fit.used.sum())} of {len(lines.at_px)} {tone} lines used, over "
         f"{fit.calibration.references[0].size_mm:g} mm; edges spread over {lines.blur_px:.2f} px (sigma)",
-        f"edges      by rising edges alone {100 * (rising / scale - 1):+.4f} %, by falling ones "
-        f"{100 * (falling / scale - 1):+.4f} % against the lines' middles",
+        f"edges      scale by rising edges alone {100 * (rising / scale - 1):+.4f} %, by falling edges alone "
+        f"{100 * (falling / scale - 1):+.4f} %, relative to that by the middles of the lines",
         f"residuals  {float(abs(fit.residual_um[fit.used]).max()):.3f} um at most; chi square {fit.chi_square:.1f} "
         f"with {fit.freedom} degrees of freedom (chance {100 * fit.probability:.1f} %)",
     ]
     if fit.width_mm is not None:
-        text.insert(3, f"width      {1e3 * fit.width_mm:.2f} um as the lines look (edge bias not taken off)")
+        text.insert(
+            3, f"width      {1e3 * fit.width_mm:.2f} um, the apparent width of the lines (not corrected for edge bias)"
+        )
     else:
-        text.insert(3, "width      not told: the lines are narrower than twice their blur")
+        text.insert(3, "width      not determined: the lines are narrower than twice their blur")
     if fit.probability < 0.01:
         text.append(
-            "The lines do not stand at equal distances within their uncertainties, which were enlarged to match."
+            "The distances of the lines are not equal within their uncertainties, which were enlarged to match."
         )
     if lines.is_clipped:
-        text.append("Part of the picture stands at an end of the grey scale: the lines' widths may be off by that.")
+        text.append("Part of the picture is clipped at an end of the grey scale: the widths of the lines may be wrong.")
     return text
 
 

@@ -75,7 +75,7 @@ class Comparison:
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """Regions in which the residual is significantly larger than noise, the largest first."""
+        """Regions in which the residual is significantly larger than the noise, the largest residual first."""
         return self.first.places
 
     @property
@@ -103,7 +103,9 @@ class Comparison:
         for name, found in self.models.items():
             which = "" if len(self.models) == 1 else f"{name}: "
             lines.append(f"{which}{found.words()}")
-            lines += [f"  {place.words}" for place in found.places] or ["  nowhere beyond the noise"]
+            lines += [f"  {place.words}" for place in found.places] or [
+                "  model and measurement nowhere differ by more than the noise"
+            ]
             lines += [f"  note: {words}" for words in (*found.data.notes, *found.data.refitted())]
         return "\n".join(lines)
 
@@ -136,7 +138,8 @@ class Comparison:
 
     def __repr__(self) -> str:
         words = (
-            f"{name}: {found.rms_mm:.3g} mm RMS, noise {found.noise_mm:.2g} mm, {len(found.places)} places beyond it"
+            f"{name}: {found.rms_mm:.3g} mm RMS, noise {found.noise_mm:.2g} mm, {len(found.places)} places with a "
+            f"larger difference"
             for name, found in self.models.items()
         )
         return f"Comparison({'; '.join(words)})"
@@ -162,13 +165,13 @@ def compare(
     measured : path, Measurement, MeasuredTable, DataFrame or mapping of columns
         `input_mm,gap_mm[,run,time_s,left_mm,right_mm,u_random_mm,force_n]`; a measurement needs a drive.
     model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
-        Also a list of these, or a mapping of them by name.
+        The model; or a list of models, or a mapping of names to models.
     seed : int
         Seed of the bootstrap for the threshold.
     kind : str
-        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+        Kind of model by which a gripper.toml is computed: stiffness_matrix, lumped or finite_element.
     columns : path or None
-        A columns.toml for foreign tables.
+        A columns.toml, for tables of other programs.
     call : str
         Name of this call in the provenance of the results.
 

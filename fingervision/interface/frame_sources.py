@@ -35,14 +35,14 @@ def recording_of(
     Parameters
     ----------
     source, rate_hz, times_s, frames, coding
-        As of `fingervision.measure`.
+        The same as the arguments of `fingervision.measure`.
 
     Raises
     ------
     ArgumentTypeError
-        The array holds no pictures.
+        The array does not contain pictures.
     UsageError
-        An argument that this source has no use for.
+        An argument does not apply to this kind of source.
     DataError, DeviceError, InputFileError
         The file cannot be read.
     """
@@ -88,7 +88,7 @@ def _camera(source: Any, frames: int | None) -> Opener:
     try:
         if frames is None:
             raise ArgumentError(
-                "frames", "be given for a camera, which goes on for ever", "is not", "say how many frames to measure"
+                "frames", "be given for a camera, which has no last frame", "is not", "say how many frames to measure"
             )
         count = whole_number("frames", frames, 1)
         kept = KeptFrames(source.description, tuple(islice(iter(source), count)))

@@ -27,16 +27,16 @@ BITS = (8, 16)
 
 
 def scale_of(calibration: Any, px_per_mm: Any, u_px_per_mm: Any = None) -> tuple[Scale, Path | None]:
-    """Return the scale, and the file that it was read from.
+    """Return the scale, and the file from which it was read.
 
     Parameters
     ----------
     calibration : path, Calibration or None
-        A calibration.json, or what one holds.
+        A calibration, or the path of a calibration.json.
     px_per_mm : float or None
-        The scale alone.
+        The scale without a calibration, in pixels per mm.
     u_px_per_mm : float or None
-        Standard uncertainty of that scale.
+        Standard uncertainty of `px_per_mm`.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def range_of(frames: Any) -> tuple[tuple[int, int] | None, Any]:
     (int, int) or None
         First and last frame, both included.
     object
-        The number of frames, unchecked; None where there is none.
+        The number of frames, unchecked; None if `frames` is a range or None.
 
     Raises
     ------
@@ -140,11 +140,13 @@ def range_of(frames: Any) -> tuple[tuple[int, int] | None, Any]:
         return None, frames
     if isinstance(frames, str) or not hasattr(frames, "__len__") or len(frames) != 2:
         raise ArgumentTypeError(
-            "frames", "be how many frames of a camera, or the first and the last of a recording", f"is {frames!r}"
+            "frames",
+            "be a number of frames (of a camera), or the first and the last frame (of a recording)",
+            f"is {frames!r}",
         )
     first, last = (whole_number("frames", value, 0) for value in frames)
     if first > last:
-        raise ArgumentError("frames", "rise from the first to the last", f"is ({first}, {last})")
+        raise ArgumentError("frames", "not have a first frame after the last one", f"is ({first}, {last})")
     return (first, last), None
 
 

@@ -51,7 +51,9 @@ class Adjustments:
             with self._lock:
                 if not wanted.done.is_set():
                     wanted.is_void = True
-                    raise DeviceError(f"The camera does not answer, so its {name} was not changed: is it plugged in?")
+                    raise DeviceError(
+                        f"The camera does not answer, so that its {name} was not changed: is the camera plugged in?"
+                    )
         if wanted.failure is not None:
             raise wanted.failure
         assert wanted.found is not None  # noqa: S101 - what is done has a result or a failure

@@ -72,8 +72,8 @@ class Recorder:
 
     def _too_slow(self) -> str:
         return (
-            f"The disk of {self.run.path} is too slow for this camera, so recording ended; what was recorded until "
-            "then is valid: name a folder on another disk with --out."
+            f"The disk of {self.run.path} is too slow for this camera, so that recording ended; the frames recorded "
+            f"before are valid: name a folder on another disk with --out."
         )
 
     def _look_at_the_disk(self) -> None:

@@ -151,7 +151,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
                 f"{out_there.left_out} lines were not printed, because the reader of standard output was too slow.",
             )
         elif broken:
-            session.say("unread", "Nobody reads standard output any more: the live view has ended.")
+            session.say("unread", "Standard output was closed by the reading program: the live view has ended.")
         said.close()
     if page is None and not session.history.count and session.ended.is_set():
         raise DeviceError(f"{session.description.name} gave no frame: check the source.")

@@ -58,8 +58,8 @@ def bound(host: str, port: int) -> socket.socket:
         if error.errno == errno.EADDRNOTAVAIL:
             raise UsageError(f"--host must be an address of this machine, but is {host}.") from error
         raise ProcessError(
-            f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may run there; end "
-            "it, or choose another port with --port (0 takes any free one)."
+            f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may use this "
+            f"port; end that live view, or choose another port with --port (0 takes any free one)."
         ) from error
     return listening
 

@@ -65,8 +65,9 @@ def choose_response(
         return (
             response,
             other,
-            f"The calibration was made with the camera response {calibrated.name}, but this recording is read as "
-            f"{response.name}{size}: calibrate with this camera, or state the same --response for both.",
+            f"The calibration was made with the camera response {calibrated.name}, but this recording is measured "
+            f"with the response {response.name}{size}: calibrate with this camera, or state the same --response for "
+            f"both.",
         )
     if stated is None and known and tag is not None and calibrated is not None and tag != calibrated.name:
         return (

@@ -10,8 +10,8 @@ from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.kinds import by_trust, why_trusted
 
 _APART = 0.10
-"""Relative difference, beyond the sum of the two kinds' stated errors, from which two kinds are said to disagree: so
-large a difference is no longer model error, but a different idea of the body's geometry."""
+"""Relative difference, beyond the sum of the two kinds' stated errors, above which two kinds are reported to disagree.
+A larger difference means that the two kinds represent the body's geometry differently."""
 _Figure = Callable[[ModelFigures], float | None]
 _QUANTITIES: tuple[tuple[str, str, _Figure, Callable[[ModelFigures], float]], ...] = (
     ("gap per input", "", lambda f: f.gap_per_input, lambda f: f.slope_error),
@@ -32,8 +32,8 @@ def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
     Returns
     -------
     list of str
-        One sentence for each quantity on which kinds disagree; if several pairs of kinds do, the pair with the largest
-        difference.
+        One sentence for each quantity on which kinds disagree; if several pairs of kinds disagree, it is about the pair
+        with the largest difference.
     """
     kinds = by_trust(figures)
     sentences = []
@@ -50,8 +50,8 @@ def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
         if worst is not None:
             apart, better, other, a, b, errors = worst
             sentences.append(
-                f"{better} and {other} must agree on the {name} within their model errors of {100.0 * errors:.2g} % "
-                f"together, but have {a:.4g} and {b:.4g}{unit}, {100.0 * apart:.3g} % apart; trust {better}: "
-                f"{why_trusted(better) or 'it stands first'}."
+                f"{better} and {other} must agree on the {name} within the sum of their model errors, "
+                f"{100.0 * errors:.2g} %, but have {a:.4g} and {b:.4g}{unit}, {100.0 * apart:.3g} % apart; trust "
+                f"{better}: {why_trusted(better) or 'it is listed first'}."
             )
     return sentences

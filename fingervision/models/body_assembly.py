@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _NEAR = 1e-7
-"""Largest distance of a node from a cut at which the node counts as lying on it, as a share of the body's size."""
+"""Largest distance of a node from a cut at which the node counts as lying on the cut, as a share of the body's size."""
 _OVER = 1.1
 """Height within which nodes on a cut belong to its section, as a multiple of the section's height."""
 

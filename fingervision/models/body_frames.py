@@ -1,4 +1,4 @@
-"""Coordinate frames by which a meshed body is condensed: each stands for the motion of a cut or of a face."""
+"""Coordinate frames to which a meshed body is condensed: each frame has the motion of a cut or of a face."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _LEVER = 1e-6
-"""Lever arms across a tied component that are shorter than this share of the face's extent do not prevent rotation."""
+"""Lever arms shorter than this share of the face's extent do not prevent rotation (measured across a tied
+component)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,8 +62,8 @@ def nodes_of(plate: PlaneStressPlate, frame: Frame) -> Indices:
 def section_frame(plate: PlaneStressPlate, at_mm: Array, axis: Array, height_mm: float, near_mm: float) -> Frame:
     """Coordinate frame of a section cut perpendicular to an axis.
 
-    The motion of this coordinate frame is the mean of the section's displacements, weighted by the stresses of a beam:
-    uniform for tension, linear for bending and parabolic for shear over the height.
+    The motion of a section's coordinate frame is the mean of the section's displacements, weighted by the stresses of a
+    beam: uniform for tension, linear for bending and parabolic for shear over the height.
 
     Parameters
     ----------
@@ -117,8 +118,8 @@ def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], tak
     nodes : ndarray of int
         Nodes of the face, all of one body.
     tied : sequence of str
-        Components (x, y or both) in which every node follows the frame; in the remaining component only the nodes' mean
-        does.
+        Components (x, y or both) in which every node follows the frame; in the remaining component, only the mean
+        motion of the nodes follows the frame.
     taken : set of int
         Unknowns that are already tied to another face; the unknowns of this face are added to the set.
 

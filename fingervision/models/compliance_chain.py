@@ -58,7 +58,7 @@ class ComplianceChain:
         return total
 
     def flexibility(self, moved: int, loaded: int) -> Array:
-        """Motion of one member's end under a load at another's: the sum (12) over the members in both load paths.
+        """Motion of one member's end under a load at another member's end: equation (12) of Hricko and Havlik (2015).
 
         Returns
         -------

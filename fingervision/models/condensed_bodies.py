@@ -1,9 +1,9 @@
-"""Elastic bodies condensed to coordinate frames: few unknowns each, exact for static loads at these frames.
+"""Elastic bodies condensed to coordinate frames: few unknowns per body, exact for static loads at these frames.
 
 The bodies are the parts of the region that remain when the flexures are cut away. Each body is meshed with quadratic
 triangles, and its stiffness and mass are condensed statically to its coordinate frames (Guyan, AIAA Journal 3 (1965)
-380). A coordinate frame stands for the mean motion of a cut, weighted by a beam's stress so that it fits the adjoining
-beam, or for the motion of a face that is fixed, slides or is driven.
+380). A coordinate frame has the mean motion of a cut, weighted by a beam's stress so that it fits the adjoining beam,
+or the motion of a face that is fixed, slides or is driven.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _ITERATIONS = 8
-"""Iterations after which the first n modes, of the 2 n + 2 vectors iterated, have converged to 1e-4: each iteration
-reduces the error by a factor of at least (w_n / w_(2n+2))^4."""
+"""Number of iterations of the search for modes. With 2 n + 2 iterated vectors, the first n modes have then converged to
+1e-4, because each iteration reduces the error by a factor of at least (w_n / w_(2n+2))^4, where w_n is the n-th angular
+frequency."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +124,7 @@ def condensed(
 
 
 def own_modes(plate: PlaneStressPlate, body: CondensedBody, count: int) -> OwnModes:
-    """Compute the first modes of a body with fixed coordinate frames (a quarter of its unknowns at most).
+    """Compute the first modes of a body with fixed coordinate frames: at most a quarter as many modes as unknowns.
 
     Source: Bathe, Finite Element Procedures, section 11.6.
     """

@@ -21,9 +21,8 @@ Indices = NDArray[np.int64]
 Bend = Callable[[Array], csr_matrix]
 
 _OVERHANG = 0.05
-"""Overhang, as a share of the other face's length, up to which a node beyond the end of that face can still touch it.
-Faces that meet corner to corner slide a little past each other and would otherwise lose contact; the other face is
-therefore extended by this share."""
+"""Length by which the touched face is extended at its ends, as a share of its length: a node beyond an end can then
+still touch it. Faces that meet corner to corner slide a little past each other and would otherwise lose contact."""
 _PENETRATES = 1e-6
 """Overlap of two faces at rest, as a share of the body's size, above which the drawing is refused as wrong."""
 
@@ -67,7 +66,7 @@ class ContactPair:
         ndarray of float, shape (k,)
             Gap of each node (mm).
         sparse matrix, shape (k, unknowns)
-            First derivatives of the gaps by the displacements.
+            First derivatives of the gaps with respect to the displacements.
         callable
             Maps forces on the nodes to the sum of force times second derivative of the gap, shape (unknowns, unknowns);
             the second derivatives arise because the normal rotates with the other face.
@@ -141,8 +140,8 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         towards = np.array([wall[1, 1] - wall[1, 0], wall[0, 0] - wall[0, 1]])
         if outward @ towards <= 0.0:
             raise DataError(
-                f"The wall of contact {contact.name} of {mechanism.name} must lie before its face, but lies "
-                "behind it, where the body is."
+                f"The wall of contact {contact.name} of {mechanism.name} must lie in front of its face, but lies "
+                "behind the face, where the body is."
             )
         pair = ContactPair(contact.name, nodes, np.zeros((2, 0), dtype=np.int64), wall)
     else:

@@ -1,9 +1,9 @@
 """A condensed body in large rotation: linear elasticity in axes that rotate with its first coordinate frame.
 
-The corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures, volume 1,
-section 7.3) for an element with any number of nodes: the energy is d' K d / 2, with K the stiffness matrix and d the
-motions of the coordinate frames relative to the first one. Each coordinate frame is a connection point of the body,
-with two displacements and a rotation.
+The method is the corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures,
+volume 1, section 7.3), for an element with any number of nodes: the energy is d' K d / 2, with K the stiffness matrix
+and d the motions of the coordinate frames relative to the first one. Each coordinate frame is a connection point of the
+body, with two displacements and a rotation.
 """
 
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class CorotationalBody:
         local = moved.reshape(-1, 3)
         at_rest = self.places_mm - self.places_mm[0]
         drift = local[:, :2] - local[0, :2]
-        # R' (X + drift) - X without a difference of large numbers: (R' - 1) X by the half angle.
+        # R' (X + drift) - X is computed without subtracting large numbers: (R' - 1) X follows from the half angle.
         angle = local[0, 2]
         back = turned_axes(-angle)
         half = np.sin(0.5 * angle)
@@ -51,7 +51,7 @@ class CorotationalBody:
         return np.column_stack([drift @ back.T + at_rest @ less.T, apart]).ravel()
 
     def slope(self, moved: Array) -> Array:
-        """Derivative of `strained` by the frames' motions, shape (3 m, 3 m)."""
+        """Derivative of `strained` with respect to the frames' motions, shape (3 m, 3 m)."""
         local = moved.reshape(-1, 3)
         back = turned_axes(-float(local[0, 2]))
         chord = self.places_mm - self.places_mm[0] + local[:, :2] - local[0, :2]

@@ -1,8 +1,8 @@
 """A plane frame of two-node corotational elements: large rotations, small strains.
 
-Each element has a linear law that relates its elongation and the rotations of its ends from its chord to the forces;
-the chord may rotate by any angle. Source: Crisfield, Non-linear Finite Element Analysis of Solids and Structures,
-volume 1, section 7.3.
+Each element has a linear law that gives its forces from its elongation and from the rotations of its ends relative to
+its chord; the chord may rotate by any angle. Source: Crisfield, Non-linear Finite Element Analysis of Solids and
+Structures, volume 1, section 7.3.
 """
 
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class CorotationalFrame:
     def __post_init__(self) -> None:
         chord = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
         length = np.hypot(chord[:, 0], chord[:, 1])
-        # Lengthening and end rotations from the chord, seen from the first node's own axes.
+        # Elongation and end rotations relative to the chord, in the axes of the first node.
         natural = np.zeros((len(length), 3, 3))
         natural[:, 0, 0] = 1.0
         natural[:, 1, 1] = -length
@@ -94,8 +94,8 @@ class CorotationalFrame:
         chord = at_rest + drift
         length = np.hypot(chord[:, 0], chord[:, 1])
         c, s = chord[:, 0] / length, chord[:, 1] / length
-        # The chord's turn from its own rest direction, and below its lengthening by a difference of squares, so that
-        # small motions lose no digits.
+        # Rotation of the chord from its direction at rest. The elongation below is computed from a difference of
+        # squares, so that small motions lose no digits.
         across = at_rest[:, 0] * drift[:, 1] - at_rest[:, 1] * drift[:, 0]
         turned = np.arctan2(across, np.sum(at_rest * chord, axis=1))
         natural = np.empty((len(length), 3))

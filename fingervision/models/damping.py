@@ -1,9 +1,9 @@
 """Damping of the gripper's vibrations: four damping laws.
 
-These are a constant modal ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko & Havlik (2015).
+The laws are a constant modal ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko & Havlik (2015).
 
-PA12 at room temperature has a loss factor tan d = 0.03 to 0.08, so that zeta = tan d / 2 is about 0.025; static results
-do not depend on damping.
+PA12 at room temperature has a loss factor tan d = 0.03 to 0.08, so that its damping ratio tan d / 2 is about 0.025;
+static results do not depend on damping.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _SINH_UNDERFLOWS_ABOVE = 30.0
 
 @dataclass(frozen=True, slots=True)
 class ModalDamping:
-    """The same damping ratio in every mode."""
+    """Damping law with the same damping ratio in every mode."""
 
     ratio: float = 0.025
 
@@ -33,7 +33,7 @@ class ModalDamping:
 
 @dataclass(frozen=True, slots=True)
 class LossFactor:
-    """Structural damping: zeta = eta / 2 at resonance."""
+    """Structural damping: at resonance, the damping ratio is half the loss factor."""
 
     eta: float = 0.05
 
@@ -44,7 +44,7 @@ class LossFactor:
 
 @dataclass(frozen=True, slots=True)
 class RayleighDamping:
-    """Rayleigh damping C = a M + b K, fitted to equal ratios at two frequencies; lower between them, higher beyond.
+    """Rayleigh damping C = a M + b K: equal ratios at two frequencies, lower ratios between them, higher ones outside.
 
     Parameters
     ----------
@@ -60,12 +60,12 @@ class RayleighDamping:
 
     @property
     def mass_factor_per_s(self) -> float:
-        """The factor a = 2 zeta w1 w2 / (w1 + w2)."""
+        """Factor of the mass matrix: 2 zeta w1 w2 / (w1 + w2), with damping ratio zeta at frequencies w1 and w2."""
         return 2.0 * self.ratio * self.low_rad_s * self.high_rad_s / (self.low_rad_s + self.high_rad_s)
 
     @property
     def stiffness_factor_s(self) -> float:
-        """The factor b = 2 zeta / (w1 + w2)."""
+        """Factor of the stiffness matrix: 2 zeta / (w1 + w2), with damping ratio zeta at frequencies w1 and w2."""
         return 2.0 * self.ratio / (self.low_rad_s + self.high_rad_s)
 
     def ratios(self, rad_s: Array) -> Array:
@@ -75,13 +75,15 @@ class RayleighDamping:
 
 @dataclass(frozen=True, slots=True)
 class PaperDamping:
-    """Equation (4) of Hricko & Havlik (2015), evaluated mode by mode: 2 zeta w = gamma w0 c(w / w0).
+    """Damping by equation (4) of Hricko & Havlik (2015), evaluated mode by mode.
 
-    The equation is an illustrative example of a theory (S. Adhikari, J. Sound Vib. 293 (2006) 156), not a material law.
-    It adds powers of w that have different units, so that its result would depend on the unit of time; frequencies are
-    therefore taken relative to w0. Below w0 the damping would be negative, and above a few w0 more than critical. Hence
-    w0 must not exceed the lowest mode, the result is multiplied by one factor gamma, and ratios outside (0, 0.3) are
-    refused.
+    For a mode with angular frequency w, the damping ratio zeta follows from 2 zeta w = gamma w0 c(w / w0), with the
+    rate c of `paper_rate`, the reference frequency w0 and a factor gamma. The equation is an illustrative example of a
+    theory (Adhikari, 2006, Journal of Sound and Vibration 293, 156), not a material law. The equation adds powers of
+    the angular frequency w that have different units, so that its result would depend on the unit of time; frequencies
+    are therefore divided by a reference frequency w0. Below the reference frequency the damping would be negative, and
+    at several times this frequency it would be more than critical. Therefore the reference frequency must not exceed
+    that of the lowest mode, and damping ratios outside (0, 0.3) are refused.
 
     Parameters
     ----------
@@ -113,10 +115,10 @@ class PaperDamping:
 
 
 def paper_rate(w: float) -> float:
-    """Equation (4) for one mode: 2 zeta w of the dimensionless frequency w, term by term.
+    """Equation (4) for one mode: 2 zeta w as a function of the dimensionless frequency w, with zeta the damping ratio.
 
-    exp(-w^4 / 2) sinh((4/3) ln(w) / w^2) + w^(3/2) cos^2(1 / w^2) atan(w / pi); for one mode, the last argument
-    sqrt(M^-1 K) / pi of the paper becomes w / pi.
+    The rate is exp(-w^4 / 2) sinh((4/3) ln(w) / w^2) + w^(3/2) cos^2(1 / w^2) atan(w / pi). For a single mode, the
+    argument sqrt(M^-1 K) / pi in the paper becomes w / pi.
     """
     first = 0.0 if w**4 > 2.0 * _SINH_UNDERFLOWS_ABOVE else exp(-(w**4) / 2.0) * sinh(4.0 / 3.0 * log(w) / w**2)
     return first + float(w**1.5) * cos(1.0 / w**2) ** 2 * atan(w / pi)

@@ -1,10 +1,11 @@
 """Out-of-plane motion of a plate of any depth: quadratic triangles in the plane, polynomials through the depth.
 
-Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with Legendre polynomials P_k: odd ones for in-plane
-components, even ones for the out-of-plane component. This parity describes bending, torsion and shear of a plate that
-is symmetric about its middle plane. The solution converges to three-dimensional elasticity as the order grows
-(hierarchic plate models: Babuska and Li, Comput. Methods Appl. Mech. Eng. 100 (1992) 249), without the assumptions of
-plate or beam theory: torsion of a deep neck includes restrained warping, and bodies bend right up to their junctions.
+Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with shape functions N_a, depth b, unknowns q and
+Legendre polynomials P_k: odd polynomials for the in-plane components, even polynomials for the out-of-plane component.
+Odd and even polynomials together describe bending, torsion and shear of a plate that is symmetric about its middle
+plane. The solution converges to three-dimensional elasticity as the order grows (hierarchic plate models: Babuska and
+Li, 1992, Computer Methods in Applied Mechanics and Engineering 100, 249), without the assumptions of plate or beam
+theory. Torsion of a deep neck therefore includes restrained warping, and bodies bend right up to their junctions.
 """
 
 from functools import cached_property
@@ -26,9 +27,10 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _ORDER = 3
-"""Order of the polynomials through the depth for the in-plane components; one less for the out-of-plane component. The
-first mode of the published sample is then 0.04 % above that of order 5, and for hinges 1 to 20 times as wide as thick
-within 0.2 % of CalculiX's wedge elements (`tests/benchmarks/models_three_dimensions.py`); order 1 is 7 % too high."""
+"""Order of the polynomials through the depth for the in-plane components; the order for the out-of-plane component is
+one less. The first mode of the published sample is then 0.04 % above that of order 5, and for hinges 1 to 20 times as
+wide as thick within 0.2 % of CalculiX's wedge elements (`tests/benchmarks/models_three_dimensions.py`); order 1 is 7 %
+too high."""
 
 
 class DeepPlate:
@@ -77,13 +79,13 @@ class DeepPlate:
 
     @cached_property
     def _plane(self) -> dict[tuple[int, int], csr_matrix]:
-        """Integrals of products of two shape functions, each differentiated by x (0), y (1) or neither (2)."""
+        """Integrals of products of two shape functions, each differentiated by x (0), by y (1) or not at all (2)."""
 
         def part(shape: Any, way: int) -> Any:
             return shape if way == 2 else shape.grad[way]
 
         def integral(first: int, second: int) -> csr_matrix:
-            # skfem hands over the second function, the column, first.
+            # scikit-fem passes the second function, which numbers the column, first.
             form = skfem.BilinearForm(lambda u, v, _: part(v, first) * part(u, second))
             return csr_matrix(form.assemble(self._basis))
 

@@ -1,4 +1,4 @@
-"""Data for the laws of a drawing: the drawing, its elastic body and its response to a changed lever."""
+"""Data from which effects of a drawing are computed: drawing, elastic body, response to a changed lever."""
 
 from dataclasses import dataclass
 

@@ -1,9 +1,10 @@
 """Extra compliance where the shuttle bar joins the drive block, because the block itself deforms.
 
-The block is hardly larger than the bar is wide, so that the formula for a bar rooted in a half plane (O'Donnell, J.
-Appl. Mech. 27 (1960) 764) does not hold. The block is meshed with a stub of the bar, as long as Saint-Venant's
-principle requires, fixed at its drive face and on the symmetry axis; the bar's own compliance is subtracted from the
-compliance at the stub's end. The result depends on geometry only, and is computed once per block.
+The block is hardly larger than the bar is wide, so that the formula for a bar rooted in a half plane (O'Donnell, 1960,
+Journal of Applied Mechanics 27, 764) does not hold. The block is meshed with a stub of the bar, as long as
+Saint-Venant's principle requires, fixed at its drive face and on the symmetry axis; the bar's own compliance is
+subtracted from the compliance at the stub's end. The compliance depends on geometry only, and is computed once per
+block.
 """
 
 from dataclasses import dataclass
@@ -87,7 +88,7 @@ def block_shape(gripper: Gripper) -> BlockShape:
     start = placed(*links.shuttle_from_mm)
     x, y = np.subtract(placed(*links.shuttle_to_mm), start)
     length = float(np.hypot(x, y))
-    # However long the shuttle is, the stub is a stub: its direction is what counts.
+    # The stub has a fixed length, so that only the direction of the shuttle matters, not its length.
     end = round(start[0] + x / length, _DIGITS), round(start[1] + y / length, _DIGITS)
     return BlockShape(placed(half_mm, 0.0)[0], placed(0.0, low_mm)[1], placed(0.0, high_mm)[1], start, end,
                       placed(lever.drive_face_half_width_mm, 0.0)[0], gripper.material.poisson_ratio)  # fmt: skip
@@ -140,7 +141,8 @@ def unit_compliance(shape: BlockShape) -> Array:
         section_frame(plate, section, along, 1.1, _NEAR * size),
     ]
     K = condensed(plate, np.arange(plate.unknowns), frames, range(3)).stiffness_n_mm
-    # Held: y and the turn of the drive face, x and the turn of the axis; the faces slide.
+    # Fixed are y and rotation of the drive face, and x and rotation of the symmetry axis; both faces slide along
+    # themselves.
     moving = np.array([0, 4, 6, 7, 8])
     whole = np.linalg.inv(K[np.ix_(moving, moving)])[2:, 2:]
     c, s = along

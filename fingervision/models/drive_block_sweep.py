@@ -1,8 +1,8 @@
-"""Compliance of the drive block over a range of drawings: computed for a few, interpolated between them.
+"""Compliance of the drive block over a range of drawings: computed for a few drawings, interpolated between them.
 
 Meshing the block takes longer than computing the rest of a lumped model, and the block's compliance hardly changes from
-one drawing of a grid to the next. Along every dimension that changes it, the compliance is computed at Chebyshev points
-and interpolated by a polynomial.
+one drawing of a grid to the next. Along every dimension that changes the block's compliance, the compliance is computed
+at Chebyshev points and interpolated by a polynomial.
 """
 
 from collections.abc import Callable, Sequence

@@ -19,7 +19,7 @@ _DENSE_BELOW = 400
 
 
 def factorised(matrix: csr_matrix) -> SuperLU:
-    """Factorise a symmetric matrix with a suitable ordering and pivoting, a sixth faster than SuperLU's default."""
+    """Factorise a symmetric matrix with an ordering and pivoting that is a sixth faster than SuperLU's default."""
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
@@ -47,7 +47,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class DrivenBody:
-    """The right half with its supports; the gripper is two such halves in parallel.
+    """The right half of a gripper with its supports; the whole gripper consists of two halves in parallel.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class DrivenBody:
     def face_displacement_mm(self) -> Array:
         """Small displacements of the body with fixed drive under a unit force on one face point, for each face point.
 
-        The result has one column for each face point.
+        Each column of the returned array belongs to one face point.
         """
         loads = np.zeros((self.unknowns, self.face.size))
         loads[self.face, np.arange(self.face.size)] = 1.0
@@ -207,7 +207,8 @@ class DrivenBody:
     def _modes_among(self, free: Indices, count: int) -> tuple[Array, Array]:
         stiffness, mass = self.stiffness_n_mm[free][:, free], self.mass_t[free][:, free]
         if free.size < _DENSE_BELOW:
-            # The reciprocal problem: lumped masses may be zero, the stiffness is positive definite.
+            # Solve the reciprocal eigenvalue problem: lumped masses may be zero, whereas the stiffness is positive
+            # definite.
             reciprocal = (free.size - count, free.size - 1)
             inverse, kept = eigh(mass.toarray(), stiffness.toarray(), subset_by_index=reciprocal)
             squared, kept = 1.0 / inverse, kept / np.sqrt(inverse)

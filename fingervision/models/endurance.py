@@ -2,7 +2,7 @@
 
 Basquin's line: the logarithm of the amplitude falls linearly with the logarithm of the number of cycles. Cycles about a
 mean stress are converted to fully reversed ones by Soderberg's line, amplitude / (1 - mean / yield) (Shigley,
-Mechanical Engineering Design, chapter 6), which is more conservative than Goodman's and needs no strength but the yield
+Mechanical Engineering Design, chapter 6), which is more conservative than Goodman's line and needs only the yield
 stress.
 """
 

@@ -3,8 +3,9 @@
 The values come from plane finite elements (`tests/benchmarks/models_fillet_table.py`), because the usual charts
 (Pilkey, Peterson's Stress Concentration Factors, charts 3.1 and 3.7) end where the shoulders are three times as high as
 the neck. Between the table's nodes, the excess of the stress concentration factors over 1 is interpolated over the
-logarithms of radius / thickness and depth / radius. Beyond the table's ends the excess is extrapolated as a power of
-the radius, because the stress at a sharp corner is unbounded, and held constant over the depth.
+logarithms of radius / thickness and depth / radius. Beyond the table's ends, the excess of the factors over 1 is
+extrapolated as a power of the radius, because the stress at a sharp corner is unbounded; over the depth, the excess is
+held constant.
 """
 
 import numpy as np
@@ -14,9 +15,9 @@ from scipy.interpolate import RegularGridInterpolator
 Array = NDArray[np.float64]
 
 RADII = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
-"""Fillet radii of the table, divided by the thickness of the neck."""
+"""Fillet radii in the table, divided by the thickness of the neck."""
 DEPTHS = (1.0, 1.5, 3.0, 8.0)
-"""Depths of the shoulder of the table, divided by the fillet radius."""
+"""Shoulder depths in the table, divided by the fillet radius."""
 _FACTORS = (
     ((1.9725, 1.7687), (2.1170, 1.8355), (2.3616, 1.9162), (2.6177, 1.9518)),
     ((1.8162, 1.5461), (1.8996, 1.5644), (2.0103, 1.5778), (2.0912, 1.5752)),

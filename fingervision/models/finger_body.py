@@ -1,10 +1,11 @@
 """The gripper's finger, from both hinges to the tip, as one elastic body condensed from plane finite elements.
 
-Slender bars are no model of the junction of root, cross bar, shuttle and finger, because the pieces between the points
-where the axes meet are as wide as they are long: the force on a gripped part would be up to a third too low. The body
-is cut from the drawing at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380)
-to the motions of the cuts, of the tip's inner face, and of a few patches in between, which carry the body's mass. The
-remaining nodes of the bar model follow the body's motion; they are used for pictures and poses.
+Slender bars would model the junction of root, cross bar, shuttle and finger badly, because the pieces between the
+points where the axes meet are as wide as they are long. With slender bars, the force on a gripped part would be up to a
+third too low. The body is cut from the drawing at the ends of the notches, meshed, and condensed statically (Guyan,
+AIAA Journal 3 (1965) 380) to the motions of the cuts, of the tip's inner face, and of a few patches in between, which
+carry the body's mass. The remaining nodes of the bar model follow the body's motion; they are used for pictures and
+poses.
 """
 
 from dataclasses import dataclass, replace
@@ -46,10 +47,10 @@ _PATCH = 0.5
 """Radius of a patch whose mean motion represents a section, as a share of the member's width."""
 _LEAST_NODES = 6
 _FOLLOWED = 12
-"""Number of nearest mesh nodes whose motion a following node of the bars takes."""
+"""Number of mesh nodes, the nearest ones, whose mean rigid motion a node of the bar model follows."""
 _STIFF = 1e-3
-"""Compliance of the springs that tie a following node, relative to that of a square of the finger's width. The springs
-carry contact loads only."""
+"""Compliance of the springs that tie a node of the bar model to the body, relative to that of a square of the finger's
+width. The springs carry contact loads only."""
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _MOST_KEPT = 32
 _UNIT = Material("unit", 1.0, 0.3, 1.0, 1.0)
@@ -75,7 +76,7 @@ class FingerBody:
     nodes : ndarray of int, shape (m,)
         Node numbers in the tree of members (member i ends at node i + 1). The body's axes rotate with the first node.
     turning : CorotationalBody
-        Stiffness of the nodes; nodes without mass and load follow the others.
+        Stiffness of the nodes; nodes without mass and load follow the other nodes.
     mass_t : ndarray of float, shape (3 m, 3 m)
         Mass matrix for the nodes' motions.
     """
@@ -124,7 +125,7 @@ def finger_ends_mm(gripper: Gripper) -> tuple[float, float]:
 
 
 def is_of_finger(name: str) -> bool:
-    """Whether a member of the half, by its name, is part of the finger."""
+    """Whether a member of the half gripper, given by its name, is part of the finger."""
     return name not in _OTHERS
 
 
@@ -132,7 +133,7 @@ def is_of_finger(name: str) -> bool:
 def _unit_body(
     body: Body, hinge: Hinge, lever: Lever, links: Links, poisson: float, stations: tuple[_Station, ...]
 ) -> tuple[Indices, Array, Array]:
-    """Order of the kept nodes; stiffness and mass for unit modulus, density (kg/m^3) and plate thickness."""
+    """Return the order of the kept nodes; stiffness and mass for unit modulus, density (kg/m^3) and plate thickness."""
     gripper = Gripper(Material("unit", 1.0, poisson, 1.0, 1.0), body, hinge, lever, links)
     mechanism = half_mechanism(gripper)
     spans = _spans(hinge, lever, links)
@@ -145,7 +146,8 @@ def _unit_body(
     frames, kept = _frames(plate, finger, mechanism, spans, stations, size)
     unknowns = np.concatenate([plate.x_dofs[finger], plate.y_dofs[finger]])
     whole = condensed(plate, unknowns, frames, range(len(frames)))
-    # Motions of every station by those of the kept ones: what lies on the face turns with it, the others follow.
+    # Motion of every station from the motions of the kept nodes: stations on the face rotate with the face, the other
+    # stations follow the body.
     followers = [i for i in range(len(stations)) if i not in kept]
     ties = np.array([_tie(plate, finger, whole.shapes_mm, stations, kept, i) for i in followers])
     ties = ties.reshape(3 * len(followers), 3 * len(kept))

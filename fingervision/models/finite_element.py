@@ -1,12 +1,12 @@
 """Finite-element model of the gripper: its outline as a plane body (Hricko & Havlik (2015) used Comsol).
 
-One half is solved under the symmetry constraint: the lower face of the pillar is clamped, the symmetry axis cannot move
-across itself, the drive face moves by the input. The plate is in plane stress; its hinges lie between plane stress and
-plane strain, depending on their width (`width_effect`). For the published gripper in plane stress, a converged mesh
-gives 7.7212 mm of gap per millimetre of input, a stiffness of 2.0014 N/mm and a stress of 19.07 MPa/mm; including the
-width of the hinges the stiffness is 2.06 N/mm, as with three-dimensional brick elements. The link length of that
-gripper is not published and was chosen so that the slope equals the one published for Comsol; the agreement of the two
-slopes is therefore no validation.
+One half is solved under the symmetry constraint: the lower face of the pillar is clamped, points on the symmetry axis
+cannot move perpendicular to it, and the drive face moves by the input. The plate is in plane stress; its hinges lie
+between plane stress and plane strain, depending on their width (`width_effect`). For the published gripper in plane
+stress, a converged mesh gives 7.7212 mm of gap per millimetre of input, a stiffness of 2.0014 N/mm and a stress of
+19.07 MPa/mm; including the width of the hinges the stiffness is 2.06 N/mm, as with three-dimensional brick elements.
+The link length of the published gripper is unknown and was chosen so that the slope equals the published slope of the
+Comsol model; the agreement of the two slopes is therefore no validation.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,10 @@ from fingervision.models.triangulate import PlaneMesh
 from fingervision.models.width_effect import force_uncertainty, gripper_zones
 
 KIND = "finite_element"
-TRUST, WHY_TRUSTED = 3, "it has the outline itself, and the other takes the body for bars and notches joined at points"
+TRUST, WHY_TRUSTED = (
+    3,
+    "it models the outline itself, whereas the other model replaces the body by bars and notches joined at points",
+)
 
 _MODES = 3
 _ON_NOTCH = 1e-6
@@ -168,5 +171,5 @@ class FiniteElementGripper:
 
 def build(gripper: Gripper, physics: Physics, theory: HingeTheory) -> FiniteElementGripper:
     """Build the model; see `fingervision.models.kinds`."""
-    del theory  # the outline itself says how its hinges yield
+    del theory  # `theory` is not used: the compliance of the hinges follows from the outline
     return FiniteElementGripper(gripper, physics)

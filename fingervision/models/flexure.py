@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 FlexureKind = Literal["circular", "elliptic", "filleted", "leaf"]
 _HEIGHT_THAT_BENDS = 0.13
-"""Height that a fillet adds on either side, in thicknesses, up to which the section counts as bending: its height is
-then 1.26 times the neck's, and its bending stiffness twice the neck's."""
+"""Largest height that a fillet adds on either side, in thicknesses, for a section that still counts as bending: such a
+section is 1.26 times as high as the neck and twice as stiff in bending."""
 _POISSON = 0.34
-"""Poisson's ratio for which the plane-strain share is computed: the share changes by 0.006 only from 0.2 to 0.34, and
-is multiplied by nu^2."""
+"""Poisson's ratio for which the plane-strain share is computed: the share changes by only 0.006 between Poisson's
+ratios nu = 0.2 and 0.34, and is multiplied by nu^2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class Flexure:
     thickness_mm : float
         Least height of the flexure.
     half_length_mm, depth_mm : float
-        Half extent along the axis, and how far the cut goes in from the surface of the neck: both the radius of a
-        circular flexure. A leaf has no depth.
+        Half extent along the axis, and depth of the cut, measured from the surface of the neck. For a circular flexure,
+        both are its radius. A leaf has no depth.
     fillet_mm : float
         Radius of the corners of a filleted flexure.
     used : (float, float, float) or None
-        Shares of its strain energy by ends that turn against each other, that sway, and that stretch it; None where not
-        known.
+        Shares of the flexure's strain energy from three deformations: ends that rotate against each other, ends that
+        sway, and elongation. None where the shares are unknown.
     """
 
     name: str
@@ -111,7 +111,7 @@ class Flexure:
 
     @property
     def bent_mm(self) -> float:
-        """Length of a leaf or straight neck that bends; of fillets, the part with at most twice the stiffness."""
+        """Length of a leaf or straight neck that bends, with the part of its fillets that is at most twice as stiff."""
         straight, r = self.half_length_mm - self.fillet_mm, self.fillet_mm
         if r == 0.0:
             return 2.0 * straight
@@ -121,8 +121,9 @@ class Flexure:
     def width_share(self, plate_mm: float) -> float:
         """Degree to which the plate's width constrains the bending: 0 for plane stress, 1 for plane strain.
 
-        For a leaf or a straight neck it lies between two cases, ends that rotate and ends that keep their direction: by
-        their shares of the strain energy, or their mean where these are unknown.
+        For a leaf or a straight neck, the degree of constraint is a mean of two cases, ends that rotate and ends that
+        keep their direction. Rotating and parallel ends are weighted by their shares of the strain energy, or equally
+        where these shares are unknown.
         """
         if self.is_notch:
             return plane_strain_share(self.notch(plate_mm))

@@ -27,7 +27,7 @@ def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plat
     shear = -(first + second) / np.diff(stations)
     loads = np.column_stack([tension, shear, second])
     whole = 0.5 * float(np.einsum("mi,mij,mj->", loads, compliances, loads))
-    if not span.flexure.is_notch:  # as a beam in every direction
+    if not span.flexure.is_notch:  # a leaf bends as a beam in every direction
         return 0.0, whole
     at_neck = float(np.interp(0.0, stations, np.append(-first, second[-1])))
     bent = 0.5 * at_neck**2 * float(np.sum(compliances[:, 2, 2]))

@@ -2,7 +2,7 @@
 
 A notch is a beam between the points where it meets the bodies that it joins, corrected by the tables for hinges. For a
 leaf and for a straight neck, the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle the
-stress there is that of a beam, and the compliance of the roots is included in the elastic bodies.
+beam theory is valid up to these ends, and the compliance of the roots is included in the elastic bodies.
 """
 
 from dataclasses import dataclass, replace
@@ -27,23 +27,25 @@ Array = NDArray[np.float64]
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _SEGMENTS, _SEGMENTS_OF_LEAF = 10, 20
 """Number of segments of a notch, which bends at its neck, and of a leaf or straight neck, which bends along its whole
-length: the error from replacing an arc by chords is 1 / n^2."""
+length: the relative error from replacing an arc by n chords is about 1 / n^2."""
 _SAMPLES = 401
 _ROUNDS, _BETWEEN = 5, 65
-"""Rounds of the search for the end of the free length, and points in each: a round narrows the interval 64 times, five
-rounds to 1e-11 of the half length."""
+"""Rounds of the search for the end of the free length, and points in each round. A round narrows the interval by a
+factor of 64; after five rounds the interval is below 1e-11 of the half length."""
 _BESIDE = 1e-4
 """Distance from a flexure's surface at which material and void are tested, as a share of the thickness."""
 _BENDS = 2.0
-"""Ratio of a section's height to the neck's up to which it bends noticeably: a section twice as high is an eighth as
-compliant."""
+"""Largest ratio of a section's height to the neck's height at which the section bends noticeably: a section twice as
+high has an eighth of the compliance."""
 _AS_THIN = 1.1
-"""Thickness that must be left there, as a multiple of the neck's: the same moment causes at most as much stress."""
+"""Thickness that every section that bends must have, as a multiple of the neck's thickness: the same moment then causes
+no more stress there than in the neck."""
 _SAINT_VENANT = 1.5
 """Distance of a cut from the root in thicknesses: a self-balanced load of a strip decays at least as exp(-2.1 x / (t /
 2)) (Timoshenko and Goodier, article 26), to 0.2 % there."""
 _LEAST_SHARE = 0.3
-"""Least share of the free length that is modelled as a beam, for necks too short for the distance above."""
+"""Least share of the free length that is modelled as a beam, used where a neck is too short for the distance
+`_SAINT_VENANT` from its roots."""
 _OVER = 1.02
 """Height of a cut as a multiple of the section's height, so that the cut ends in the void on either side."""
 _WITHIN = 0.95
@@ -52,7 +54,7 @@ notch."""
 _BEYOND = 0.02
 """Distance of the cut beyond a notch's end, in thicknesses; the cut runs straight through the link."""
 _NARROW = 0.25
-"""Ratio of width to thickness below which the tables are those of plane stress."""
+"""Ratio of width to thickness for which the tables give plane stress; used if the width effect is left out."""
 _GAUSS = leggauss(12)
 _SHEAR = 6.0 / 5.0
 
@@ -97,7 +99,7 @@ class FlexureSpan:
         """Ends of the segments, closer together where a notch bends; shape (segments + 1,)."""
         if not self.flexure.is_notch:
             return np.linspace(*self.cut_mm, _SEGMENTS_OF_LEAF + 1)
-        # A notch may meet its bodies sooner on the one side than on the other.
+        # A notch may meet its two bodies at different distances from its centre.
         halves = []
         for free_mm, cut_mm in zip(self.free_mm, self.cut_mm, strict=True):
             web_mm = float(self.flexure.height_mm(np.array([free_mm]))[0])
@@ -116,7 +118,8 @@ class FlexureSpan:
             parts = np.array([beam_compliance(notch, material, span)[_PLANAR] for span in spans])
             found = root[:, None] * parts * root
             if corrected:
-                # Sections of a notch are not sheared as a straight beam's are, and bending does not make them yield.
+                # The shear of a notch's sections differs from that of a straight beam, and the correction for bending
+                # does not apply to shear.
                 beam = _SHEAR * material.youngs_modulus_mpa / material.shear_modulus_mpa
                 shear = sway_shear(notch) - SWAY_SHEAR + root[1] ** 2 * (SWAY_SHEAR - beam)
                 found[:, 1, 1] += shear * parts[:, 0, 0]
@@ -196,7 +199,7 @@ def _check_neck(flexure: Flexure, region: PlanarRegion) -> None:
     if missing.size:
         raise DataError(
             f"flexure {flexure.name} must be thinnest at its centre, but another cut makes it thinner "
-            f"{missing.min():.3g} mm from there; move the cuts apart, or take --kind finite_element."
+            f"{missing.min():.3g} mm from its centre; move the cuts apart, or take --kind finite_element."
         )
 
 

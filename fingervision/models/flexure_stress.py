@@ -36,7 +36,7 @@ def nominal_stress_mpa(
     plate_mm = mechanism.plate_mm
     stations = span.stations_mm(plate_mm)
     at_ends = np.concatenate([-end_loads[:, 1], end_loads[-1:, 2]])
-    # The moment of a beam is linear between its segments' ends, and on to its roots.
+    # The moment of a beam is linear between the ends of its segments, and is extrapolated linearly to its roots.
     x = np.linspace(*span.free_mm, _SAMPLES)
     moment = np.interp(x, stations, at_ends)
     for beyond, (i, j) in ((x < stations[0], (0, 1)), (x > stations[-1], (-2, -1))):

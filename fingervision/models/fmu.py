@@ -15,7 +15,8 @@ INPUTS = ("input_mm", "input", "u_in", "u", "position", "displacement", "stroke"
 GAPS = ("gap_mm", "gap", "opening", "y", "out", "output")
 OTHERS = ("left_mm", "right_mm", "force_n")
 FINER = 4
-"""Co-simulation steps between two given times: the FMU holds its input, read at the middle of the step, over a step."""
+"""Number of co-simulation steps between two given times. The FMU keeps its input constant during a step, at the value
+in the middle of the step."""
 MOST_STEPS = 200_000
 LONGEST_STEP_S = 0.01
 """Longest co-simulation step, however far apart the given times are: a vibration at 10 Hz is then still sampled ten
@@ -50,7 +51,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
             "is an FMU, which is read by the library FMPy: install that with `pip install fingervision[fmu]`."
         ) from None
     if not path.is_file():
-        raise ValueError("must be a file, but is not there.")
+        raise ValueError("must be a file, but does not exist.")
     try:
         description = read_model_description(str(path))
         platforms = supported_platforms(str(path))
@@ -127,8 +128,8 @@ def _drive_between_steps() -> None:
     """Let FMPy's integrator read the input at each time that it evaluates, instead of the input at the last step.
 
     FMPy 0.3 sets inputs only before a step of the integrator and in the root function. During a step of the integrator
-    CVode a moving input then lags, and the integrator's error test fails where the input jumps. The change applies to
-    the whole worker process, which runs only the model.
+    CVode a moving input then lags, and the integrator's error test fails where the input jumps. The change of FMPy
+    applies to the whole worker process, which runs only the model.
     """
     from fmpy import sundials
 
@@ -156,7 +157,7 @@ def _outputs(variables: list[Any], names: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _choose(variables: list[Any], causality: str, stated: str | None, usual: tuple[str, ...]) -> Any:
-    """Choose the variable with the stated name, else one with a usual name, else the only variable there is."""
+    """Choose the variable with the stated name, else a variable with a usual name, else the only variable."""
     word = "input" if causality == "input" else "gap"
     real = [one for one in variables if one.causality == causality and one.type in ("Real", "Float64", "Float32")]
     if stated is not None:

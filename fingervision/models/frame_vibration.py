@@ -69,7 +69,7 @@ class FrameVibration:
         if not drive_held:
             columns = np.column_stack([columns, self.by_input])
         K, M = columns.T @ self.stiffness_n_mm @ columns, columns.T @ self.mass_t @ columns
-        # The reciprocal problem: masses may be zero, the stiffness is positive definite.
+        # Solve the reciprocal eigenvalue problem: masses may be zero, whereas the stiffness is positive definite.
         last = K.shape[0] - 1
         inverse, sought = eigh(M, K, subset_by_index=(last + 1 - count, last))
         inverse, sought = inverse[::-1], sought[:, ::-1] / np.sqrt(inverse[::-1])

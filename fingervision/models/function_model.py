@@ -22,8 +22,9 @@ SUFFIXES = (".fmu", ".py")
 LONGEST_S = 120.0
 """Longest wall time of one call: the model of an ordinary gripper with some hundred states needs one or two seconds."""
 STEPS = 21
-"""Number of inputs, from lowest to highest, at which the model is run until the gap is at rest; the static gap is
-linear between them, and any remaining nonlinearity appears in the simulated remainder over time."""
+"""Number of inputs, from lowest to highest, at which the model is run until the gap is at rest; between these inputs,
+the static gap is interpolated linearly. The error of this interpolation is part of the difference that is simulated
+over time."""
 HOLDS_S = (2.0, 8.0, 32.0)
 """Hold times tried one after another until the gap has settled: grippers ring for less than a second and creep for
 about a minute."""
@@ -93,7 +94,7 @@ class FunctionModel:
         return TableModel(self.path.name, up, mean(last.left_mm), mean(last.right_mm), force)
 
     def simulate(self, runs: Sequence[tuple[Array, Array]]) -> list[Response]:
-        """Simulate the runs, each from its own initial state, in a process of its own.
+        """Simulate the runs in a separate process, each run from its own initial state.
 
         Parameters
         ----------
@@ -119,8 +120,8 @@ class FunctionModel:
                 )
             except subprocess.TimeoutExpired:
                 raise ModelError(
-                    f"{self.path} must answer within {LONGEST_S:g} s, but was still running and was ended: look for an "
-                    "endless loop, or run it beforehand and give its results as a table."
+                    f"{self.path} must answer within {LONGEST_S:g} s, but was still running and was stopped: look for "
+                    "an endless loop, or run the model beforehand and give its results as a table."
                 ) from None
             if ended.returncode != 0 or not answered.is_file():
                 raise ModelError(self._failure(ended.returncode, ended.stderr))
@@ -134,8 +135,8 @@ class FunctionModel:
             return f"{self.path} {said[-1].removeprefix(SAYS)}"
         if code < 0:
             name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-            return f"{self.path} must answer, but crashed ({name}): the fault is in the model; nothing was lost."
-        last = f" Its last words: {said[-1][:300]}" if said else ""
+            return f"{self.path} must answer, but crashed ({name}): correct the model; no data were lost."
+        last = f" The last line of its error output: {said[-1][:300]}" if said else ""
         return f"{self.path} must answer, but its process ended with code {code}: correct the model.{last}"
 
 

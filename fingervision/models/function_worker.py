@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _python_function(path: Path) -> Function:
-    """Load `simulate` from a Python file; its folder is searched for what it imports."""
+    """Load `simulate` from a Python file; modules that the file imports are searched in the file's folder."""
     sys.path.insert(0, str(path.parent))
     spec = spec_from_file_location("model_of_ones_own", path)
     if spec is None or spec.loader is None:
@@ -44,7 +44,7 @@ def _python_function(path: Path) -> Function:
     try:
         spec.loader.exec_module(module)
     except FileNotFoundError:
-        raise ValueError("must be a file, but is not there.") from None
+        raise ValueError("must be a file, but does not exist.") from None
     except (Exception, SystemExit) as error:
         raise ValueError(f"could not be loaded: {type(error).__name__}: {error}") from error
     simulate = getattr(module, "simulate", None)

@@ -1,7 +1,7 @@
 """Time integration of a body in large rotation and contact: the generalised-alpha method.
 
 The method is second-order accurate in the time step, with adjustable damping of frequencies that the step does not
-resolve. Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371.
+resolve. Source: Chung and Hulbert, 1993, Journal of Applied Mechanics 60, 371.
 """
 
 from collections.abc import Callable
@@ -100,7 +100,7 @@ def integrate(
             if left <= _SETTLED * scale or scale == 0.0:
                 break
             if solver is None or left > _SLOW * before:
-                # One factorisation serves as long as the residual falls well by it.
+                # Use one factorisation for as long as the residual falls quickly.
                 effective = (
                     (1.0 - alpha_m) / (beta * step_s**2) * mass
                     + (1.0 - alpha_f) * gamma / (beta * step_s) * damping

@@ -2,8 +2,8 @@
 
 The part is a block with flat sides, of given width and stiffness, centred between the fingers. Each finger meets an
 elastic plane at half the part's width. The plane is displaced by the finger's force divided by twice the part's
-stiffness. This is Signorini's contact problem with the part's compliance added to that of every pair of points on the
-finger's face.
+stiffness. The method is Signorini's contact problem, with the compliance of the part added to the compliance between
+every pair of points on the finger's face.
 """
 
 from dataclasses import dataclass
@@ -84,7 +84,8 @@ def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
 def mechanical_advantage(body: DrivenBody) -> float | None:
     """Increase of each finger's gripping force per increase of drive force, once the fingers touch each other.
 
-    The remaining work of the drive bends hinges and fingers. The function returns None for fingers that do not close.
+    The part of the drive's work that does not increase the grip bends hinges and fingers. The function returns None for
+    fingers that do not close.
     """
     touch = body.first_touch_mm()
     if touch is None:

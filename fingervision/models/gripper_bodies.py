@@ -71,7 +71,7 @@ def poses_of_frame(gripper: Gripper, skeleton: Skeleton, *, large: bool) -> Pose
                 if owner != name or member.mass_t == 0.0:
                     continue
                 a, b = member.parent + 1, place + 1
-                # Simpson's rule along the bar; at its middle the cubic of a beam that bends.
+                # Simpson's rule along the bar; the displacement of its middle follows the cubic of a bent beam.
                 chord = places[b] - places[a]
                 bend = (motion[a, 2] - motion[b, 2]) / 8.0 * np.array([-chord[1], chord[0]])
                 middle = 0.5 * (motion[a] + motion[b])
@@ -123,7 +123,7 @@ def gripper_poses(half: DrivenBody, physics: Physics, poses: Poses, input_mm: Ar
         if name.startswith(_RIGHT):
             found[_LEFT + name.removeprefix(_RIGHT)] = rows * _MIRROR
         found[name] = rows if name.startswith(_RIGHT) else rows * _ON_AXIS
-    return {name: rows + 0.0 for name, rows in sorted(found.items())}  # no -0
+    return {name: rows + 0.0 for name, rows in sorted(found.items())}  # no -0.0
 
 
 def _rows(poses: Mapping[str, BodyPose]) -> dict[str, Array]:

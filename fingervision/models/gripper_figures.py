@@ -74,7 +74,8 @@ def gripper_figures(
     own = asdict(operating_figures(gripper, half)) if isinstance(half, DrivenBody) else {}
     row |= {field.name: own.get(field.name) for field in fields(OperatingFigures)}
     if not isinstance(model, FiniteElementGripper):
-        # Bars that end where their axes meet grow otherwise: by more than the sample's gap does.
+        # A frame of bars cannot give thermal expansion: its bars end where their axes meet, and the error exceeds the
+        # sample's change.
         row["gap_per_kelvin_mm"] = row["force_per_kelvin_n"] = None
     row["sag_out_of_plane_mm"] = figures.sag_out_of_plane_mm
     ends = [float(min(inputs)), float(max(inputs))]

@@ -21,7 +21,7 @@ _ASKEW_DEG = 15.0
 """Largest angle between a notch and its link: a notch at a larger angle is not a hinge of the link; its neck is then 4
 % longer than its height."""
 _STATED = 0.05
-"""Largest relative difference between the stated width and height and those drawn. The stated ones are used in no
+"""Largest relative difference between the stated width and height and those drawn. The stated values are used in no
 computation."""
 
 
@@ -117,7 +117,7 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
                     f"of hinge.radius_mm = {hinge.radius_mm:g} about ({centre[0]:.4g}, {centre[1]:.4g}) mm is a closed "
                     "hole inside it; make hinge.radius_mm larger or the link narrower."
                 )
-    # Saw through the neck from disc to disc: the half must fall in two.
+    # Cut through the neck from disc to disc: the half must then separate into two parts.
     (xa, ya), (xb, yb) = centres
     saw = bar(xa, ya, xb, yb, _SLIT * hinge.thickness_mm)
     pieces = [loop for loop in PlanarRegion((*region.steps, (False, saw))).loops if loop.area_mm2 > 0.0]

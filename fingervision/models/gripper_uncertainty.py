@@ -31,11 +31,11 @@ def gripper_uncertainty(
 ) -> dict[str, FigureUncertainty]:
     """Propagate the stated uncertainties of a drawing to every number of `gripper_figures`.
 
-    The numbers of drawings with changed dimensions come from the lumped model (out of the plane from the stiffness
-    matrix), for small displacements, and with contact if the physics includes it; they are scaled from those of the
-    given drawing by ratios that a bar model computes (`changed_drawings`). Finite elements for every changed drawing
-    would take minutes, whereas an uncertainty needs only two digits. The same uncertainty is stated for the other kinds
-    of model.
+    The numbers of drawings with changed dimensions come from the lumped model, and out-of-plane numbers from the
+    stiffness matrix. Both models are used for small displacements, with contact if the physics includes contact. A bar
+    model computes the ratio of each changed number to that of the given drawing (`changed_drawings`). Finite elements
+    for every changed drawing would take minutes, whereas an uncertainty needs only two digits. The uncertainty from the
+    lumped model is stated for all kinds of model.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def check_uncertainties(gripper: Gripper) -> None:
         for by in (-(estimate.u or 0.0), estimate.u or 0.0):
             try:
                 drawn = _changed(gripper, {name: by})
-                check_outline(drawn, "the drawing so changed")
+                check_outline(drawn, "the changed drawing")
             except FingervisionError as error:
                 raise ModelError(
                     f"The uncertainty of {name} is too large: with {name} = {estimate.value + by:g}, one standard "

@@ -90,8 +90,9 @@ def _mass_t(
 ) -> csr_matrix:
     """Mass matrix: half of each member's mass at each end, corrected to a uniform bar's rotational inertia.
 
-    This is the mass matrix (2) of Hricko & Havlik (2015), with mass m and moment of inertia I_z for each node: I_z of a
-    bar about its centre is m (l^2 + w^2) / 12. An elastic body that replaces members has its own mass matrix.
+    The mass matrix is equation (2) of Hricko & Havlik (2015), with mass m and moment of inertia I_z for each node: I_z
+    of a bar about its centre is m (l^2 + w^2) / 12 for length l and width w. An elastic body that replaces members has
+    its own mass matrix.
     """
     mass, inertia = np.zeros(len(nodes)), np.zeros(len(nodes))
     body = frame.body if isinstance(frame, JoinedFrame) else None

@@ -2,10 +2,10 @@
 
 The load acts at the right end of the notch, x = R; the left end is fixed. The components are ordered as displacements
 along x, y, z, then rotations about x, y, z, with x along the hinge, y across the hinge in the plane, and z out of the
-plane. The circular case is that of Paros and Weisbord (1965) and Wu and Zhou (Rev. Sci. The quadrature reproduces these
-formulas to ten digits. Beam theory is too stiff, the more so the thicker the hinge: compared with a finite-element
-model at t / R = 0.25, by 5 % in bending and 7 % in tension; in torsion it is 28 % too soft. `corrected_compliance`
-corrects these errors.
+plane. For circular notches, Paros and Weisbord (1965) and Wu and Zhou (2002, Review of Scientific Instruments 73, 3101)
+give closed formulas, which the quadrature reproduces to ten digits. Beam theory is too stiff, and more so for thicker
+hinges: compared with a finite-element model at t / R = 0.25, by 5 % in bending and 7 % in tension; in torsion it is 28
+% too soft. `corrected_compliance` corrects these errors.
 """
 
 import numpy as np
@@ -34,16 +34,17 @@ def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, floa
         Linear elastic material.
     span_mm : (float, float) or None
         Start and end of a part of the notch, as positions along its axis from its middle; the load acts at the part's
-        right end. The parts in series have the compliance of the whole notch to rounding, wherever it is divided. None
-        for the whole notch.
+        right end. The parts in series have the compliance of the whole notch to rounding, wherever the notch is
+        divided. None for the whole notch.
 
     Returns
     -------
     ndarray of float, shape (6, 6)
         Symmetric matrix with entries in mm/N, rad/N = mm/(N mm) and rad/(N mm).
     """
-    # With x = a sin(angle) the integrands are smooth at the notch's ends; with sin(angle / 2) = c sinh(s) the peak of
-    # 1 / h^3 at the neck, which is sqrt(t R) wide, becomes as wide as the range, so that thin necks lose no digits.
+    # With x = a sin(angle) the integrands are smooth at the notch's ends; with sin(angle / 2) = c sinh(s) the peak of 1
+    # / h^3 at the neck, which is sqrt(t R) wide, becomes as wide as the range, so that no digits are lost for thin
+    # necks.
     nodes, weights = _GAUSS
     a, b = notch.half_length_mm, notch.plate_mm
     c = notch.bending_share
@@ -69,7 +70,7 @@ def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, floa
 def bar_compliance(length_mm: float, width_mm: float, plate_mm: float, material: Material) -> Array:
     """Compliance of a straight bar (Timoshenko beam) at its loaded end, with the other end fixed.
 
-    Order of components and units are those of `beam_compliance`.
+    The order of components and the units are the same as in `beam_compliance`.
     """
     E, G = material.youngs_modulus_mpa, material.shear_modulus_mpa
     area = width_mm * plate_mm
@@ -86,8 +87,8 @@ def bar_compliance(length_mm: float, width_mm: float, plate_mm: float, material:
 def torsion_constant_mm4(height_mm: Array, plate_mm: float) -> Array:
     """Saint-Venant torsion constant of a rectangle.
 
-    J = p q^3 (1/3 - 0.21 q/p (1 - q^4 / (12 p^4))), p the longer side: Young and Budynas, Roark's Formulas for Stress
-    and Strain, table 10.1.
+    J = p q^3 (1/3 - 0.21 q/p (1 - q^4 / (12 p^4))), with p the longer and q the shorter side: Young and Budynas,
+    Roark's Formulas for Stress and Strain, table 10.1.
     """
     p, q = np.maximum(height_mm, plate_mm), np.minimum(height_mm, plate_mm)
     return np.asarray(p * q**3 * (1.0 / 3.0 - 0.21 * q / p * (1.0 - q**4 / (12.0 * p**4))))

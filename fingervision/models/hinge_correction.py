@@ -1,13 +1,14 @@
 """Beam theory of the notch hinge corrected by finite elements: the default of the models.
 
 The compliance in each direction is multiplied by ratios that `tests/benchmarks/models_hinge_table.py` prints for nu =
-0.34. The first ratio is that of the compliance in plane stress, between rigid end planes, to that by beam theory. The
-second ratio is the restraint by the plate's width, from quadratic brick elements; it scales with nu^2. The third ratio,
-for a hinge in a body, is that of the compliance between elastic blocks to that between rigid planes, because the blocks
-deform where the notch joins them. At t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant as beam
-theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of
-the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are constant,
-except in torsion, where the ratio continues to fall with (t / b)^2.
+0.34. The first ratio is the compliance in plane stress, between rigid end planes, over the compliance by beam theory.
+The second ratio is the restraint of a hinge by the plate's width, from quadratic brick elements; the restraint scales
+with nu^2 (nu: Poisson's ratio). The third ratio, for a hinge in a body, is the compliance between elastic blocks over
+the compliance between rigid planes, because the blocks deform where the notch joins them. For a neck of thickness t in
+a notch of radius R and a plate of width b, with t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant
+as beam theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the
+nodes of the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are
+constant, except in torsion, where the ratio continues to fall with (t / b)^2.
 """
 
 from enum import StrEnum
@@ -38,7 +39,7 @@ _POISSON = 0.34
 for plane strain is 1 - nu^2."""
 _X, _Y, _ABOUT_X, _ABOUT_Z = 0, 1, 3, 5
 
-# By t / R, then by b / t; order of the six: displacements x, y, z, rotations about x, y, z.
+# First index: t / R; second index: b / t; third index: displacements x, y, z, rotations about x, y, z.
 _BRICKS_OVER_BEAM = (
     (
         (1.0352, 1.0013, 0.9772, 0.9792, 0.9805, 1.0013),
@@ -130,22 +131,24 @@ _BLOCKS_OVER_PLANES = (
 
 
 _SWAY = (1.4026, 1.3674, 1.3122, 1.2233, 1.0407, 0.8454, 0.6979)
-"""By t / R up to 0.8: ratio of the shear compliance that makes a notch as compliant to forces across it, with ends that
-stay parallel, as plane-stress elements find it between elastic blocks (`tests/benchmarks/models_sway_table.py`), to
-that of a Timoshenko beam. Its sections are not sheared as a straight beam's are, because they widen quickly."""
+"""Ratio of the shear compliance of a notch between elastic blocks to that of a Timoshenko beam, by t / R up to 0.8. The
+shear compliance is chosen so that the notch, with ends that stay parallel, is as compliant across its axis as a mesh of
+plane-stress elements (`tests/benchmarks/models_sway_table.py`). The sections of a notch widen quickly, so that their
+shear differs from that of a straight beam."""
 
 
 def sway_shear(notch: Notch) -> float:
     """Shear compliance of a notch in a body, as a multiple of the integral of 1 / (E b h) over its length.
 
-    In plane stress it does not depend on Poisson's ratio, because the stresses under given loads do not (Michell's
-    theorem).
+    In plane stress this multiple does not depend on Poisson's ratio, because the stresses under given loads do not
+    depend on it (Michell's theorem).
     """
     return SWAY_SHEAR * _sway_ratio(notch.curvature_ratio)
 
 
 SWAY_SHEAR = 6.0 / 5.0 * 2.0 * (1.0 + _POISSON)
-"""The same for a Timoshenko beam of the material of the tables."""
+"""Shear compliance of a Timoshenko beam with the Poisson's ratio of the tables, as a multiple of the integral of 1 / (E
+b h)."""
 
 
 @lru_cache(maxsize=512)
@@ -156,7 +159,7 @@ def _sway_ratio(t_over_r: float) -> float:
 
 @lru_cache(maxsize=1)
 def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpolator]:
-    """Curves over log(t / R): ratios that depend on b / t, plane stress to beam theory, blocks to planes."""
+    """Curves over log(t / R) of three ratios: by b / t, plane stress over beam theory, blocks over planes."""
     table = np.array(_BRICKS_OVER_BEAM)
     shares = (1.0 - table / table[:, :1, :]) / _POISSON**2
     mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
@@ -169,13 +172,14 @@ def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpola
 def _bricks(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
     """Interpolate shares of plane strain (along x, along y, about z) and ratios of the other directions."""
     if t_over_r < _T_OVER_R[0]:
-        # What counts is the width over the length that bends, sqrt(t R).
+        # The ratio that matters is that of the width to the length that bends, sqrt(t R).
         b_over_t *= np.sqrt(t_over_r / _T_OVER_R[0])
     at = np.log(np.clip(t_over_r, _T_OVER_R[0], _T_OVER_R[-1]))
     row = _by_t_over_r()[0](at)
     curves = PchipInterpolator(np.log(_B_OVER_T), row, axis=0)
     values = curves(np.log(np.clip(b_over_t, _B_OVER_T[0], _B_OVER_T[-1])))
-    # Wide plates twist by bending their strips to and fro: beam theory falls behind with the square of the width.
+    # In a wide plate, torsion bends the strips of the plate: the ratio to beam theory falls with the square of the
+    # width.
     values[_ABOUT_X] -= 2.0 * np.log(max(b_over_t / _B_OVER_T[-1], 1.0))
     return tuple(values.tolist())
 
@@ -207,11 +211,12 @@ def blocks_over_planes(notch: Notch) -> Array:
 
 
 def hinge_ratio(notch: Notch, material: Material, theory: HingeTheory) -> Array:
-    """Ratio of the compliance of a notch in a body to that by beam theory, shape (6,); ones for `BEAM`."""
+    """Ratio of the compliance of a notch in a body to that by beam theory, shape (6,); all ratios are 1 for `BEAM`."""
     if theory is HingeTheory.BEAM:
         return np.ones(6)
     ratio = planes_ratio(notch, material) * blocks_over_planes(notch)
-    # Across, what bends is what turns: a notch cut into segments then is the whole notch.
+    # Across the hinge, use the ratio of bending, so that the segments of a notch together are as compliant as the whole
+    # notch.
     ratio[_Y] = ratio[_ABOUT_Z]
     return ratio
 

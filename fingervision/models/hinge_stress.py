@@ -55,7 +55,7 @@ def peak_hinge_stress(
         if member.name in _HINGES:
             axes, start, end = _axes(member)
             first, second = moved[member.parent + 1], moved[place + 1]
-            # The end's motion as the start's rigid motion leaves it.
+            # Displacement of the end if the member moved rigidly with its start.
             carried = first[:2] + first[2] * np.array([start[1] - end[1], end[0] - start[0]])
             strained = np.append(axes @ (second[:2] - carried), second[2] - first[2])
             tension_n, shear_n, moment_n_mm = np.linalg.solve(member.compliance[_PLANAR], strained)
@@ -93,7 +93,7 @@ def _peak(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheor
         stress = factors[0] * abs(tension_n) / (notch.plate_mm * height_mm)
         stress += factors[1] * 6.0 * np.abs(moment_n_mm) / (notch.plate_mm * height_mm**2)
         if theory is HingeTheory.CORRECTED:
-            # Along the surface sigma, across the plate w nu sigma.
+            # The stress is sigma along the surface and w nu sigma across the plate, with w the share of plane strain.
             across = plane_strain_share(notch) * gripper.material.poisson_ratio
             stress *= sqrt(1.0 - across + across**2)
         highest = int(np.argmax(stress))

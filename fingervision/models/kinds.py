@@ -1,4 +1,4 @@
-"""Registry of the parametric models: modules of this package that define KIND, and those of other distributions."""
+"""Registry of the parametric models: modules of this package that define KIND, and models from other distributions."""
 
 import importlib
 from collections.abc import Iterable
@@ -42,7 +42,7 @@ class GripperModel(Model, Protocol):
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each.
 
-        A model from outside the package may lack this method.
+        A model from outside the package may lack the method `body_poses`.
         """
         ...
 
@@ -56,8 +56,8 @@ class Kind(Protocol):
 
     Optional attributes are `SMALL_DISPLACEMENTS_ALONE` (True for a model without large rotation and contact) and
     `TRUST`, a number (finite elements of the outline 3, bars in the plane 2, bars at small displacements 1; default 0).
-    If two kinds differ by more than their own errors, the kind with the larger `TRUST` is trusted, for the reason given
-    in `WHY_TRUSTED`.
+    If two kinds of model differ by more than their own errors, the kind with the larger `TRUST` is trusted, for the
+    reason given in `WHY_TRUSTED`.
     """
 
     KIND: str
@@ -97,12 +97,12 @@ def small_displacements_alone(kind: str) -> bool:
 
 
 def by_trust(names: Iterable[str]) -> list[str]:
-    """Sort kinds, the most trusted first; names that are no kind come last in their given order."""
+    """Sort kinds of model, the most trusted first; names of no kind come last in their given order."""
     return sorted(names, key=lambda name: -trust(name))
 
 
 def trust(kind: str) -> int:
-    """Rank by which a kind of model is trusted: the larger, the more of the drawing's outline the kind represents."""
+    """Rank by which a kind of model is trusted: a kind with a larger rank represents more of the drawing's outline."""
     return int(getattr(REGISTRY.get(kind).value, "TRUST", 0)) if kind in kinds() else 0
 
 

@@ -19,11 +19,12 @@ from fingervision.models.signorini import contact_forces_n
 Array = NDArray[np.float64]
 
 _TANGENTS, _STEPS_EACH = 30, 12
-"""Most tangent matrices, and iterations with each: computing a tangent costs as much as about ten iterations."""
+"""Largest number of tangent matrices, and of iterations with each matrix: computing a tangent costs as much as about
+ten iterations."""
 _SET_CHANGES = 12
 _RESIDUAL, _ROUNDING = 1e-9, 1e-7
-"""Largest residual of a solution, as a share of the largest nodal force of the small displacements; and the larger
-residual that is accepted as rounding error if it does not fall any more."""
+"""Largest residual of a solution, as a share of the largest nodal force at small displacements; and a larger residual
+that is accepted as rounding error if further iterations do not reduce it."""
 _ON_MM = 1e-7
 _STEP_MM = 0.5
 _SCALE_MM = 1e-3
@@ -121,7 +122,7 @@ def _next(tangent: _Tangent, input_mm: float, path: list[Equilibrium]) -> Equili
         return _settled(tangent, input_mm, _predicted(body, input_mm, path), pressed)
     except ModelError:
         pass
-    # The prediction led too far from the equilibria: follow them by their tangents, in smaller steps.
+    # The prediction was too far from the equilibria: follow the equilibria by their tangents, in smaller steps.
     for parts in _SMALLER[:-1]:
         try:
             return _followed(tangent, input_mm, last, parts)
@@ -131,7 +132,7 @@ def _next(tangent: _Tangent, input_mm: float, path: list[Equilibrium]) -> Equili
 
 
 def _followed(tangent: _Tangent, input_mm: float, last: Equilibrium, parts: int) -> Equilibrium:
-    """Follow the equilibria from the last one to an input in equal steps, each predicted by the tangent."""
+    """Follow the equilibria from the last equilibrium to an input in equal steps, each predicted by the tangent."""
     state = last
     for at_mm in np.linspace(last.input_mm, input_mm, parts + 1)[1:].tolist():
         state = _settled(tangent, at_mm, *tangent.ahead(state, at_mm))
@@ -148,7 +149,7 @@ def _settled(tangent: _Tangent, input_mm: float, moved: Array, pressed: Array) -
         unbalanced = internal.copy()
         unbalanced[body.face] -= pressed
         residual = float(np.abs(unbalanced[body.free]).max())
-        # Complementarity holds after a step, exactly: gaps are linear in the displacements.
+        # After a step, complementarity holds exactly, because gaps are linear in the displacements.
         settled = residual < _RESIDUAL * scale_n or (residual < _ROUNDING * scale_n and 2.0 * residual > before)
         if settled and (stepped or not tangent.contact):
             return Equilibrium(input_mm, moved, 2.0 * float(internal[body.driven].sum()), pressed)
@@ -166,7 +167,7 @@ def _settled(tangent: _Tangent, input_mm: float, moved: Array, pressed: Array) -
 
 def _is_slow(body: DrivenBody, residual: float, before: float, wanted: float, since: int) -> bool:
     """Whether computing a new tangent takes less work than the further steps with the present one."""
-    if body.nodal_force is None:  # forces come with the tangent
+    if body.nodal_force is None:  # computing the forces also computes the tangent
         return True
     if not residual < before:
         return bool(np.isfinite(before))
@@ -191,7 +192,7 @@ def _predicted(body: DrivenBody, input_mm: float, path: list[Equilibrium]) -> Ar
 def large_path(
     body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False, least: int = 3
 ) -> list[Equilibrium]:
-    """Follow the equilibria from a first one, or from rest, to an input, in steps of at most half a millimetre.
+    """Follow the equilibria from a given equilibrium, or from rest, to an input, in steps of at most 0.5 mm.
 
     `least` is the least number of steps: three for a curve through the equilibria, one if only the last equilibrium is
     needed.

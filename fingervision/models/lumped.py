@@ -34,7 +34,7 @@ from fingervision.models.static_answer import (
 from fingervision.models.width_effect import force_uncertainty
 
 KIND = "lumped"
-TRUST, WHY_TRUSTED = 2, "both take the body for bars, and it has more of them"
+TRUST, WHY_TRUSTED = 2, "both models replace the body by bars, and the lumped model has more bars"
 
 _SEGMENTS = 10
 _MODES = 3
@@ -42,8 +42,8 @@ _SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR, _GRIP_ERROR = 0.002, 0.015, 0.02, 0.015
 """Relative model errors, from finite elements of other grippers: slope within 0.03 %, force 0.9 %, first modes 0.4 %
 (`tests/benchmarks/models_held_out.py`), grip on a part 0.5 % (`models_grip.py`)."""
 _SLOPE_OF_BARS, _FORCE_OF_BARS, _MODE_OF_BARS, _GRIP_OF_BARS = 0.01, 0.03, 0.2, 0.35
-"""Relative model errors with a finger made of bars only: bars bend up to the point where their axes meet, and the real
-body does not. This hardly affects slope and force, but the grip and the first mode are 31 % and 18 % off where the
+"""Relative model errors with a finger made of bars only: bars bend up to the point where their axes meet, whereas the
+real body does not. This hardly affects slope and force, but the grip and the first mode are 31 % and 18 % off where the
 cross bar is 5 mm wide between bars of 9 mm."""
 
 
@@ -64,7 +64,7 @@ class LumpedGripper:
         Result of `drive_block_root.unit_compliance` for the drive block, if already computed.
     bars_alone : bool
         Whether the finger too is modelled by bars joined at points, which takes a hundredth of the time; with beam
-        theory it always is.
+        theory, the finger is always modelled by bars.
     """
 
     name = KIND
@@ -140,7 +140,7 @@ class LumpedGripper:
 
     @property
     def _errors(self) -> tuple[float, float, float, float]:
-        """Relative model errors of slope, force, modes and grip; with beam theory those of a finger made of bars."""
+        """Relative model errors of slope, force, modes and grip; larger with beam theory (finger made of bars)."""
         if not isinstance(self.frame, JoinedFrame):
             return _SLOPE_OF_BARS, _FORCE_OF_BARS, _MODE_OF_BARS, _GRIP_OF_BARS
         force = _FORCE_ERROR + 2.0 * force_uncertainty(self.gripper.material)

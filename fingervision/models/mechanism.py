@@ -164,7 +164,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         t = flexure.thickness_mm
         inside = np.array([flexure.point_mm(0.0, s * t * 0.49) for s in (-1.0, 0.0, 1.0)]).T
         beside = np.array([flexure.point_mm(0.0, s * (0.5 * t + 1e-3 * t)) for s in (-1.0, 1.0)]).T
-        # A flexure that is cut has had material beside its neck.
+        # A flexure that is cut from a body must have had material beside its neck before the cut.
         cuts = flexure.kind == "leaf" or uncut.holds(beside).all()
         if not region.holds(inside).all() or region.holds(beside).any() or not cuts:
             raise DataError(

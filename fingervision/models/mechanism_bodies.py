@@ -73,7 +73,7 @@ def bodies_of(mechanism: Mechanism, spans: Sequence[FlexureSpan] | None = None) 
     cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
     outer = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
     inner = [loop for loop in cut.loops if loop.area_mm2 < 0.0]
-    # The smallest outline that holds a hole is the one that it is cut from: loops are sorted by size.
+    # A hole belongs to the smallest outline that contains the hole; loops are sorted by size.
     owners = [max(n for n, loop in enumerate(outer) if loop.holds(_point(hole))) for hole in inner]
     names = _names(mechanism, outer)
     found = []
@@ -135,8 +135,8 @@ def column_name(name: str) -> str:
 def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
     """Name every piece by the first named shape that contains more than half of the piece's area.
 
-    A piece without such a shape is named by a shape that has no larger part elsewhere, such as a bar that a notch
-    halves; other pieces are numbered.
+    A piece of which no shape covers more than half takes the name of a shape that has no larger part in another piece,
+    such as a bar that a notch divides in two. All other pieces are numbered.
     """
     names: dict[int, str] = {}
     halved: dict[int, str] = {}

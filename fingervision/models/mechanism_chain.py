@@ -1,9 +1,10 @@
 """Stiffness-matrix model of a chain of rigid bodies: the compliances of its flexures are summed at the drive.
 
 The model applies equations (5) to (15) of Hricko & Havlik (2015), in the plane, to any chain from a fixed body to the
-driven one: the compliance at the drive is C = sum T C_i T', and the stiffness is that in the directions which the drive
-and its guides constrain. If there are several drives, they are loads at several bodies of such a tree. For a closed
-loop of bodies such a sum does not exist; it is refused.
+driven one: the compliance at the drive is C = sum T C_i T', where T transforms the compliance C_i of flexure i to the
+drive. The stiffness is the inverse of the compliance in the directions that the drive and its guides constrain. Several
+drives act as loads at several bodies of a tree of bodies. A drawing with a closed loop of bodies is refused, because
+the sum exists only for chains and trees.
 """
 
 from dataclasses import replace
@@ -59,7 +60,7 @@ class MechanismChain:
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
         self._bodies = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
         self.bodies: tuple[LinkBody, ...] = bodies_of(mechanism, spans)
-        # Bodies are rigid: of a leaf all that is free bends.
+        # Bodies are rigid, so that a leaf bends over its whole free length.
         self.spans = [span if span.flexure.is_notch else replace(span, cut_mm=span.free_mm) for span in spans]
         self._joins = [self._joined(span) for span in spans]
         self._ground = {body for face in mechanism.fixed for body in self._touching(face)}
@@ -131,7 +132,7 @@ class MechanismChain:
         return reached[driven]
 
     def _support(self, bodies: list[int]) -> None:
-        """Find what drives and their bodies' guides hold (x, y, rotation), and the loads there per 1 mm of each."""
+        """Find the motions (x, y, rotation) fixed by drives and guides, and reaction loads per 1 mm of each drive."""
         mechanism = self.mechanism
         drives = mechanism.drives
         held = [self._held_by(drive.face, driven_components(drive)) for drive in drives]
@@ -159,7 +160,7 @@ class MechanismChain:
         self._load = self._by_drive @ per_input_of(mechanism)
 
     def _held_by(self, face: Face, components: tuple[str, ...]) -> set[int]:
-        """Which of x, y and rotation (0, 1, 2) a face takes from a rigid body; turning if it is wide across them."""
+        """Motions (0 x, 1 y, 2 rotation) of a body that a face fixes; rotation only if the face is wide enough."""
         x0, x1, y0, y1 = face.box_mm
         wide = {"x": y1 - y0, "y": x1 - x0}
         turns = {2} if any(wide[component] > _ON * self._size_mm for component in components) else set()
@@ -238,7 +239,7 @@ class MechanismChain:
         return self._seen(input_mm, input_mm * self._load, per_input_of(self.mechanism))
 
     def drive_states(self) -> tuple[MechanismState, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        """Small displacements per 1 mm of one driven face after another, with all other driven faces at rest."""
         alone = np.eye(len(self.mechanism.drives))
         return tuple(self._seen(1.0, load, own) for load, own in zip(self._by_drive.T, alone, strict=True))
 
@@ -310,5 +311,5 @@ class MechanismChain:
 
 
 def _carried(arm: Array) -> Array:
-    """Matrix from the motion at the start of an arm to that at its end; its transpose transfers loads back."""
+    """Matrix that gives the motion at the end of an arm from that at its start; its transpose transfers loads back."""
     return np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])

@@ -32,8 +32,8 @@ _MOST_MOTION = 1e6
 amplifies as much."""
 _STILL = 1e-9
 _STRAINLESS = 1e-8
-"""Strain energy of all drives together, as a share of that of each alone, below which the body moves as a rigid one:
-rounding leaves 1e-11."""
+"""Strain energy under all drives together, as a share of the strain energies under each drive alone, below which the
+body counts as moving rigidly; rounding errors give 1e-11."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +125,7 @@ class DrivenMechanism:
 
     @cached_property
     def unit_by_drive(self) -> Array:
-        """Small displacements per 1 mm of one driven face after another, the others at rest, shape (unknowns, drives).
+        """Small displacements per 1 mm of each driven face, other faces at rest; shape (unknowns, drives).
 
         Raises
         ------
@@ -153,21 +153,18 @@ class DrivenMechanism:
         return float(moved @ (self.stiffness_n_mm @ moved))
 
     def by_one_drive(self) -> tuple[MechanismEquilibrium, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest, without contact."""
+        """Small displacements per 1 mm of each driven face, with the other driven faces at rest, without contact."""
         pairs = zip(self.unit_by_drive.T, self.drive_stiffness_n_mm.T, strict=True)
         return tuple(
             MechanismEquilibrium(moved, float(forces[i]), forces, ()) for i, (moved, forces) in enumerate(pairs)
         )
 
     def under_load(self, load_n: Array) -> Array:
-        """Small displacements under loads, one or a column each, with the drive fixed."""
+        """Small displacements under one load, or under each column of loads, with the drive fixed."""
         return np.asarray(self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ load_n)))
 
     def touch_inputs_mm(self) -> list[float | None]:
-        """Input nearest to zero (mm) at which each contact pair first touches, for small displacements.
-
-        A pair that never touches has None.
-        """
+        """Input nearest to zero (mm) at which each contact pair touches, for small displacements; None if never."""
         found: list[float | None] = []
         for gaps in self.gaps:
             gap, slope, _ = gaps(np.zeros(self.by_input.size))

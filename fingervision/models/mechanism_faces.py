@@ -56,8 +56,8 @@ def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
 def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
     """Whether a face is parallel to x or y (`component`), so that prescribing that component lets it rotate.
 
-    A face at another angle is driven by its mean motion: with the component prescribed at every node it would have to
-    stretch in order to rotate.
+    For a face parallel to the component, the drive prescribes only the mean of the component over the face. A face at
+    another angle could rotate only by stretching if the component were prescribed at every node.
     """
     places = plate.nodes_mm[:, nodes]
     spread = np.ptp(places, axis=1)

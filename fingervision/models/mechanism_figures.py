@@ -1,4 +1,4 @@
-"""Characteristic numbers of a mechanism drawn by bodies, for any kind of model."""
+"""Characteristic numbers of a mechanism that is described by its bodies, for any kind of model."""
 
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_frame import MechanismFrame
@@ -59,7 +59,7 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
 
 
 def _of_drives(model: MechanismModel) -> dict[str, float]:
-    """Effects of each of several driven faces alone, with the others at rest, and each face's share of the force."""
+    """Response to each of several driven faces, with the other faces at rest, and the face's share of the force."""
     together, rest = model.state(1.0), model.state(0.0)
     figures = {f"{name}: force per input [N/mm]": force for name, force in together.drives_n.items()}
     for name, alone in zip(together.drives_n, model.drive_states(), strict=True):

@@ -1,6 +1,6 @@
 """A planar mechanism of lumped flexures between elastic bodies: any topology, loops included.
 
-This is the lumped model of Hricko & Havlik (2015), extended to any drawing. Flexures are chains of beam segments,
+The model is the lumped model of Hricko & Havlik (2015), extended to any drawing. Flexures are chains of beam segments,
 corrected by the hinge tables; the bodies that they join are cut from the drawing and condensed to a few coordinate
 frames (`condensed_bodies`). Flexures and bodies may rotate by any angle.
 """
@@ -43,14 +43,14 @@ _ACROSS, _BODY = 2.0, 0.05
 and their stress is not computed."""
 _TINY = 1e-7
 _RIGID_MOTIONS, _SAME_PLACE = 3, 1e-6
-"""Rigid motions in the plane, and the share of the size below which a lever arm holds no rotation."""
+"""Number of rigid motions in the plane, and the share of the size below which a lever arm prevents no rotation."""
 _FORCE_ERROR = 0.015
 """Relative error of the force from the tables of hinges between blocks, by comparison with finite elements
 (`tests/benchmarks/models_held_out.py`)."""
 _FORCE_MISUSED, _STRESS_ERROR, _STRESS_MISUSED = 0.05, 0.02, 0.3
-"""Relative errors of force and stress where a guided drive shears or stretches flexures, not bends them: forces
-across a notch are within 1 % of plane stress, forces along one 4 % low to 4 % high (elliptic cuts, wide plates), and
-stress is low by 0.3 sqrt(t / R), because its peak is no longer at the neck."""
+"""Relative errors of force and stress where a guided drive shears or stretches flexures instead of bending them. Forces
+across a notch are within 1 % of those in plane stress; forces along a notch are up to 4 % too low or too high (elliptic
+cuts, wide plates). The stress is too low by 0.3 sqrt(t / R), because its peak is no longer at the neck."""
 _TINIEST = 1e-300
 
 
@@ -90,7 +90,7 @@ class MechanismFrame:
         self._mesh, self._size_mm = mesh, region.size_mm
         self._assemble()
         if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures):
-            # How a strip is held back depends on how it is bent: that is known now.
+            # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
             loads = self._end_loads(self.driven.unit_displacement, large=False)
             whole = 0.5 * self.stiffness_n_mm
             self.spans = tuple(
@@ -187,7 +187,7 @@ class MechanismFrame:
         def gaps(moved: Array) -> Gaps:
             field, slope = self.assembly.field(moved)
             gap, by_node, bend = ends.gaps_mm(plate, field)
-            # The frames' own turning is left out of the second derivative: Newton's method is then a little slower.
+            # The second derivative leaves out the rotation of the frames, which makes Newton's method a little slower.
             return gap, csr_matrix(by_node @ slope), lambda forces: csr_matrix(slope.T @ bend(forces) @ slope)
 
         return gaps
@@ -207,7 +207,7 @@ class MechanismFrame:
 
     @cached_property
     def _errors(self) -> tuple[float, float]:
-        """Relative errors of force and stress: those of bent flexures, larger for other loads on the flexures."""
+        """Relative errors of force and stress: as for flexures in bending, and larger for other loads on flexures."""
         loads, plate_mm = self._end_loads(self.driven.unit_displacement, large=False), self.mechanism.plate_mm
         misused, every, stress = 0.0, 0.0, 0.0
         for span, own in zip(self.spans, self.segments, strict=True):
@@ -244,7 +244,7 @@ class MechanismFrame:
         return self._seen(input_mm, found, large_rotation=large_rotation)
 
     def drive_states(self) -> tuple[MechanismState, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        """Small displacements per 1 mm of one driven face after another, with all other driven faces at rest."""
         return tuple(self._seen(1.0, found, large_rotation=False) for found in self.driven.by_one_drive())
 
     def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:

@@ -1,7 +1,7 @@
 """Effects of weight, temperature and a part between two probes on a mechanism, for small displacements.
 
-All effects are computed by finite elements. A frame of bars would give wrong results, because its bars end where their
-axes meet, unlike those of the drawing.
+The effects of weight, temperature and a gripped part are computed by finite elements. A frame of bars would give wrong
+results, because its bars end where their axes meet, unlike the bars of the drawing.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
 Array = NDArray[np.float64]
 
 _STILL = 1e-3
-"""Of the input: a pair whose distance changes by less is no output, and grips nothing."""
+"""Smallest change of a pair's distance, as a share of the input, for a pair that can grip a part."""
 
 
 def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
@@ -29,12 +29,12 @@ def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
     Parameters
     ----------
     model : MechanismPlate
-        Of the drawing.
+        Model of the drawing.
 
     Returns
     -------
     dict of str to float
-        By name, with the unit at its end.
+        Numbers by name, with the unit at the end of the name.
     """
     figures: dict[str, float] = {}
     for name in model.pair_rows:
@@ -71,11 +71,11 @@ class PairGrip:
     Parameters
     ----------
     input_mm, distance_mm : float
-        Of the drive, and of the pair.
+        Input of the drive, and distance between the probes of the pair.
     grip_n, force_n : float
-        On the part, and at the drive along its direction.
+        Force on the part, and force at the drive along its direction.
     stress_mpa : float
-        Largest in the flexures.
+        Largest stress in the flexures.
     """
 
     input_mm: float
@@ -94,7 +94,7 @@ class GrippedPair:
     Parameters
     ----------
     model : MechanismPlate
-        Of the drawing.
+        Model of the drawing.
     pair : str
         Name of the pair.
     """
@@ -110,7 +110,7 @@ class GrippedPair:
 
     @property
     def mechanical_advantage(self) -> float:
-        """Gripping force on a rigid part per force at the drive, beyond the touch; the remainder bends the flexures.
+        """Gripping force on a rigid part per drive force, after first touch; the remaining drive force bends flexures.
 
         By Betti's theorem, the gripping force N acts on the drive with N times the motion of the pair per unit of
         input.
@@ -124,7 +124,7 @@ class GrippedPair:
         Raises
         ------
         ModelError
-            Where the drive does not move the probes towards each other.
+            If the drive does not move the probes towards each other.
         """
         if not self.per_input:
             raise ModelError(

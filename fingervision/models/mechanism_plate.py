@@ -67,7 +67,7 @@ class MechanismPlate:
         self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, middles)
         self._support()
         if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures) and not self._wanders():
-            # How a strip is held back depends on how it is bent: that is known now.
+            # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
             moved, whole = self.driven.unit_displacement, 0.5 * self.driven.input_stiffness_n_mm
             flexures = (f if f.is_notch else used_in_plate(f, self.plate, moved, whole) for f in mechanism.flexures)
             self.mechanism = replace(mechanism, flexures=tuple(flexures))
@@ -103,7 +103,8 @@ class MechanismPlate:
                                           strict=True):  # fmt: skip
             driven = driven_components(drive)
             if len(driven) == 1 and turns_with(plate, nodes, driven[0]):
-                # The face lies along its drive: its mean is driven, by way of the unknown that weighs most.
+                # The face is parallel to the drive: the drive prescribes the mean motion of the face, through the
+                # unknown with the largest weight.
                 own, weights = dofs[driven[0]][nodes], mean_weights(plate, nodes)
                 chief = int(np.argmax(weights))
                 column[own[chief]] = drive.direction["xy".index(driven[0])] / weights[chief]
@@ -185,7 +186,7 @@ class MechanismPlate:
         return self._seen(input_mm, found, large_rotation=large_rotation)
 
     def drive_states(self) -> tuple[MechanismState, ...]:
-        """Small displacements per 1 mm of one driven face after another, with the others at rest."""
+        """Small displacements per 1 mm of one driven face after another, with all other driven faces at rest."""
         return tuple(self._seen(1.0, found, large_rotation=False) for found in self.driven.by_one_drive())
 
     def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:

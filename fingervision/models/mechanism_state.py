@@ -21,8 +21,8 @@ class MechanismState:
     Parameters
     ----------
     input_mm, force_n : float
-        Input, and the force that does its work: at a single driven face the force along its direction, with several
-        the sum of their forces, each times its motion per 1 mm of input.
+        Input, and the force that does its work: for one driven face, this is the force along its direction; for
+        several, it is the sum of their forces, each times the motion of its face per 1 mm of input.
     probes_mm : dict of str to (float, float)
         Displacements of the probes.
     pairs_mm : dict of str to float
@@ -147,7 +147,7 @@ def changes(mechanism: Mechanism, probes_by: Mapping[str, NDArray[np.float64]]) 
 
 
 def observables(mechanism: Mechanism, probes_by: Mapping[str, NDArray[np.float64]]) -> dict[str, Observable]:
-    """Outputs of a modal model; the first of the k cases of `changes` is 1 mm of input, the others are its modes."""
+    """Outputs of a modal model; the first of the k cases is 1 mm of input, the other cases are the modes."""
     rest_mm = {
         f"{name}_mm": float(np.hypot(*(np.array(mechanism.probes[b]) - mechanism.probes[a])))
         for name, (a, b) in mechanism.pairs.items()

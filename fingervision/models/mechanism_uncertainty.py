@@ -20,7 +20,7 @@ def mechanism_uncertainty(
     """Propagate stated uncertainties to every number of `mechanism_figures`.
 
     Drawings with changed dimensions are computed by the lumped model, or by finite elements if the drawing has no
-    flexures; the same uncertainty is stated for the other kinds of model.
+    flexures; their uncertainty is stated for all kinds of model.
 
     Parameters
     ----------

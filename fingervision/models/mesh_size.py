@@ -19,7 +19,7 @@ _OF_RADIUS = 0.35
 """Largest ratio of edge length to radius of curvature: the sagitta is 1.5 % of the radius, and the quadratic edge
 follows the arc to 1e-5 of the radius."""
 _CLASS = 1.3
-"""Ratio of edge lengths within a group of points, of which only the nearest point is looked up."""
+"""Largest ratio of edge lengths within a group of points; in each group only the nearest point is looked up."""
 _SMALLEST = 1e-4
 """Smallest edge length, as a share of the body's size."""
 _ALONG_NOTCH = 6.0
@@ -52,7 +52,7 @@ class SizeField:
     def at(self, points: Array) -> Array:
         """Edge length at points, shape (2, n)."""
         wanted = np.full(points.shape[1], self.body_mm)
-        # From the finest class on: a coarser one has nothing to say where the wanted length is smaller than its own.
+        # Start with the finest class: a class does not matter at points where the edge length is already below its own.
         for tree, edge in self._classes:
             open_ = np.flatnonzero(wanted > edge.min())
             if open_.size == 0:
@@ -91,9 +91,9 @@ def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField
         others = [other for other in every if id(other) not in neighbours]
         t = curve.t0 + (curve.t1 - curve.t0) * np.linspace(0.0, 1.0, _FIRST_SAMPLES)
         size = _sizes(curve, t, others, across, body_mm, region.size_mm)
-        # Samples as close as the triangles are small, so that a long leaf is fine over its whole length.
+        # Space the samples as closely as the triangles, so that the mesh of a long leaf is fine over its whole length.
         length = _lengths(curve, t)
-        # A short edge beside long ones must be led up to.
+        # The edge length must fall gradually towards a short side between long sides of the outline.
         size = np.clip(np.minimum(size, length[-1]), _SMALLEST * region.size_mm, body_mm)
         count = int(min(2000.0, np.ceil(np.sum(np.diff(length) / np.minimum(size[1:], size[:-1])))))
         if count > _FIRST_SAMPLES:

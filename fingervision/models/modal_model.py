@@ -1,15 +1,16 @@
 """A driven elastic body reduced to its static shape and its natural modes: the basis of all dynamic responses.
 
 The motion u(t) of the drive is prescribed. The body follows u by its static shape s; each mode r of the body with fixed
-drive is excited by the inertia of the static shape (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface
+drive is excited by the inertia of the static shape (Craig and Bampton, 1968, AIAA Journal 6, 1313, with one interface
 unknown):
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = -L_r u''
     force at the drive = k u + m u'' + sum_r L_r q_r''
 
-with L_r = phi_r' M s, k = s' K s and m = s' M s. Damping acts on the motion relative to the static shape. If the drive
-is free to move and pushed by a force f, the modes with free drive vibrate instead; with d_r the motion of the drive in
-mode r:
+with L_r = phi_r' M s, k = s' K s and m = s' M s, where mode r has the coordinate q_r, the shape phi_r, the angular
+frequency w_r and the damping ratio zeta_r, and the body has the mass matrix M and the stiffness matrix K. Damping acts
+on the motion relative to the static shape. If the drive is free to move and pushed by a force f, the modes with free
+drive vibrate instead; with d_r the motion of the drive in mode r:
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = d_r f
 """
@@ -77,7 +78,7 @@ class ModalModel:
         return self.rad_s / (2.0 * pi)
 
     def with_modes(self, count: int) -> "ModalModel":
-        """Keep the first modes only; the contribution of the others then follows the drive without delay."""
+        """Keep the first modes only; the contribution of the remaining modes then follows the drive without delay."""
         observed = {name: replace(seen, by_mode=seen.by_mode[:count]) for name, seen in self.observed.items()}
         return replace(self, rad_s=self.rad_s[:count], participation=self.participation[:count], observed=observed)
 
@@ -107,8 +108,9 @@ class FreeModes:
 def described(damping: Damping, rad_s: Array) -> Array:
     """Damping ratios of the lowest modes, as far as a damping law is valid for them.
 
-    If the ratio leaves the range that is possible for solids, as that of equation (4) does at a few times its reference
-    frequency, the law is used for the modes below that frequency only.
+    A damping law may give ratios that are impossible for solids, as equation (4) of Hricko & Havlik (2015) does at a
+    few times its reference frequency. A damping law is used only for the modes below the frequency at which its ratios
+    become impossible.
 
     Raises
     ------

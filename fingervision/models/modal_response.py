@@ -31,8 +31,8 @@ class Motion:
         Static value of each observed length at each input.
     force_n : ndarray of float, shape (n,)
         Force at the drive, at each sample the mean of the values in the two straight pieces of the history that meet
-        there. The mass that is in no mode adds an impulse where the drive's speed jumps between pieces; it belongs to
-        no sample and is left out.
+        there. The mass that is in no mode adds an impulse where the drive's speed jumps between pieces; this impulse
+        belongs to no sample and is left out.
     inertia_n : ndarray of float, shape (n,)
         Contribution of the vibration to the force.
     damping_ratios : ndarray of float, shape (modes,)
@@ -94,7 +94,7 @@ def _run(model: ModalModel, ratios: Array, time_s: Array, inputs: Array) -> tupl
     rad_s, participation = model.rad_s, model.participation
     steps_s = np.diff(time_s)
     jumps = np.diff(np.diff(inputs) / steps_s, prepend=0.0)
-    # Between the samples the modes are free; where the drive's speed jumps, theirs jump with it.
+    # Between the samples the modes vibrate freely; where the drive's speed jumps, the speeds of the modes jump too.
     state = np.zeros((2, rad_s.size))
     states = np.zeros((inputs.size, 2, rad_s.size))
     powers: dict[int, Array] = {}

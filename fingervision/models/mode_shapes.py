@@ -58,7 +58,7 @@ class ModeShape:
 
 
 class MovingMechanism(Protocol):
-    """Protocol of a mechanism drawn by bodies whose vibration can be computed, because it has masses."""
+    """Protocol of a mechanism, described by its bodies, whose vibration can be computed because it has masses."""
 
     def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
         """First natural modes in the plane: angular frequencies (rad/s), and mode shapes by column."""
@@ -105,7 +105,7 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
     """
     half: DrivenBody = model.half
     lines, points = _lines_of_half(model)
-    # The symmetry axis is no edge of the body.
+    # Leave out lines on the symmetry axis, which is not an edge of the whole body.
     real = np.abs(lines[..., 0]).max(axis=1) > 1e-9 * float(np.abs(lines).max())
     lines, points = lines[real], points[real]
     families: tuple[tuple[str, Solve, float], ...] = (
@@ -118,7 +118,8 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
         rad_s, shapes = _wanted_modes(solve, wanted, half.free.size)
         for number, (angular, shape) in enumerate(zip(rad_s, shapes.T, strict=True), 1):
             shift = _scaled(lines, shape[points], mirrored=mirror > 0.0)
-            # The left half mirrors the right one; where both sway the same way its motion is turned round.
+            # The left half mirrors the right half; for swaying modes, the motion of the left half has the opposite
+            # sign.
             flip = np.array([-1.0, 1.0])
             both = np.concatenate([lines, flip * lines]), np.concatenate([shift, mirror * flip * shift])
             swing = min(1.0, _way_to_meeting(lines[..., 0], -shift[..., 0])) if mirror > 0.0 else 1.0
@@ -127,7 +128,7 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
 
 
 def mechanism_mode_shapes(model: MovingMechanism, wanted: ModesWanted) -> list[ModeShape]:
-    """Modes of a mechanism drawn by bodies, with the drive free or fixed."""
+    """Modes of a mechanism that is described by its bodies, with the drive free or fixed."""
     lines, points = model.mode_lines()
     found = []
     for family, held in (("drive free", False), ("drive held", True)):

@@ -24,8 +24,8 @@ MODES = 8
 """Number of modes with the drive held. The ninth mode of the published sample is at 9.6 kHz and has a tenth of a per
 cent of the moving mass."""
 _MOST_STEPS, _MOST_UNKNOWNS = 20_000, 400
-"""Most time steps and unknowns that are integrated step by step: these take at most half a minute, and are those of a
-frame of bars."""
+"""Largest number of time steps, and of unknowns, for an integration step by step: it then takes at most half a minute,
+and only frames of bars have so few unknowns."""
 _FAST = 0.05
 """Largest vibration that still counts as small beside the motion that deforms the shape, as a share of the gap's
 travel."""
@@ -74,8 +74,9 @@ def gripper_motion(
     """Compute the motion over a drive history; each run begins at rest at its first input.
 
     With small displacements the modes' equations are solved exactly. With large rotation or contact, a frame of bars is
-    integrated in time steps if at most 20 000 steps are needed. Otherwise the gripper follows its equilibria, and the
-    modes at rest vibrate about them while the fingers do not touch, which is valid for small vibrations.
+    integrated in time steps if at most 20 000 steps are needed. If more steps are needed, or the model is no frame of
+    bars, the modes of the gripper at rest are superposed on its equilibria while the fingers do not touch. The
+    superposition of modes on equilibria is valid for small vibrations.
 
     Parameters
     ----------
@@ -114,16 +115,18 @@ def gripper_motion(
     travel = float(np.ptp(answer.gap_mm))
     if small.vibration_mm(GAP) > _FAST * travel:
         raise ModelError(
-            f"With large rotation or contact this drive must be shorter than {_MOST_STEPS * step_s:.3g} s (a frame of "
-            f"bars, --kind lumped), or make the gap vibrate by at most {_FAST:g} of its travel of {travel:.3g} mm, but "
-            f"the drive takes {sum(spans_s):.3g} s and the gap vibrates by {small.vibration_mm(GAP):.3g} mm; shorten "
-            "the drive, slow it down or leave --large-rotation and --contact off."
+            f"With large rotation or contact this drive must be shorter than {_MOST_STEPS * step_s:.3g} s (with --kind "
+            f"lumped, a frame of bars), or make the gap vibrate by at most {_FAST:g} of its travel of {travel:.3g} mm, "
+            f"but the drive takes {sum(spans_s):.3g} s and the gap vibrates by {small.vibration_mm(GAP):.3g} mm; "
+            "shorten the drive, slow it down or leave --large-rotation and --contact off."
         )
     onset_mm = contact_onset_mm(model.half, model.physics) if model.physics.contact else None
     apart = np.ones_like(force, dtype=bool) if onset_mm is None else drive.input_mm > onset_mm
     motion = about_equilibria(small, static, force, apart)
     return GripperMotion(
-        motion, f"equilibria, and about them {small.modes_hz.size} modes at rest where the fingers do not touch"
+        motion,
+        f"equilibria, with {small.modes_hz.size} modes of the gripper at rest superposed where the fingers do not "
+        "touch",
     )
 
 

@@ -1,7 +1,7 @@
 """Place the nodes inside a body: seeded by the size field, moved by forces along the edges, settled at circumcentres.
 
 Sources: Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329; Alliez et al., Variational
-tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane.
+tetrahedral meshing, ACM Transactions on Graphics 24 (2005) 617, in the plane.
 """
 
 import numpy as np
@@ -46,7 +46,7 @@ def seeded_nodes(region: PlanarRegion, field: SizeField, outline: Array) -> Arra
         share = (side / (_OF_SQUARE * wanted[done])) ** 2
         found.append(centres[:, done][:, random.random(share.size) < share])
         rest = centres[:, ~done]
-        # Squares that lie wholly outside are dropped where their middle is far from the outline and not inside.
+        # Drop squares whose centre is outside the body and far from the outline.
         near = tree.query(rest.T)[0] < 1.5 * side + 2.0 * wanted[~done] if rest.size else np.zeros(0, dtype=bool)
         rest = rest[:, near | region.holds(rest)]
         side *= 0.5
@@ -110,7 +110,7 @@ def _mended(points: Array, bad: Indices, fixed: int) -> Array | None:
     inner = np.unique(bad[bad >= fixed])
     if inner.size == 0:
         return None
-    # One of neighbouring nodes at a time.
+    # Remove only one of several neighbouring nodes.
     taken: list[int] = []
     for place in inner.tolist():
         beside = bad[:, np.any(bad == place, axis=0)]
@@ -126,7 +126,7 @@ def _settled(points: Array, triangles: Indices, fixed: int) -> Array:
     twice = ab[0] * ac[1] - ab[1] * ac[0]
     ab2, ac2 = np.sum(ab**2, axis=0), np.sum(ac**2, axis=0)
     centre = a + np.stack([ac[1] * ab2 - ab[1] * ac2, ab[0] * ac2 - ac[0] * ab2]) / (2.0 * twice)
-    # Of a flat triangle the circumcentre lies far off: its centroid is taken.
+    # The circumcentre of a flat triangle lies far outside: use the centroid instead.
     flat = triangle_quality(points, triangles) < 0.5
     centre = np.where(flat, (a + b + c) / 3.0, centre)
     weight = np.abs(twice)

@@ -70,10 +70,11 @@ class Notch:
     def stations_mm(self, pieces: int) -> Array:
         """Ends of pieces along the notch, more densely where it bends; shape (pieces + 1,), symmetric about the middle.
 
-        Each piece contributes the same amount to the mean of two fractions: that of the bending compliance (the
-        integral of 1 / h^3) and that of the length.
+        Each piece contributes the same amount to the mean of two fractions: the fraction of the bending compliance (the
+        integral of 1 / h^3 for the height h) and the fraction of the length.
         """
-        # x = a tan-like spacing near the neck: the bending part is sqrt(t R) long, and must be sampled finely.
+        # Space the points by a sinh, closest at the neck: the part that bends is sqrt(t R) long and must be sampled
+        # finely.
         fine = np.sinh(np.linspace(0.0, np.arcsinh(20.0 * self.reach_mm / self._bending_mm), _FINE))
         x = self.reach_mm * fine / fine[-1]
         middle = 0.5 * (x[1:] + x[:-1])
@@ -93,7 +94,7 @@ class Notch:
         return min(sqrt(self.thickness_mm / self.depth_mm), 1.0)
 
     def height_mm(self, x_mm: Array) -> Array:
-        """Height h(x) = t + 2 c (1 - sqrt(1 - x^2 / a^2))."""
+        """Height t + 2 c (1 - sqrt(1 - x^2 / a^2)), with thickness t and half axes a (along) and c (across)."""
         along = np.clip(1.0 - (x_mm / self.half_length_mm) ** 2, 0.0, 1.0)
         return np.asarray(self.thickness_mm + 2.0 * self.depth_mm * (1.0 - np.sqrt(along)))
 

@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 Array = NDArray[np.float64]
 
 _WITHIN = 1e-9
-"""Relative tolerance beyond a curve's ends within which it is still met, so that curves that share a corner meet
-there."""
+"""Relative tolerance beyond a curve's ends within which a point counts as on the curve, so that curves that share a
+corner meet there."""
 _SAMPLES = 181
 """Samples along an arc at which crossings of two arcs are searched: crossings closer than 2 degrees are not
 separated."""
@@ -82,7 +82,7 @@ class Curve:
     def level(self, points: Array) -> Array:
         """Signed distance of points from the extended curve (line or whole ellipse), zero on the curve; shape (n,).
 
-        For a line this is the distance in mm; for an ellipse, the squared relative radius minus 1.
+        For a line, the value is the distance in mm; for an ellipse, it is the squared relative radius minus 1.
         """
         apart = points - self.origin[:, None]
         if self.v is None:
@@ -106,7 +106,7 @@ def crossings(curve: Curve, other: Curve) -> list[float]:
     """Parameters of a curve, strictly between its ends, at which it meets another curve or the end of another curve."""
     found = _meetings(curve, other)
     for corner in (other.start_mm, other.end_mm):
-        # Curves that lie on each other are divided at each other's ends.
+        # Where two curves coincide, each is divided at the ends of the other.
         found += _on_curve(curve, corner)
     low, high = sorted((curve.t0, curve.t1))
     margin = _WITHIN * (high - low)

@@ -43,7 +43,7 @@ def divided_outline(region: PlanarRegion, field: SizeField) -> list[OutlineSide]
 def _stations(curve: Curve, field: SizeField) -> Array:
     """Parameters that divide a curve into edges of the length that the size field requires."""
     t = np.linspace(curve.t0, curve.t1, 60)
-    for _ in range(2):  # the second time the samples lie as close as the edges are short
+    for _ in range(2):  # the second round takes four samples per edge
         at = curve.at(t)
         length = np.hypot(*np.diff(at, axis=1))
         edge = field.at(at)

@@ -146,7 +146,7 @@ def _figures(model: LumpedGripper) -> dict[str, float]:
 def mechanism_sweep_answers(
     redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
 ) -> tuple[Array, tuple[str, ...], Array]:
-    """Compute the responses for every combination of the varied dimensions of a mechanism drawn by bodies.
+    """Compute the responses for every combination of the varied dimensions of a mechanism.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def mechanism_sweep_answers(
     if len(grid) > _MOST_MECHANISMS:
         raise UsageError(f"--vary must give at most {_MOST_MECHANISMS} mechanisms, but gives {len(grid)}.")
     rows: list[dict[str, float]] = []
-    # The corners of the grid come first: where they are no mechanisms, nothing has been waited for.
+    # Check the corners of the grid first, so that an invalid corner is reported before anything is computed.
     corners = list(product(*((v.values[0], v.values[-1]) for v in variations)))
     for values in [*corners, *grid]:
         try:

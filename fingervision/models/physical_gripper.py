@@ -1,4 +1,4 @@
-"""A drawn gripper for the diagnosis: its small-displacement response, and the laws for effects of the catalogue.
+"""A drawn gripper for the diagnosis: its small-displacement response, and its own formulas for effects.
 
 Expensive parts (large rotation, contact, changed links) are computed once and interpolated, so that a search may
 evaluate them thousands of times.
@@ -65,9 +65,11 @@ class PhysicalGripper:
 
     @cached_property
     def laws(self) -> Mapping[str, PhysicalLaw]:
-        """Laws of the catalogue's effects that this drawing determines, by the name of the effect."""
+        """Formulas for those effects of the catalogue that the drawing determines, by the name of the effect."""
         body = getattr(self._model, "half", None)
-        if not isinstance(body, DrivenBody):  # a model of small displacements alone: the frame of the same members
+        if not isinstance(
+            body, DrivenBody
+        ):  # for a model limited to small displacements, take a frame of the same members
             body = half_frame(self.gripper, skeleton_of(self.gripper, self.theory, 0))
         length_mm = self.gripper.lever.l2_mm
         lever = ratio_curves(
@@ -85,7 +87,7 @@ class PhysicalGripper:
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may change them within it."""
+        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may change them."""
         return {
             name: Estimate(attrgetter(name)(self.gripper), u)
             for name, u in self.gripper.uncertainties.items()

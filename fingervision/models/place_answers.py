@@ -104,7 +104,7 @@ class PlaceAnswers:
         return (*bodies, *hinges, *probes, *(f"{name}_mm" for name in self.mechanism.pairs), "force_n")
 
     def _make_observers(self) -> None:
-        """Express the outputs as linear functionals of the frames' motions; hinge angles are derived from these."""
+        """Express the outputs as linear functionals of the frames' motions; hinge angles from body rotations."""
         model, plate = self.model, self.model.plate
         self._weights = body_weights(plate, model.bodies)
         size = model.frame.unknowns
@@ -135,7 +135,7 @@ class PlaceAnswers:
                 moved = np.zeros(size)
                 moved[dof] = _UNIT
                 own[:2, dof] = np.array(assembly.motion_mm(moved, point, large=False)) / _UNIT
-            # The body's own turn carries a probe that sits elsewhere.
+            # The rotation of the body moves a probe that is displaced from its drawn position.
             own[2] = self._turn_of(number)
             self._probe_of[name] = number, own
 
@@ -168,8 +168,8 @@ class PlaceAnswers:
     def by_edges(self) -> Array:
         """Extra change of each channel per 1 mm of input if the poses are measured from edges, shape (channels,).
 
-        If a body bends, the mean motion of its outline differs from that of its area. In a picture only the edges are
-        seen: their pose is the rigid motion nearest to the displacements of the edges along their normals.
+        If a body bends, the mean motion of its outline differs from that of its area. A picture shows only the edges of
+        a body: the pose of the edges is the rigid motion nearest to their displacements along their normals.
         """
         model, plate = self.model, self.model.plate
         moved = model.driven.equilibrium(1.0, large_rotation=False, contact=False).displacement
@@ -227,7 +227,7 @@ class PlaceAnswers:
         mechanism, span = self.mechanism, self.model.spans[flexure]
         changed = replace(span, flexure=replace(span.flexure, thickness_mm=thickness_mm))
         own = changed.compliances(mechanism.plate_mm, mechanism.material, self.model.theory, width_effect=True)
-        # The stations follow the thickness; the segments stay where they are, and keep their number.
+        # The compliances are those of the changed thickness; the segments keep their ends and their number.
         return np.asarray(own)
 
     def answer(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
@@ -243,7 +243,7 @@ class PlaceAnswers:
         arms = np.eye(size)
         for flexure, (x, y) in changes.moved_mm.items():
             for node in model.assembly.ends[flexure]:
-                # The body's own frame stays; what the flexure holds is the end of a rigid arm.
+                # The body's coordinate frame stays in place; the flexure is joined to the end of a rigid arm.
                 arms[3 * node, 3 * node + 2], arms[3 * node + 1, 3 * node + 2] = y, -x
         for body in model.assembly.bodies:
             dofs = body.unknowns
@@ -258,7 +258,7 @@ class PlaceAnswers:
         moved[:, 0] += unit
         observe = self._observer(arms, changes)
         seen = observe @ moved
-        # The drive's force: of the motion itself, and of a slip with the drive held.
+        # Force at the drive: from the input, and from a slip with the drive held.
         seen[-1] = unit @ (stiffness @ moved - np.column_stack([np.zeros(size), loads]))
         count = len(self.mechanism.flexures)
         by_slip = seen[:, 1:].reshape(seen.shape[0], count, 2).transpose(1, 0, 2).copy()
@@ -277,7 +277,8 @@ class PlaceAnswers:
             ).stiffness_n_mm()
             node = int(frame.ends[element, 1])
             at = [3 * node, 3 * node + 1]
-            # The element ends short of its node by the slip: its force on the node is that of a shorter way.
+            # The displacement of the element's end is that of the node minus the slip, so that a unit slip loads the
+            # node by the element's stiffness.
             block = alone[:, at].toarray()
             loads.append(block)
             own.append(block[at])

@@ -50,7 +50,7 @@ def inner_triangles(region: PlanarRegion, points: Array) -> Indices:
 def edges_of(triangles: Indices) -> Indices:
     """Every edge of the triangles, listed once; shape (2, k)."""
     pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
-    # As single numbers pairs sort ten times as fast.
+    # Pairs coded as single numbers are sorted ten times as fast.
     count = int(triangles.max()) + 1
     return np.asarray(np.stack(np.divmod(np.unique(pairs[0] * count + pairs[1]), count)))
 

@@ -149,7 +149,7 @@ class PlaneStressPlate:
         return csr_matrix(skfem.BilinearForm(inertia).assemble(self._basis))
 
     def internal_force_n(self, displacement_mm: Array) -> tuple[csr_matrix, Array]:
-        """Tangent stiffness and nodal forces of the deformed plate (total Lagrangian, St. Venant-Kirchhoff).
+        """Tangent stiffness and nodal forces of the deformed plate (total Lagrangian, Saint Venant-Kirchhoff).
 
         Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, chapters 6 and 9.
         """
@@ -164,12 +164,12 @@ class PlaneStressPlate:
             part[..., 0, :], part[..., 1, :], part[..., 2, :] = fx * dx, fy * dy, fx * dy + fy * dx
         stressed = self._law @ strains
         stressed *= weights[..., None, None]
-        # All points of a triangle in one product.
+        # One matrix product covers all quadrature points of a triangle.
         along = strains.reshape(triangles, 3 * points, 12)
         elements = np.swapaxes(along, 1, 2) @ stressed.reshape(triangles, 3 * points, 12)
         if not displacement_mm.any():
             return self._assembled(elements, at_rest=True), np.zeros(self.unknowns)
-        # The stress that is there already resists a turn: slope, stress, slope.
+        # Geometric stiffness: present stress resists rotation (product of shape slopes, stress and shape slopes).
         sx, sy, txy = (stress[..., k, None] * weights[..., None] for k in range(3))
         pulled = np.stack([sx * dx + txy * dy, txy * dx + sy * dy], axis=2)
         flat = slopes.reshape(triangles, 2 * points, 6)

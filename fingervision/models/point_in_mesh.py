@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _NEWTON = 5
-"""Steps on elements with a curved edge; the residual squares in each."""
+"""Newton steps on elements with a curved edge; each step squares the relative residual."""
 
 
 def element_weights(nodes_mm: Array, triangles: Indices, point: tuple[float, float]) -> tuple[Indices, Array]:
@@ -23,14 +23,14 @@ def element_weights(nodes_mm: Array, triangles: Indices, point: tuple[float, flo
     triangles : ndarray of int, shape (6, m)
         Corners, then the middles of edges first to second, second to third, first to third.
     point : (float, float)
-        Inside the body, or on its outline.
+        A point inside the body, or on its outline.
 
     Returns
     -------
     nodes : ndarray of int, shape (6,)
-        Of the element.
+        Nodes of the element.
     weights : ndarray of float, shape (6,)
-        Of the values at its nodes; their sum is 1.
+        Weights of the values at these nodes; their sum is 1.
     """
     a, b, c = (nodes_mm[:, row] for row in triangles[:3])
     p = np.array(point, dtype=np.float64)[:, None]

@@ -1,6 +1,7 @@
 """Table 1 of Hricko & Havlik (2015): the two published models and the only measurement of the real gripper.
 
-Source: Am. J. Mech. Eng. 3(6) 2015, 201-206, table 1, with the digits as printed. Nothing is fitted to these values.
+Source: American Journal of Mechanical Engineering 3(6), 2015, 201-206, table 1, with the digits as printed. No
+parameter of a model is fitted to the table.
 """
 
 import numpy as np

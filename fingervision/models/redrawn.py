@@ -30,7 +30,7 @@ def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
     record: Any = getattr(gripper, section, None)
     old = getattr(record, key, None)
     if not isinstance(old, float):
-        raise DataError(f"A number of the drawing must be named as in gripper.toml, but is {name}.")
+        raise DataError(f"A dimension of the drawing must have its name in gripper.toml, but is named {name}.")
     parts: dict[str, Any] = {section: replace(record, **{key: old + by})}
     changed = replace(gripper, **parts)
     lever, links = changed.lever, changed.links

@@ -30,9 +30,9 @@ class BodyPose:
 def rigid_motion(places_mm: Array, moved_mm: Array, weights: Array, about_mm: Array, *, large: bool) -> BodyPose:
     """Fit the rigid motion that leaves the smallest weighted sum of squared distances.
 
-    For large displacements the rotation is that of Kabsch (1976), Acta Crystallographica A 32, 922, DOI
-    10.1107/S0567739476001873, in the plane. For small displacements the linear part of that rotation is used, so that
-    the pose is proportional to the displacements.
+    For large displacements, the rotation is computed by the method of Kabsch (1976), Acta Crystallographica A 32, 922,
+    DOI 10.1107/S0567739476001873, in the plane. For small displacements, the rotation is linearised, so that the pose
+    is proportional to the displacements.
 
     Parameters
     ----------

@@ -11,8 +11,9 @@ Array = NDArray[np.float64]
 def contact_forces_n(compliance_mm_n: Array, free_gap_mm: Array) -> Array:
     """Find the forces that keep every point on its side of the plane.
 
-    Solves gap = free_gap + C force with gap >= 0, force >= 0, gap * force = 0. The forces f minimise f' C f / 2 + g' f
-    over f >= 0, a quadratic programme; with C = L L' it is solved as a non-negative least-squares problem.
+    With the compliance matrix C, the equation gap = free_gap + C force is solved for gap >= 0, force >= 0, gap * force
+    = 0. The forces f minimise f' C f / 2 + g' f over f >= 0, with the free gap g. This quadratic programme is solved as
+    a non-negative least-squares problem, by the factorisation C = L L'.
 
     Parameters
     ----------

@@ -122,7 +122,8 @@ class _Tree:
         along = (edges - edges[0]) / (edges[-1] - edges[0])
         points = np.array(start) + np.outer(along, np.subtract(end, start))
         for place, span in enumerate(pairwise(edges.tolist())):
-            # Each segment has its integral, so that however few and long they are, thin necks are as soft as they are.
+            # Each segment has the exact integral of its compliance, so that thin necks are right with any number of
+            # segments.
             part = root[:, None] * beam_compliance(notch, material, span) * root
             height = float(notch.height_mm(np.array([0.5 * (span[0] + span[1])]))[0])
             a, b = points[place].tolist(), points[place + 1].tolist()
@@ -180,7 +181,7 @@ def skeleton_of(
             f"y = {cross_y:g} mm, but the hinges reach from y = {lower1[1]:g} to "
             f"{max(upper1[1], upper2[1]):g} mm; take --kind finite_element."
         )
-    # A notch may reach into the cross bar: the root then begins where it ends.
+    # A notch may reach into the cross bar: the root then begins where the notch ends.
     beam_low = max(beam_low, upper1[1] + _LEAST_BAR * (cross_y - upper1[1]))
 
     def link(parent: int, start: PointMm, end: PointMm, name: str, width_mm: float) -> int:
@@ -217,7 +218,7 @@ def skeleton_of(
     tip = links.tip_polygon_mm
     tip_low = min(y for _, y in tip)
     below = _at_height(links.finger_mm, tip_low)
-    # Within the cross bar the finger is part of it, and does not bend.
+    # Within the cross bar, the finger is part of the cross bar and does not bend.
     leaves = _at_height(links.finger_mm, min(cross_y + links.cross_bar_width_mm / 2.0, tip_low))
     within_mm2 = links.finger_width_mm * float(np.hypot(*np.subtract(leaves, foot)))
     at = tree.rigid(at, foot, leaves, "finger's foot", within_mm2, links.finger_width_mm)

@@ -80,7 +80,7 @@ def _right_and_force(body: DrivenBody, physics: Physics, inputs: Array) -> tuple
     right = body.measured_rest_mm + 0.5 * gap_per_input(body) * inputs
     force = body.equilibrium(1.0).force_n * inputs
     if touch_mm is not None and np.any(inputs < touch_mm):
-        # Linear complementarity: the answer is made of straight pieces, bent where another point touches.
+        # Linear complementarity: the response is piecewise linear, with a kink where another point touches.
         at = np.linspace(float(inputs.min()), touch_mm, _SAMPLES_BEYOND_TOUCH)
         _, pressed, pull = _curve(body, [body.equilibrium(value, contact=True) for value in at.tolist()])
         beyond = inputs < touch_mm
@@ -103,7 +103,7 @@ def _large(body: DrivenBody, inputs: Array, touch_mm: float | None) -> tuple[Arr
     at, right, force = _curve(body, free)
     answer = CubicSpline(at, right)(inputs), CubicSpline(at, force)(inputs)
     if touching:
-        # Contact bends the curve sharply where the tip first touches; beyond, it is straight to a part in 1000.
+        # The curve has a kink where the tip first touches; beyond first touch, the curve is straight within 1 in 1000.
         beyond = inputs < at[0]
         pressed = _curve(body, [*touching[::-1], free[0]])
         for smooth, curve in zip(answer, pressed[1:], strict=True):

@@ -38,8 +38,8 @@ def weight_displacement_mm(body: DrivenBody, direction: tuple[float, float], *, 
 def thermal_displacement_mm(body: DrivenBody, strain: float, held_mm: Array) -> tuple[Array, Array]:
     """Displacements and nodal forces under a uniform thermal strain.
 
-    A free body expands without stress, each node by `strain` times its position x: K (u - strain x) = 0 at every
-    unknown that is not fixed.
+    A free body expands without stress, each node by `strain` times its position x. The displacements u therefore
+    satisfy K (u - strain x) = 0 at every unknown that is not fixed, with K the stiffness matrix.
 
     Parameters
     ----------

@@ -19,7 +19,8 @@ _PENALTY = 20.0
 """Ratio of each face point's contact stiffness to the finger's own stiffness: under a grip of 1 N the face penetrates
 by a twentieth of the finger's own deflection (0.02 mm for the published sample)."""
 _A_PERIOD = 60
-"""Time steps per period of the lowest mode: the gap is then within 0.1 % of its travel of the exact modal solution."""
+"""Time steps per period of the lowest mode: the difference of the gap from the exact modal solution is then below 0.1 %
+of the gap's travel."""
 _RESOLVED_MODES = 3
 """Number of modes that the time step resolves. The third mode of the published sample has six times the frequency of
 the first: ten steps per period."""
@@ -61,7 +62,7 @@ def stepped_motion(
         drive jumps between straight pieces of its history.
     """
     usual_s = float(np.median(np.diff(drive.time_s))) if drive.time_s.size > 1 else step_s
-    # Steps that divide the samples' spacing put the kinks of the drive at their ends.
+    # The steps divide the spacing of the samples, so that kinks of the drive history lie at the ends of steps.
     step_s = usual_s / np.ceil(usual_s / step_s)
     steps = max(1, int(np.ceil((drive.time_s[-1] - drive.time_s[0]) / step_s - 1e-9)))
     time_s = drive.time_s[0] + np.arange(steps + 1) * step_s
@@ -105,9 +106,10 @@ def stepped_motion(
 def _drag(body: DrivenBody, damping: Damping) -> csr_matrix:
     """Damping matrix for motion relative to the static shape.
 
-    The matrix is B = M Phi diag(2 zeta w) Phi' M for the modes that the damping law describes and the time step
-    resolves. The remaining stiffness is damped in proportion, so strongly that the other modes follow the drive without
-    delay, as in `modal_model`.
+    For the modes that the damping law describes and the time step resolves, the damping matrix is M Phi diag(2 zeta w)
+    Phi' M, with the mass matrix M, the mode shapes Phi, the damping ratios zeta and the angular frequencies w. For all
+    other modes, damping is proportional to their stiffness, and so strong that they follow the drive without delay, as
+    in `modal_model`.
     """
     model, ratios = gripper_modes(body, _RESOLVED_MODES).damped(damping)
     rad_s, shapes = body.modes(drive_held=True, count=_RESOLVED_MODES + 1)

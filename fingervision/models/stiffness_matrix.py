@@ -1,13 +1,21 @@
 """Stiffness-matrix model of the gripper: equations (5) to (15) of Hricko & Havlik (2015) in six dimensions, corrected.
 
-Corrections of the published equations, each with its reason:
+The published equations are corrected for these reasons:
 
-* Equation (6) transforms six components, but (3) is a planar compliance of three; here all compliances are 6 by 6.
-* (10) gives 135.15 degrees and (13) 135 degrees for what one drawing must state once; the angles come from the drawing.
-* (12) uses T_12, which is never defined; it must carry the compliance from O1 to O2, as T_O2 does.
-* (14) has C_2A on both sides; the right-hand one must be C_12.
-* (15), K = 2 C^-1, holds for the entry along the drive only while the shuttle is kept from moving sideways and
-  rotating, which the other half does: 2 (C^-1)_yy, instead of 2 / C_yy of a free shuttle.
+* Equation (6) of the paper transforms six components, but its equation (3) is a planar compliance with three
+  components; in this module,
+  all compliances are 6 by 6.
+* Equation (10) of the paper uses 135.15 degrees and equation (13) 135 degrees for the same angle; in this module, the
+  angles come
+  from the drawing.
+* Equation (12) of the paper uses T_12, which is not defined there; T_12 must transfer the compliance from O1 to O2, as
+  T_O2
+  does.
+* Equation (14) of the paper has C_2A on both sides; on the right-hand side it must be C_12.
+* Equation (15) of the paper, K = 2 C^-1, gives the stiffness along the drive only if the shuttle cannot move sideways
+  or rotate. The
+  other half of the gripper prevents these motions of the shuttle, so that the stiffness is 2 (C^-1)_yy; for a free
+  shuttle, the stiffness would be 2 / C_yy.
 
 The links are elastic too, as Timoshenko bars; `rigid_links` gives the published model with elastic hinges only, which
 for the published gripper has a 0.9 % larger slope and about 10 % more force.
@@ -82,14 +90,14 @@ class StiffnessMatrixGripper:
 
     @cached_property
     def drive_compliance(self) -> Array:
-        """Compliance C_2A of one half at O_A, equation (14), shape (6, 6)."""
+        """Compliance C_2A of one half at the drive point O_A: equation (14) of Hricko & Havlik (2015), (6, 6)."""
         return self._chain.flexibility(self.skeleton.drive, self.skeleton.drive)
 
     @cached_property
     def drive_stiffness(self) -> Array:
-        """Stiffness K_2A of both halves at O_A with every direction fixed, equation (15), shape (6, 6).
+        """Stiffness K_2A of both halves at the drive point: equation (15) of Hricko & Havlik (2015), shape (6, 6).
 
-        Entries that change sign under reflection cancel between the halves.
+        Every direction is fixed. Entries that change sign under reflection cancel between the halves.
         """
         mirror = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
         half = np.linalg.inv(self.drive_compliance)
@@ -149,7 +157,7 @@ class StiffnessMatrixGripper:
             if weight_n > 0.0:
                 load = np.zeros(6)
                 load[_Z] = weight_n
-                # The weight acts at the member's middle, half its length short of its end.
+                # The weight acts at the middle of the member, half a length before the member's end.
                 load[_ABOUT_X] = -0.5 * (member.end_mm[1] - member.start_mm[1]) * weight_n
                 load[_ABOUT_Y] = 0.5 * (member.end_mm[0] - member.start_mm[0]) * weight_n
                 sag += self._held_flexibility(self.skeleton.measured, place, held) @ load
@@ -221,7 +229,7 @@ def _lifted_mass(member: Member, plate_mm: float) -> Array:
     along = axis / length
     turn = np.array([along, [-along[1], along[0]]])
     about_axis, about_side = (member.width_mm**2 + plate_mm**2) / 12.0, (length**2 + plate_mm**2) / 12.0
-    # The middle lies half the axis behind the end: z of it is z + y about_x - x about_y.
+    # The middle lies half an axis length before the end; its displacement along z is z + y about_x - x about_y.
     middle = np.array([1.0, -0.5 * axis[1], 0.5 * axis[0]])
     mass = np.outer(middle, middle)
     mass[1:, 1:] += turn.T @ np.diag([about_axis, about_side]) @ turn

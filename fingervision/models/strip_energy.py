@@ -1,8 +1,9 @@
-"""Load on a leaf or straight neck: bent by ends that rotate against each other, by ends that sway, or stretched.
+"""Load on a leaf or straight neck: bending with ends that rotate against each other or that sway, and stretching.
 
-The plate's width restrains these three deformations differently (`strip_width`). The strain energies of a bar whose
-ends move by rotations, a chord's rotation and an elongation are E I / 2 L times the squares below (Timoshenko, Strength
-of Materials). Only the fractions of these energies are needed, which hardly change when the bar is restrained.
+The plate's width restrains rotation of the ends, sway and stretching differently (`strip_width`). The strain energies
+of a bar follow from the rotations of its ends, the rotation of its chord and its elongation (Timoshenko, Strength of
+Materials): each is E I / (2 L) times a square, see `used_in_plate`. The models need only the fractions of the three
+strain energies, and restraint of the bar hardly changes these fractions.
 """
 
 from dataclasses import replace
@@ -17,9 +18,10 @@ from fingervision.models.plane_stress import PlaneStressPlate
 Array = NDArray[np.float64]
 
 _ACROSS = 0.4
-"""Of the thickness: two points that far from the axis tell a section's rotation."""
+"""Distance from the axis, as a share of the thickness, of the two points that define a section's rotation."""
 _LEAST = 1e-3
-"""Of the whole strain energy: what a strip with less is taken for changes the force by less than 1e-4."""
+"""Share of the whole strain energy below which a strip keeps its assumed fractions; these then change the force by less
+than 1e-4."""
 
 
 def used_in_plate(flexure: Flexure, plate: PlaneStressPlate, moved: Array, whole_n_mm: float) -> Flexure:

@@ -1,9 +1,9 @@
-"""Effect of its width on the bending stiffness of a flat strip: a plate clamped at two sides, free at the others.
+"""Effect of its width on the bending stiffness of a flat strip: a plate with two clamped and two free sides.
 
 A bar in bending becomes narrower on the stretched side and wider on the compressed side, and so also curves across its
-length (anticlastic bending). The bodies at its ends prevent this over a length of about its width. The plate's energy
-(Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, article 22) is minimised by Ritz's method for a unit
-rotation of one end.
+length (anticlastic bending). The bodies at the ends of a strip prevent anticlastic bending over a length of about the
+strip's width. The plate's energy (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, article 22) is
+minimised by Ritz's method for a unit rotation of one end.
 """
 
 from functools import lru_cache
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _ALONG, _ACROSS = 9, 6
-"""Terms of Ritz's method along and across the strip: half as many again change the share by less than 0.01 for widths
-of a tenth to twenty times the length."""
+"""Terms of Ritz's method along and across the strip: 50 % more terms change the share by less than 0.01 for widths of a
+tenth to twenty times the length."""
 _NARROW = 0.1
 """Ratio of width to length below which the share is proportional to the width, because the bodies restrain a length
 equal to the width."""
@@ -25,7 +25,7 @@ _DIGITS = 3
 
 
 def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]:
-    """Weight w of plane strain in a strip's bending, 0 if narrow and 1 if wide: E' = E / (1 - w nu^2).
+    """Weight w of plane strain in a strip's bending, 0 if narrow, 1 if wide; the modulus is E / (1 - w nu^2).
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _stretched(log_width: float, poisson: float) -> float:
     energy = (stretch * weights) @ stretch.T + (narrowing * weights) @ narrowing.T + law * (shear * weights) @ shear.T
     mixed = poisson * (stretch * weights) @ narrowing.T
     pull = (stretch + poisson * narrowing) @ weights
-    # The stretch itself is uniform; what is added to it makes the energy least.
+    # The displacements that are added to a uniform stretch minimise the energy.
     stiffness = (width - pull @ np.linalg.lstsq(energy + mixed + mixed.T, pull, rcond=None)[0]) / width
     stiffness /= 1.0 - poisson**2
     return float(np.clip((1.0 - 1.0 / stiffness) / poisson**2, 0.0, 1.0))
@@ -97,7 +97,8 @@ def _shares(log_width: float, poisson: float) -> tuple[float, float]:
     width = float(np.exp(log_width))
     x, x_weights = (0.5 * (part + 1.0) if i == 0 else 0.5 * part for i, part in enumerate(legendre.leggauss(24)))
     y, y_weights = legendre.leggauss(24)
-    # Along: nothing moves or turns at the ends; across: even polynomials.
+    # Along the strip, the functions have no displacement and no slope at the ends; across it, they are even
+    # polynomials.
     clamped = poly.polymul([0.0, 0.0, 1.0], poly.polypow([1.0, -1.0], 2))
     along = [poly.polymul(clamped, _shifted(m)) for m in range(_ALONG)]
     across = [legendre.leg2poly(np.eye(2 * _ACROSS)[2 * n]) for n in range(_ACROSS)]
@@ -114,7 +115,7 @@ def _shares(log_width: float, poisson: float) -> tuple[float, float]:
     mixed = poisson * np.einsum("axy,bxy,xy->ab", xx, yy, weights)
     energy += mixed + mixed.T
     found = []
-    # The curvature of a bar, even all along or turning back in the middle.
+    # Curvature of a bar: uniform, or with a change of sign in the middle.
     for curvature in (np.ones(x.size), 1.0 - 2.0 * x):
         pull = np.einsum("axy,xy->a", (xx + poisson * yy) * curvature[:, None], weights)
         bar = width * float(x_weights @ curvature**2)

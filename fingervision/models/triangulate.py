@@ -2,9 +2,9 @@
 
 The outline is divided by the size field and stays fixed. Inner nodes start on squares of the required size and move
 under forces along the edges (Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329), are
-triangulated again as they move, and end at the area-weighted mean of their triangles' circumcentres (Alliez et al.,
-Variational tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane). Midside nodes lie on the arcs of the
-outline.
+triangulated again as they move, and are finally placed at the area-weighted mean of their triangles' circumcentres
+(Alliez et al., Variational tetrahedral meshing, ACM Transactions on Graphics 24 (2005) 617, in the plane). Midside
+nodes lie on the arcs of the outline.
 """
 
 from fingervision.domain.errors import ModelError
@@ -58,7 +58,7 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
         corners, triangles = relaxed_nodes(region, field, outline_points(sides), inside)
         missing = missing_sides(sides, triangles)
         if not missing and refined < _REFINED:
-            # Flat triangles on the outline alone: its edges differ too much there.
+            # Flat triangles whose corners all lie on the outline show that its edges differ too much in length there.
             missing, refined = flat_sides(sides, corners, triangles), refined + 1
         if not missing:
             return with_middles(corners, triangles, sides)

@@ -145,7 +145,8 @@ def _samples(
 ) -> dict[str, Array]:
     """Quantities of drawings whose dimensions are sampled from independent normal distributions."""
     points = qmc.Sobol(len(used), seed=seed).random(count)
-    # A point far out in the first or last slice of a number would count for the whole of it: 18 % of a bent figure's u.
+    # Clip the outermost samples: one extreme value would represent a whole interval of 1 / count, which changes u of a
+    # nonlinear quantity by 18 %.
     normal = ndtri(np.clip(points, 0.5 / count, 1.0 - 0.5 / count))
     rows: dict[str, list[float]] = {figure: [] for figure in figures}
     refused, last = 0, ""

@@ -1,9 +1,9 @@
 """Width effect: restraint of flexures by the width of the plate, between plane stress and plane strain.
 
 A bar in bending becomes narrower on its stretched side and wider on the compressed side. A flexure that is short
-compared with its width cannot deform in this way, because of the thick material at its ends: it is stiffer than in
-plane stress, by a factor of up to 1 / (1 - nu^2) in plane strain. The weight w of plane strain (0 to 1) comes from
-brick elements (`hinge_correction`).
+compared with its width cannot become narrower or wider, because of the thick material at its ends. It is therefore
+stiffer than in plane stress, by a factor of up to 1 / (1 - nu^2) in plane strain (nu: Poisson's ratio). The weight w of
+plane strain (0 to 1) comes from brick elements (`hinge_correction`).
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from fingervision.models.notch import notches_of
 Array = NDArray[np.float64]
 
 SHARE_UNCERTAINTY = 0.05
-"""Standard uncertainty of w. The bending stiffness is within 0.42 % of brick elements between elastic blocks for width
-over thickness 1 to 20 and t / R 0.0125 to 0.5 (`tests/benchmarks/models_width.py`), which is 0.04 of w at nu = 0.34.
-The resulting uncertainty of the force is 0.05 nu^2, 0.6 %."""
+"""Standard uncertainty of the weight w of plane strain. The bending stiffness is within 0.42 % of brick elements
+between elastic blocks for width over thickness 1 to 20 and t / R 0.0125 to 0.5 (`tests/benchmarks/models_width.py`),
+which is 0.04 of w at nu = 0.34. The resulting uncertainty of the force is 0.05 nu^2, 0.6 %."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Entries of a registry: a part with its origin, or a plug-in that cannot be used with the reason."""
+"""Entries of a registry: a part with its origin, or an unusable plug-in with the reason."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar

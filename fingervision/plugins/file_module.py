@@ -28,14 +28,14 @@ def check_file(path: Path, what: str) -> Origin:
     PluginFileError
         The file does not exist, or is not a Python file.
     PluginVersionError
-        The file's inline metadata require another version of fingervision.
+        The inline metadata of the file require another version of fingervision.
     """
     origin = of_file(str(path))
     if not path.exists():
         raise PluginFileError(f"There is no file {path}: {what} must come from a Python file that exists.")
     if not path.is_file() or path.suffix.lower() != SUFFIX:
         raise PluginFileError(
-            f"{what.capitalize()} must come from a file NAME.py, but {path} is not one: name a Python file."
+            f"{what.capitalize()} must come from a Python file (NAME.py), but {path} is not a Python file: name one."
         )
     try:
         source = path.read_text(encoding="utf-8")
@@ -51,7 +51,10 @@ def needs(who: str, specifier: str) -> str:
     """Return the error for a plug-in that needs another version of fingervision."""
     from fingervision import __version__
 
-    return f"{who} needs fingervision {specifier}, but this is {__version__}: install the version that it asks for."
+    return (
+        f"{who} needs fingervision {specifier}, but the installed version is {__version__}: install the required "
+        "version."
+    )
 
 
 def load_file(path: Path) -> ModuleType:
@@ -68,7 +71,7 @@ def load_file(path: Path) -> ModuleType:
     assert spec is not None  # noqa: S101 - a file NAME.py always has one
     assert spec.loader is not None  # noqa: S101 - as above
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up while it is imported
+    sys.modules[name] = module  # dataclasses look up their module during its import
     try:
         spec.loader.exec_module(module)
     except BaseException:

@@ -160,7 +160,7 @@ class Registry(Generic[T]):
         return watched(who, origin, lambda: self._parts_of(held))
 
     def remove(self, name: str) -> None:
-        """Remove an added part; nothing happens if no such part was added."""
+        """Remove an added part; nothing happens if no part of that name was added."""
         self._added = [entry for entry in self._added if entry.name != name]
         self._version += 1
 
@@ -185,7 +185,9 @@ class Registry(Generic[T]):
         """Add the parts defined in files for the duration of a `with` block."""
         before = list(self._added)
         try:
-            for path in {path.resolve(): path for path in reversed(paths)}.values():  # a file named twice counts once
+            for path in {
+                path.resolve(): path for path in reversed(paths)
+            }.values():  # a file that is named twice is read once
                 for name, value in self.in_file(path).items():
                     self.add(name, value, check_file(path, self.noun))
             yield

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from fingervision import __version__
 
-# The block of PEP 723, as given there.
+# Regular expression for the metadata block, as given in PEP 723.
 SCRIPT = re.compile(r"(?m)^# /// script\s*$\s(?P<content>(?:^#(?:| .*)$\s)+?)^# ///\s*$")
 
 

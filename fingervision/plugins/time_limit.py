@@ -49,8 +49,9 @@ def longest_s() -> float:
 def within(seconds: float, act: Callable[[], T]) -> T:
     """Run a function in a separate thread under a time limit, and return the function's result.
 
-    Code that still runs at its time limit is ended by an exception raised inside it. Code that waits inside a compiled
-    function cannot be ended in this way; it continues in the background and does not prevent the program from ending.
+    Code that still runs at its time limit is ended by an exception that is raised inside this code. Code that waits
+    inside a compiled function cannot be ended by an exception; the code continues in the background, and does not
+    prevent the program from ending.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def within(seconds: float, act: Callable[[], T]) -> T:
     OutOfTimeError
         The call took longer than the limit.
     BaseException
-        Whatever `act` raises.
+        Any exception that `act` raises.
     """
     results: list[T] = []
     raised: list[BaseException] = []

@@ -50,7 +50,7 @@ def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
         return within(seconds, run)
     except OutOfTimeError:
         raise PluginTimeoutError(
-            f"{who} must be imported within {seconds:g} s, but was still running after that and was stopped: "
+            f"{who} must be imported within {seconds:g} s, but was still running at this time limit and was stopped: "
             f"look for an endless loop; {origin.remedy}."
         ) from None
     except PluginError:
@@ -59,7 +59,8 @@ def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
         raise PluginShapeError(f"{who} {error}; {origin.remedy}.") from error
     except ModuleNotFoundError as error:
         raise PluginImportError(
-            f"{who} could not be imported, as there is no module {error.name}: install it, or {origin.remedy}."
+            f"{who} could not be imported, as the module {error.name} is missing: install that module, or "
+            f"{origin.remedy}."
         ) from error
     except (KeyboardInterrupt, MemoryError):
         raise

@@ -120,7 +120,8 @@ def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], c
         tick = _tick(frame, last_tick)
         if frame.pixels.shape != first.pixels.shape or frame.pixels.dtype != first.pixels.dtype:
             msg = (
-                f"All frames of a clip must be alike, but frame {frame.index} is {frame.pixels.shape} of "
+                f"All frames of a clip must have the same shape and type, but frame {frame.index} is "
+                f"{frame.pixels.shape} of "
                 f"{frame.pixels.dtype} and the first {first.pixels.shape} of {first.pixels.dtype}."
             )
             raise DataError(msg)

@@ -12,8 +12,8 @@ between readings (move, settle, average) is 28.5 s. Effects with time constants 
 treated as invisible."""
 SWAPPED = 0.75
 """Fraction of the moves between targets that contradict the stated direction, above which the directions are considered
-as interchanged. With correct directions, hardly any move contradicts: only the return of one-directional cycles, one
-move per number of targets."""
+as interchanged. With correct directions, only the return moves of one-directional cycles contradict, one move in each
+cycle."""
 LONGEST_OVERSHOOT_MM = 0.5
 """Longest assumed overshoot beyond a target: the largest play in the catalogue of effects. The overshoot is shorter if
 the targets are closer together, so that it does not pass a neighbouring target."""
@@ -67,10 +67,10 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
         came = f"{against} of {moves} moves from target to target go against the stated direction"
         if timed:
             readings = [replace(reading, side=-reading.side) for reading in readings]
-            notes.append(f"By the times {came}: the directions were taken as swapped, and exchanged.")
+            notes.append(f"According to the times, {came}: the two directions were exchanged.")
         elif len({reading.side for reading in readings}) > 1:
-            # A table of one side may well be sorted by its targets.
-            notes.append(f"In the order of the rows {came}: are the directions swapped?")
+            # A table with a single direction of approach may be sorted by its targets.
+            notes.append(f"In the order of the rows, {came}: are the two directions exchanged in the table?")
     targets = np.unique([reading.target_mm for reading in readings])
     closest = float(np.min(np.diff(targets))) if targets.size > 1 else LONGEST_OVERSHOOT_MM
     beyond = min(LONGEST_OVERSHOOT_MM, closest)
@@ -86,12 +86,12 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
         notes.append(
             "The table has no times: within a cycle, targets approached from below were taken in ascending order, then "
             f"those from above in descending order, one row every {NOMINAL_S:g} s. Rates and time constants of the "
-            "report count in that time."
+            f"report refer to these assumed times."
         )
     if added:
         notes.append(
-            f"{added} rows without a gap were added {beyond:g} mm beyond a target, where the stated side of approach "
-            "needs that the stage came from there."
+            f"{added} rows without a gap were added {beyond:g} mm beyond a target, because the stated side of "
+            f"approach means that the stage came from there."
         )
     return tuple(rows), tuple(notes)
 

@@ -39,8 +39,8 @@ def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tup
     if found and statistics.median(found) > 0.0:
         size = f" by up to {1e3 * statistics.median(found) / px_per_mm:.2g} um (u_shift_px, median)"
     return (
-        f"the camera's response is not known and was taken as {response}: another usual one may move every gap "
-        f"alike{size}, as an offset does; measure it with `fingervision calibrate response`.",
+        f"the camera's response is not known and was taken as {response}: another usual response may change all gaps "
+        f"equally{size}, like an offset; measure the response with `fingervision calibrate response`.",
     )
 
 

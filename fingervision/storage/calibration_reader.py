@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 # Newest schema of calibration.json that this program reads, and the one that it writes.
 SCHEMA = 1
-# A standard uncertainty that stands twice in the file (alone and in the covariance) may have been rounded by hand.
+# A standard uncertainty that occurs twice in the file (alone and in the covariance) may have been rounded by hand.
 SAME_U = 0.01
 
 
@@ -39,13 +39,13 @@ class CalibrationReader:
     Raises
     ------
     DataError
-        The content is no object with a schema.
+        The content is not a JSON object with a schema.
     """
 
     def __init__(self, path: Path, content: object) -> None:
         self._path = path
         if not isinstance(content, dict) or "schema" not in content:
-            self._refuse("it has no schema; make one with `fingervision calibrate`")
+            self._refuse("it has no schema; make a calibration with `fingervision calibrate`")
         self._content: dict[str, Any] = content
 
     def _refuse(self, words: str) -> NoReturn:
@@ -57,13 +57,16 @@ class CalibrationReader:
         Raises
         ------
         DataError
-            The schema is newer than this program, a value is missing or not allowed, or two contradict each other.
+            The schema is newer than this program, a value is missing or not allowed, or two values contradict each
+            other.
         """
         schema = self._content["schema"]
         if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
             self._refuse(f"schema must be a whole number from 1, but is {schema!r}")
         if schema > SCHEMA:
-            self._refuse(f"it has schema {schema}, and this program knows up to {SCHEMA}; use a newer fingervision")
+            self._refuse(
+                f"it has schema {schema}, but this program reads only schemas up to {SCHEMA}; use a newer fingervision"
+            )
         budget = self._object("budget")
         limits, stated = self._limits(budget.get("limits"))
         try:
@@ -189,7 +192,7 @@ class CalibrationReader:
         return parts
 
     def _limits(self, stated: object) -> tuple[Limits, frozenset[str]]:
-        # A file of another program may state no limits: its covariance is then all the budget there is.
+        # A file of another program may state no limits: the budget then consists of the covariance alone.
         nothing = {item.name: 0.0 for item in fields(Limits)} | {"camera_distance_mm": Limits().camera_distance_mm}
         if stated is None:
             return Limits(**nothing), frozenset()
@@ -197,7 +200,7 @@ class CalibrationReader:
             self._refuse(f"budget.limits must be an object of objects, but is {stated!r}")
         unknown = set(stated) - set(nothing)
         if unknown:
-            self._refuse(f"budget.limits knows no {sorted(unknown)[0]}")
+            self._refuse(f"budget.limits has an unknown limit, {sorted(unknown)[0]}")
         values = {name: self._number(limit, "value") for name, limit in stated.items()}
         try:
             limits = Limits(**(nothing | values))

@@ -37,7 +37,7 @@ def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any],
     Raises
     ------
     DataError
-        Where an uncertainty is no positive number, or belongs to a list.
+        An uncertainty is not a positive number, or belongs to a list.
     """
     bare = copy.deepcopy(dict(tables))
     uncertainties = {}
@@ -78,14 +78,14 @@ def changed_tables(
     Raises
     ------
     DataError
-        Where a name is that of no number.
+        A name does not denote a number of the drawing.
     """
     changed = copy.deepcopy(dict(tables))
     places = {name: (path, raw) for name, path, raw in _walk(changed)}
     for name, by in changes.items():
         if name not in places:
             raise DataError(
-                f"There is no number called {name} in {origin}. Names of numbers in it are, for example, "
+                f"There is no number called {name} in {origin}. Numbers in this file are, for example, "
                 f"{', '.join(sorted(places)[:8])}."
             )
         path, raw = places[name]

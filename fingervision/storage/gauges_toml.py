@@ -109,6 +109,5 @@ def write_gauges_text(path: Path, text: str) -> None:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise OutputError(
-            f"{path} could not be written ({error.strerror}); nothing is lost here: free disk space there, "
-            "and save again."
+            f"{path} could not be written ({error.strerror}); the gauges are not lost: free disk space, and save again."
         ) from error

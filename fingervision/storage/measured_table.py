@@ -19,8 +19,8 @@ from fingervision.storage.summary_json import u_clock_beside
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")
-# Each run has constants of its own in the fit, whose matrices grow with rows times runs: 1000 runs of 20 000 rows are
-# 160 MB, and no bench records more in a day.
+# In the fit, each run has its own constants, so that the matrices grow with rows times runs: 1000 runs of 20 000 rows
+# need 160 MB, and no test bed records more in a day.
 MOST_RUNS = 1000
 NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
 
@@ -31,8 +31,8 @@ def read_measured_table(path: Path) -> MeasuredTable:
     Raises
     ------
     DataError, InputFileError
-        In a sentence: columns missing, cells that are no numbers, fewer than five rows, an input or a gap that
-        never changes, times that repeat within a run.
+        A column is missing, a cell is not a number, there are fewer than five rows, the input or the gap never changes,
+        or times repeat within a run.
     """
     targets = read_iso230_table(path)
     if targets is not None:
@@ -86,7 +86,7 @@ def measured_rows(
     Raises
     ------
     DataError
-        As `read_measured_table`.
+        For the same reasons as in `read_measured_table`.
     """
     values = dict(values)
     edges = "left_mm" in values and "right_mm" in values
@@ -128,7 +128,9 @@ def measured_rows(
         for run, name in zip(of_runs, run_names, strict=True):
             _check_times(times[run], name, path)
     if edges and np.median(column["right_mm"] - column["left_mm"]) < 0.0:
-        notes.append("left_mm is larger than right_mm: the two columns were taken as exchanged and swapped back.")
+        notes.append(
+            "left_mm is larger than right_mm: the two columns were taken as exchanged, and were exchanged back."
+        )
         column["left_mm"], column["right_mm"] = column["right_mm"], column["left_mm"]
     gap = column["right_mm"] - column["left_mm"] if edges else column["gap_mm"]
     for label, signal in (("input_mm", column["input_mm"]), ("gap_mm", gap)):
@@ -173,7 +175,9 @@ def _left_out(total: int, kept: int, besides: int) -> list[str]:
     """Sentences on the number of rows without a gap that count as path, and of rows that are omitted."""
     notes = []
     if besides:
-        notes.append(f"{besides} of {total} rows have an input and no gap: they count as the input's path.")
+        notes.append(
+            f"{besides} of {total} rows have an input but no gap: they are used as part of the path of the input."
+        )
     if total - kept - besides:
         notes.append(f"{total - kept - besides} of {total} rows have no value and were left out.")
     return notes
@@ -184,7 +188,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
     repeated = np.flatnonzero(np.diff(time_s) == 0.0)
     if not repeated.size:
         return
-    said = f"time_s must be unique within a run, but {time_s[repeated[0]]:g} s stands "
+    said = f"time_s must be unique within a run, but {time_s[repeated[0]]:g} s occurs "
     said += "in every row" if repeated.size == time_s.size - 1 else "twice"
     whole = bool(np.all(time_s == np.round(time_s)))
     cure = "write the times with more digits" if whole else "add a run column, or remove the repeated rows"
@@ -221,7 +225,7 @@ def _runs(
 ) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
     """Order of the rows; runs are sorted by their first time (or smallest input), independently of their names."""
     key = inputs if time is None else time
-    # Each group is sorted by its key: its first is the least.
+    # Each group is sorted by its key, so that its first row has the smallest key.
     groups = sorted(_by_run(names, key).items(), key=lambda item: (key[item[1][0]], float(np.sum(inputs[item[1]]))))
     ends = np.cumsum([rows.size for _, rows in groups])
     runs = tuple(slice(int(end) - rows.size, int(end)) for end, (_, rows) in zip(ends, groups, strict=True))

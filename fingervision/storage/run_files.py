@@ -67,6 +67,6 @@ class RunFiles:
     def failed(self, error: OSError) -> FingervisionError:
         """Return the error which states that the run could not be written."""
         return OutputError(
-            f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
-            "in it: free disk space, or name another folder with --out."
+            f"The run {self.path} could not be written any further ({error.strerror}); it holds what was recorded "
+            f"before: free disk space, or name another folder with --out."
         )

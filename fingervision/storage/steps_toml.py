@@ -39,7 +39,7 @@ def read_steps(path: Path) -> StepData:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or a value in it cannot be meant; the sentence names the line.
+        The file cannot be read, or a value in it is not allowed; the message names the line.
     """
     values, text = read_document(path, "step data")
     top = Section(path, text, "", values)
@@ -57,7 +57,7 @@ def read_steps(path: Path) -> StepData:
     for section in sections:
         number = section.whole("number", max(steps, default=0) + 1, low=1, high=MOST_STEPS)
         if number in steps:
-            section.refuse("number", f"must be another than those before, but {number} comes again.")
+            section.refuse("number", f"must differ from the numbers of all earlier steps, but {number} occurs twice.")
         steps[number] = _step(section)
     return StepData(
         name=top.word("name", path.stem),
@@ -71,7 +71,7 @@ def _sequence(top: Section, steps: Mapping[int, Step]) -> tuple[int, ...]:
     raw = top.values.get("sequence", sorted(steps))
     if not isinstance(raw, list) or not all(isinstance(each, int) and each in steps for each in raw):
         known = ", ".join(str(number) for number in sorted(steps))
-        top.refuse("sequence", f"must be a list of numbers of steps that there are ({known}), but is {raw!r}.")
+        top.refuse("sequence", f"must be a list of the numbers of existing steps ({known}), but is {raw!r}.")
     return tuple(raw)
 
 
@@ -97,7 +97,10 @@ def _entry(section: Section) -> CycleTime | SpeedEntry:
     timed = "positioning_time_s" in section.values
     speeds = [key for key in _SPEED_KEYS if key in section.values]
     if timed and speeds:
-        section.refuse(speeds[0], "must not stand beside positioning_time_s, from which it follows: leave one out.")
+        section.refuse(
+            speeds[0],
+            "must not be given together with positioning_time_s, which determines it: leave one of the two out.",
+        )
     if timed:
         return CycleTime(section.number("positioning_time_s", above=0.0))
     if not speeds:

@@ -71,11 +71,11 @@ def channels_in(raw: RawTable, used: Collection[int], decimal: str) -> BodyChann
         column = raw.columns[of_name[0]]
         if len(of_name) > 1:
             listed = " and ".join(f"'{raw.columns[k].name}'" for k in of_name)
-            found.notes.append(f"the channel {name} was left out: {listed} would both be it.")
+            found.notes.append(f"the channel {name} was left out, because several columns fit its name: {listed}.")
             continue
         values, unread = _numbers(column, decimal)
         if unread:
-            found.notes.append(f"the column {column.name} was left out: {unread} of its cells are no numbers.")
+            found.notes.append(f"the column {column.name} was left out: {unread} of its cells are not numbers.")
             continue
         size = sizes[of_name[0]]
         found.columns[name] = values if size == 1.0 else Numbers(values.value * size, values.present)

@@ -3,9 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
-from fingervision.tables.column_names import ColumnName, column_name
+from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
+from fingervision.tables.column_suggestions import likeliest
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import Question
 from fingervision.tables.raw_table import RawColumn, RawTable
@@ -19,8 +22,6 @@ WANTED = {
     "drive": ("run", "force"),
     "simulation": ("left", "right", "force"),
 }
-LENGTHS = ("input", "gap", "left", "right", "u_gap", "u_random", "target", "position", "deviation")
-DIMENSION = {**dict.fromkeys(LENGTHS, "length"), "time": "time", "force": "force"}
 UNIT = {"length": "mm", "time": "s", "force": "n"}
 CANONICAL = {role: f"{role}_{UNIT[dimension]}" for role, dimension in DIMENSION.items()}
 """Names of the columns in fingervision's own tables, by role."""
@@ -69,12 +70,16 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
         roles.pop("time")
     sides = all(side in chosen or len(roles.get(side, ())) == 1 for side in ("left", "right"))
     suggested: set[int] = set()
+    decimal = given.words.get("decimal") or str(raw.settings.get("decimal", "."))
 
-    def suggest(candidates: Sequence[int]) -> int:
-        """Choose a column that no other question suggests, so that all suggestions can be followed at once."""
-        place = next((k for k in candidates if k not in suggested), candidates[0])
+    def suggest(role: str, candidates: Sequence[int]) -> str:
+        """Name a column that no other question suggests, so that all suggestions can be followed at once."""
+        place = likeliest(raw, names, role, [k for k in candidates if k not in suggested] or candidates, decimal)
+        if place is None:
+            return "NAME"
         suggested.add(place)
-        return place
+        name = raw.columns[place].name
+        return name if [column.name for column in raw.columns].count(name) == 1 else str(place + 1)
 
     for role in (*NEEDED[kind], *WANTED[kind]):
         if role in chosen:
@@ -92,7 +97,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
                 continue
             listed = " or ".join(f"'{raw.columns[k].name}'" for k in candidates)
             about.questions.append(
-                Question(f"the {role} may be {listed}", f"columns.{role}={raw.columns[suggest(candidates)].name}")
+                Question(f"the {role} may be {listed}", f"columns.{role}={suggest(role, candidates)}")
             )
         elif role in NEEDED[kind] and not (role == "gap" and sides):
             free = [k for k in range(len(raw.columns)) if k not in set(chosen.values())]
@@ -100,7 +105,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             about.questions.append(
                 Question(
                     f"no column is called as the {role} is (the columns are {listed or 'taken'})",
-                    f"columns.{role}={raw.columns[suggest(free)].name if free else 'NAME'}",
+                    f"columns.{role}={suggest(role, free) if free else 'NAME'}",
                     CANONICAL[role],
                 )
             )
@@ -125,8 +130,8 @@ def _lone_u(
     if len(found) == 1:
         roles["input"] = found
         about.notes.append(
-            f"'{raw.columns[found[0]].name}' is taken for the input, a prescribed displacement: columns.input in "
-            "columns.toml would name another."
+            f"'{raw.columns[found[0]].name}' is read as the input (a prescribed displacement); to name another "
+            f"column, set columns.input in columns.toml."
         )
 
 
@@ -138,11 +143,23 @@ def _one_clock(
     elapsed = [k for k in times if not _is_dated(raw.columns[k])]
     if len(both) > 1 and len(elapsed) == 1:
         others = ", ".join(raw.columns[k].name for k in both if k != elapsed[0])
-        about.notes.append(f"{raw.columns[elapsed[0]].name} is taken for the time, not {others}.")
+        about.notes.append(f"{raw.columns[elapsed[0]].name} is read as the time, not {others}.")
         return elapsed
     if len(times) == 1 and not elapsed and len(both) > 1:
-        return times  # a day and a time of day in columns of their own: joined later
+        return times  # date and time of day in separate columns are joined later
+    if len(times) > 1 and _alike([raw.columns[k] for k in times]):
+        return times[:1]  # a clock beside each channel
     return times or both
+
+
+def _alike(columns: Sequence[RawColumn]) -> bool:
+    """Whether all columns hold the same cells or numbers."""
+    first = columns[0].content
+    if isinstance(first, Numbers):
+        return all(
+            isinstance(one.content, Numbers) and np.array_equal(one.content.value, first.value) for one in columns
+        )
+    return all(not isinstance(one.content, Numbers) and list(one.content) == list(first) for one in columns)
 
 
 def _is_dated(column: RawColumn) -> bool:

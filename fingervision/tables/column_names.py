@@ -4,11 +4,15 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from fingervision.tables.units import known_unit, spelled
+from fingervision.tables.units import factor, known_unit, spelled
 from fingervision.tables.words import role_of, source_of
 
 BRACKETS = re.compile(r"^(?P<base>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|<(?P<c>[^>]*)>|\{(?P<d>[^}]*)\})\s*$")
-BESIDE = re.compile(r"^(?P<base>.+?)\s*(?:/|,|\bin\b|:|\s|_|-|\.)\s*(?P<unit>[^\s/,_:]+)\s*$")
+BESIDE = re.compile(r"^(?P<base>.+?)\s*(?P<mark>/|,|\bin\b|:|\s|_|-|\.)\s*(?P<unit>[^\s/,_:]+)\s*$")
+
+LENGTHS = ("input", "gap", "left", "right", "u_gap", "u_random", "target", "position", "deviation")
+DIMENSION = {**dict.fromkeys(LENGTHS, "length"), "time": "time", "force": "force"}
+"""Dimension of the columns, by role."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,8 @@ def column_name(text: str) -> ColumnName:
     --------
     >>> column_name("Weg [µm]").unit, column_name("gap_mm").unit, column_name("Zeit/ms").unit, column_name("u_in").unit
     ('µm', 'mm', 'ms', '')
+    >>> column_name("gap.mm").unit, column_name("stage.s").unit
+    ('mm', '')
     >>> column_name("Force in N").base, column_name("gap"), column_name("opening, mm").unit
     ('Force', ColumnName(text='gap', base='gap', unit=''), 'mm')
     """
@@ -57,12 +63,16 @@ def column_name(text: str) -> ColumnName:
         return ColumnName(text, text, "")
     if match is not None:
         unit = next(part for part in match.group("a", "b", "c", "d") if part is not None)
-        # Brackets may hold a remark: `gap (left)`, `position (actual) [mm]`.
+        # Brackets may contain a remark instead of a unit: `gap (left)`, `position (actual) [mm]`.
         if known_unit(unit) is not None or role_of(f"{match['base']} {unit}") is None:
             return ColumnName(text, re.sub(r"[\[\](){}]", " ", match["base"]).strip(), spelled(unit))
         return ColumnName(text, f"{match['base']} {unit}", "")
     if (match := BESIDE.match(text)) is not None and known_unit(match["unit"]) is not None:
         base = match["base"].strip(" _-/,.:")
+        # `stage.s` is a variable `s` of `stage` (Modelica), and no position in seconds.
+        dimension = DIMENSION.get(role_of(base) or "", "length")
+        if match["mark"] == "." and factor(match["unit"], dimension) is None:
+            return ColumnName(text, text, "")
         if role_of(base) is not None or source_of(base) is not None or base == "u":
             return ColumnName(text, base, spelled(match["unit"]))
     return ColumnName(text, text, "")

@@ -30,6 +30,8 @@ THOUSANDS = {",": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+"), ".": re.compile(r"[
 DATE_LIKE = re.compile(r"[\d./\-]+([T ]\d.*)?|\d{1,2}:\d{2}(:\d{2}([.,]\d*)?)?( ?[AaPp][Mm])?Z?")
 MINUS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{NO-BREAK SPACE}": " "})
 SAMPLE_LINES = 2000
+QUOTED_LINES = 5
+"""Last lines of the sample that must have quotes, if a comma separates cells and is the decimal mark too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +105,11 @@ def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -
     for between in separators:
         rows = [split(line.translate(MINUS), between) for line in sample]
         for mark in (decimal,) if decimal else (".", ","):
-            if mark == between == ",":
+            # Spreadsheets put decimal commas between commas into quotes.
+            if mark == between == "," and not all('"' in line for line in sample[-QUOTED_LINES:]):
                 continue
             found = _explained(rows, mark)
-            # Ties go to the first: likelier separators, the point.
+            # Among equal results the first is taken: the more probable separator, and the decimal point.
             if found is not None and (best is None or found[0] > best[0] + 1e-9):
                 best = found[0], Dialect(between, mark, found[1])
     if best is None:

@@ -23,9 +23,9 @@ GREATEST_GAP_MM = 500.0
 """Largest plausible gap, beyond the field of view of any such set-up."""
 LEAST_SPEED_MM_S, GREATEST_SPEED_MM_S = 2e-3, 50.0
 USUAL_STEPS_S = (1e-3, 1.0)
-"""Speed of the input during motions (mm/s) and time between rows (s). Usual set-ups move at 0.01 to 2 mm/s and record 5
-to 1000 rows per second; if both are slower (or faster) by a factor of a thousand, times have another unit, or the log
-spans hours, which the user may confirm."""
+"""Usual time between rows (s), judged together with the usual speed of the input during motions (mm/s). Usual set-ups
+move at 0.01 to 2 mm/s and record 5 to 1000 rows per second; if both are slower (or faster) by a factor of a thousand,
+times have another unit, or the log spans hours, which the user may confirm."""
 FEWEST_FOR_SPEED = 20
 LEAST_OVERLAP = 0.5
 """Smallest fraction of the rows with a gap that should have an input; with a smaller fraction, the two records hardly
@@ -93,8 +93,8 @@ def _sizes(columns: Mapping[str, Numbers], travel: float, given_units: set[str])
         unit = "m" if travel < LEAST_INPUT_MM else "um"
         return [
             Question(
-                f"the input ranges over {travel:g} mm as its unit is stated, which looks like {words} called "
-                "millimetres (accept=sizes if it is right)",
+                f"with the stated unit, the input ranges over {travel:g} mm; the numbers look like {words} (if the "
+                "stated unit is right, set accept=sizes)",
                 f"units.input={unit}",
             )
         ]
@@ -131,8 +131,8 @@ def _times(
         restarts = np.isclose(time[back + 1], time[0], atol=2.0 * float(np.median(np.abs(steps)))).all()
         found.append(
             Question(
-                f"time runs backwards {back.size} time(s), first from {time[at - 1]:g} to {time[at]:g} s"
-                + (" and begins anew there: runs=restart makes a run of each" if restarts else "")
+                f"the time decreases {back.size} time(s), first from {time[at - 1]:g} to {time[at]:g} s"
+                + (" and starts again: runs=restart begins a new run at each of these rows" if restarts else "")
                 + " (accept=backward_time sorts the rows by time)",
                 "runs=restart" if restarts else "accept=backward_time",
             )
@@ -150,10 +150,9 @@ def _times(
     if slow or (speed > GREATEST_SPEED_MM_S and step < USUAL_STEPS_S[0]):
         found.append(
             Question(
-                f"the input moves at {speed:.2g} mm/s, a row every {step:.2g} s, as the unit of time is stated, which "
-                "looks like "
-                f"{'milliseconds called seconds' if slow else 'seconds called milliseconds'} (accept=speed if it is "
-                "right)",
+                f"with the stated unit of time, the input moves at {speed:.2g} mm/s with a row every {step:.2g} s; the "
+                f"times look like {'milliseconds' if slow else 'seconds'} (if the stated unit is right, set "
+                "accept=speed)",
                 f"units.time={'ms' if slow else 's'}",
             )
         )

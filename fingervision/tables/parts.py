@@ -26,9 +26,9 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
     Raises
     ------
     DataError
-        The file has no part with columns of numbers, or not the stated part.
+        The file has no part with columns of numbers, or does not contain the stated part.
     OpenQuestionError
-        Several may be meant.
+        Several parts may be the table, and the user has not chosen one.
     """
     listed = ", ".join(f"'{name}'" for name in names)
     if (stated := given.words.get("part")) is not None:
@@ -44,4 +44,6 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
     if not names:
         raise DataError(f"{path} must hold a table, but has no {what} with columns of numbers: export it again.")
     example = (fitting or list(names))[0]
-    raise OpenQuestionError(path, "table", [Question(f"which {what} is meant is open: {listed}", f"part={example}")])
+    raise OpenQuestionError(
+        path, "table", [Question(f"it must be stated which {what} is meant: {listed}", f"part={example}")]
+    )

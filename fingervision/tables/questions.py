@@ -49,7 +49,8 @@ class OpenQuestionError(FingervisionError):
         asked = f" --as {kind}" if kind != "table" else ""
         begin = f"must have a column {missing}" if missing else f"cannot be read as a {words} without a decision"
         super().__init__(
-            f"{path} {begin}: {open_points}. Say it once, then call again: fingervision table {name}{asked} {keys}"
+            f"{path} {begin}: {open_points}. State it once with this command, then repeat the first one: "
+            f"fingervision table {name}{asked} {keys}"
         )
 
 

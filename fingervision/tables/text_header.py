@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from fingervision.domain.errors import DataError
 from fingervision.tables.column_names import column_name
 from fingervision.tables.dialect import Dialect, is_comment, is_number, is_value, split
+from fingervision.tables.header_pairs import Header, labelled_pairs
 from fingervision.tables.mapping import Entry
 from fingervision.tables.units import is_unit, known_unit
 from fingervision.tables.words import role_of
@@ -24,27 +24,18 @@ ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
 """Pattern of a line that names a single column (data recorders of Physik Instrumente write `# NAME0 = ...`)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Header:
-    """The header lines above the numbers.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the columns; empty if there are none.
-    units : tuple of str
-        Units from a row of units; empty if there is none.
-    line : int
-        Number of the line with the names, from 0; -1 if there is none.
-    """
-
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    line: int = -1
-
-
 def _is_row(cells: Sequence[str], dialect: Dialect) -> bool:
-    return len(cells) == dialect.wide and any(is_number(cell, dialect.decimal) for cell in cells)
+    # `Points: 30` is a key and its value.
+    is_key = cells[0].endswith((":", "=")) and not is_value(cells[0], dialect.decimal)
+    return len(cells) == dialect.wide and not is_key and any(is_number(cell, dialect.decimal) for cell in cells)
+
+
+def _is_label(cells: Sequence[str], below: Sequence[str], dialect: Dialect) -> bool:
+    """Whether a line is a label with a value for each channel (`Offset 0 Offset 0`), which the next line has not."""
+    if dialect.wide < 4 or len(set(cells[::2])) > 1 or is_value(cells[0], dialect.decimal):
+        return False
+    following = next((line for line in below if line.strip()), "")
+    return split(following, dialect.separator)[:1] != cells[:1]
 
 
 def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
@@ -56,13 +47,14 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
         if is_comment(lines[at]) or not lines[at].strip():
             continue
         cells = split(lines[at], dialect.separator)
-        if not _is_row(cells, dialect):
+        if not _is_row(cells, dialect) or _is_label(cells, lines[at + 1 :], dialect):
             continue
-        # A header that numbers its columns has fewer values than a row: `Position 1, Position 2` has none.
+        # Numbers in column names are not values: the header `Position 1, Position 2` contains no value.
         values = sum(is_value(cell, dialect.decimal) for cell in cells)
         words = sum(role_of(column_name(cell).base) is not None for cell in cells)
         if not named or values > words:
-            # `rate, 0.5, mm/s` above the table is as wide as a row of three, and holds a number as well.
+            # A line such as `rate, 0.5, mm/s` above the table has as many cells as a row of three columns, and contains
+            # a number.
             if not named or 2 * values >= dialect.wide:
                 return at
             poor = at if poor is None else poor
@@ -83,8 +75,9 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
             )
         units = names_in(lines[at + 1], dialect) if at + 1 < first else None
         return Header(names, units if units is not None and _all_units(units) else (), at)
-    if (listed := _one_a_line(lines[:first], dialect.wide)) is not None:
-        return listed
+    for listed in (_one_a_line(lines[:first], dialect.wide), labelled_pairs(lines[:first], dialect)):
+        if listed is not None:
+            return listed
     found: list[tuple[int, int, tuple[str, ...]]] = []
     units, units_at = None, -1
     blanks = 0
@@ -111,11 +104,11 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
         known = sum(column_name(name).role is not None or column_name(name).source is not None for name in names)
         found.append((known, at, names))
     if not found and units and not all(known_unit(cell) for cell in units if cell):
-        # `a,b` could be ares and bits; names are likelier above numbers than rare units alone.
+        # `a,b` could mean ares and bits, but names are more probable above numbers than a line of rare units.
         return Header(units, (), units_at)
     if not found:
         return Header((), units or (), -1)
-    # The most words that mean something; among equals the line nearest to the numbers.
+    # The line with the most known words is chosen; among equal lines, the line nearest to the numbers.
     _, at, names = max(found, key=lambda item: (item[0], item[1]))
     return Header(names, units or (), at)
 
@@ -139,7 +132,7 @@ def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
 
 def _all_units(cells: Sequence[str]) -> bool:
     """Whether a line contains only units and empty cells, with at least one unit."""
-    # `t` is a name and a tonne, `s` a second: a word of a role is a name only beside others that are.
+    # `t` can be a name or a tonne, and `s` a second: such a word is a name only if the line contains other names.
     return any(cells) and all(is_unit(cell) for cell in cells) and sum(role_of(cell) is not None for cell in cells) == 0
 
 
@@ -155,7 +148,7 @@ def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
         if len(cells) != wide:
             continue
         if "=" in cells or all(is_value(cell, dialect.decimal) for cell in cells):
-            return None  # a key and its value, or numbers
+            return None  # the line holds a key and its value, or numbers
         return tuple(cells)
     return None
 

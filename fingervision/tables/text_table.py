@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,12 @@ from fingervision.tables.dialect import (
     is_value,
     split,
 )
+from fingervision.tables.exchanged_rows import exchanged
+from fingervision.tables.header_pairs import Header
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
-from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, names_in
+from fingervision.tables.text_header import HEADER_LINES, find_header, first_row, names_in
 
 NUMBER_BEGINS = frozenset("0123456789+-., \t")
 BETWEEN = re.compile(r"[\s,;|]+")
@@ -53,7 +56,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     DataError
         The lines contain no table, or too many lines do not fit its columns.
     OpenQuestionError
-        A mark may be a decimal comma or set thousands apart.
+        A mark in the numbers may be a decimal sign or a thousands separator.
     """
     dialect = find_dialect(lines, given.words.get("separator", ""), given.words.get("decimal", ""))
     if dialect is None:
@@ -61,6 +64,10 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
             f"{path} must hold rows of two numbers or more, but has none in its {len(lines)} lines: name another file, "
             "or export the table again."
         )
+    if (turned := exchanged(lines, dialect)) is not None:
+        whole = table_of_lines(path, turned, given, encoding)
+        note = "Each line holds a column, with its name first: rows and columns are exchanged."
+        return replace(whole, lines=(), notes=(note, *whole.notes))
     check_columns(path, dialect.wide)
     first = first_row(lines, dialect, given)
     header = find_header(lines, first, dialect, given)
@@ -71,13 +78,13 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
         mark, name = (",", "comma") if "," in example else (".", "point")
         other = "." if mark == "," else ","
         words = (
-            f"each {name} in its numbers may be the decimal one or set thousands apart ('{example}'): decimal={mark} "
-            f"or decimal={other} says which sign is the decimal one"
+            f"each {name} in the numbers may be the decimal sign or a thousands separator ('{example}'): "
+            f"decimal={mark} or decimal={other} states the decimal sign"
         )
         raise OpenQuestionError(path, "table", [Question(words, f"decimal={mark}")])
     rows = _Rows(path, dialect, header, first)
     columns, numbers, left_out, restarts = rows.read(lines)
-    notes = () if header.names else (f"The file names no columns: they are called 1 to {len(columns)}.",)
+    notes = () if header.names else (f"The file has no column names: its columns are named 1 to {len(columns)}.",)
     return RawTable(
         path,
         f"text, {encoding}, {dialect.words}",
@@ -106,7 +113,7 @@ def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect
         if 2 * len(names) == dialect.wide and not any(is_value(name, ".") for name in names):
             raise DataError(
                 f"{path} has {len(names)} names and {dialect.wide} cells a row between commas: decimal commas and "
-                "commas between cells cannot be told apart. Export it with semicolons or tabs."
+                "commas between cells cannot be distinguished. Export it with semicolons or tabs."
             )
 
 
@@ -185,12 +192,12 @@ class _Rows:
             prose = sum(_is_prose(text, self._dialect.decimal) for text in told)
             if prose > MOST_PROSE * len(told):
                 raise DataError(
-                    f"{self._path} is no table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
+                    f"{self._path} is not a table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
                     "words, and a table has rows of two numbers or more. Name the file that holds the table."
                 )
             raise DataError(
                 f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
-                f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
+                f"{len(rows) + len(odd)} rows do not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
                 "key separator in columns.toml."
             )
         left_out = []

@@ -22,6 +22,11 @@ ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
 DAY_S = 86400.0
 HALF_DAY_S = 43200.0
 ORDERS = ("dmy", "mdy")
+DAY_NUMBERS = (36526.0, 58500.0)
+"""Days since 1899-12-30 of the years 2000 to 2060: a date as a spreadsheet stores it."""
+DAY_STEP = 0.01
+"""Largest median step between day numbers, in days: a log has at least one row per quarter of an hour. Numbers with
+larger steps are taken as seconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +86,7 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
         falls = np.diff(value[known]) < -HALF_DAY_S
         if falls.any():
             value[known[1:]] += DAY_S * np.cumsum(falls)
-            notes.append(f"Times of day pass midnight {int(falls.sum())} time(s): a day was added each time.")
+            notes.append(f"The times of day pass midnight {int(falls.sum())} time(s): a day was added each time.")
     first = int(np.argmax(present))
     unread = sum(cells[row].strip().lower() not in MISSING for row in np.flatnonzero(~present).tolist())
     return Seconds(
@@ -136,7 +141,7 @@ def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
     numbers = [_ordinal(word, order) for word in words]
     if None in numbers:
         return None
-    # Counted from the first: a float holds the microseconds then.
+    # Times are counted from the first time, so that a float holds microseconds exactly enough.
     known = [number for number in numbers if number is not None]
     return np.array([number - known[0] for number in known] or [0], dtype=np.float64)
 
@@ -194,3 +199,19 @@ def is_epoch(first: float) -> str:
         if 2000.0 <= years <= 2060.0:
             return f"seconds since {name}"
     return ""
+
+
+def is_day_number(value: float) -> bool:
+    """Whether a number may be a date as a spreadsheet stores it, in days since 1899-12-30.
+
+    Examples
+    --------
+    >>> is_day_number(45415.4244), is_day_number(12.5)
+    (True, False)
+    """
+    return DAY_NUMBERS[0] <= value <= DAY_NUMBERS[1]
+
+
+def counts_days(values: NDArray[np.float64]) -> bool:
+    """Whether a column of times without a unit looks like dates of a spreadsheet."""
+    return values.size > 1 and is_day_number(float(values[0])) and 0.0 < float(np.median(np.diff(values))) < DAY_STEP

@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels, channels_in
+from fingervision.tables.cell_units import with_units_of_cells
 from fingervision.tables.cells import to_numbers
-from fingervision.tables.column_choice import DIMENSION, NEEDED, Findings, choose
-from fingervision.tables.column_names import ColumnName, column_name
+from fingervision.tables.column_choice import NEEDED, Findings, choose
+from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
 from fingervision.tables.doubts import doubts
 from fingervision.tables.long_table import refuse_long_table
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable
-from fingervision.tables.times import is_epoch, looks_like_time, seconds_of
+from fingervision.tables.times import counts_days, is_day_number, is_epoch, looks_like_time, seconds_of
 from fingervision.tables.units import factor, known_unit, spelled
 
 DATE = "date"
@@ -93,7 +94,7 @@ class Understood:
         Raises
         ------
         OpenQuestionError
-            Something is.
+            There is an open question.
         """
         if self.questions:
             raise OpenQuestionError(self.path, self.kind, self.questions)
@@ -115,10 +116,11 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     Raises
     ------
     DataError
-        What the user has decided does not fit the table.
+        A decision of the user in columns.toml does not fit the table.
     """
     refuse_long_table(raw)
     about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))
+    raw = with_units_of_cells(raw)
     names = [column_name(column.name) for column in raw.columns]
     chosen = choose(raw, names, kind, given, about)
     columns: dict[str, Numbers] = {}
@@ -133,8 +135,8 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
             columns[role] = dated
             taken.append(Taken(column.name, role, DATE))
             continue
-        unit = _unit(column, names[place], role, kind, given, about)
         values = _numbers(raw, column, decimal, given, about)
+        unit = _unit(column, names[place], role, kind, given, about, values)
         taken.append(Taken(column.name, role, unit or ""))
         if unit is None:
             continue
@@ -143,12 +145,12 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
             about.questions.append(_wrong_unit(column, role, unit))
             continue
         if role == "time":
-            values = _from_epoch(values, column, about)
+            values = _from_epoch(values, column, unit, about)
         columns[role] = values if size == 1.0 else Numbers(values.value * size, values.present)
         if column.since and role == "time":
             taken[-1] = Taken(column.name, role, DATE)
         if column.since:
-            about.notes.append(f"{column.name} counts from {column.since}.")
+            about.notes.append(f"The times in {column.name} are counted from {column.since}.")
     run_cells = _runs(raw, chosen, columns, given, about)
     if not about.questions and "input" in columns:
         codes = None if run_cells is None else _codes(run_cells)
@@ -164,7 +166,9 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     )  # fmt: skip
 
 
-def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings) -> str | None:
+def _unit(
+    column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings, values: Numbers
+) -> str | None:
     """Unit of a column as stated by the user, beside the name or in the name; None if unresolved or not needed."""
     if role in given.units:
         return given.units[role]
@@ -178,9 +182,15 @@ def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entr
         return stated[0]
     optional = role not in NEEDED[kind] and role in ("force", "u_gap", "u_random")
     if optional:
-        about.notes.append(f"{column.name} has no unit and is not used: units.{role} in columns.toml would say it.")
+        about.notes.append(
+            f"{column.name} has no unit and is not used; state its unit as units.{role} in columns.toml."
+        )
         return None
-    example = {"length": "mm", "time": "s", "force": "N"}[DIMENSION[role]]
+    example = {
+        "length": "mm",
+        "time": "d" if role == "time" and counts_days(values.value[values.present]) else "s",
+        "force": "N",
+    }[DIMENSION[role]]
     about.questions.append(Question(f"the unit of '{column.name}' ({role}) is not stated", f"units.{role}={example}"))
     return None
 
@@ -189,7 +199,7 @@ def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
     dimension = DIMENSION[role]
     example = {"length": "0.1 um", "time": "ms", "force": "mN"}[dimension]
     return Question(
-        f"'{column.name}' ({role}) must be a {dimension}, but its unit is '{unit}': say what one of it is worth",
+        f"'{column.name}' ({role}) must be a {dimension}, but its unit is '{unit}': state what one unit is worth",
         f"units.{role}={example}",
     )
 
@@ -202,7 +212,7 @@ def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about
     if odd.size:
         at = int(odd[0])
         words = (
-            f"{odd.size} of {len(column)} cells of '{column.name}' are no numbers ('{column.content[at][:40]}' in "
+            f"{odd.size} of {len(column)} cells of '{column.name}' are not numbers ('{column.content[at][:40]}' in "
             f"{raw.place(at)})"
         )
         if odd.size > max(1.0, MOST_UNREAD * len(column)) and "unreadable_cells" not in given.accept:
@@ -230,21 +240,28 @@ def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findin
         about.notes.append(f"{raw.columns[day].name} and {column.name} are read as one date.")
     read = seconds_of(cells, given.words.get("date_order", ""))
     if read.open_order:
-        about.questions.append(Question(f"day and month of '{read.since}' could be either way round", "date_order=dmy"))
+        about.questions.append(Question(f"the order of day and month in '{read.since}' is ambiguous", "date_order=dmy"))
     if read.unread:
-        about.left_out.append(f"{read.unread} cells of '{column.name}' are no times")
-    about.notes += [*read.notes, f"{column.name} counts from {read.since}."]
+        about.left_out.append(f"{read.unread} cells of '{column.name}' are not times")
+    about.notes += [*read.notes, f"The times in {column.name} are counted from {read.since}."]
     return read.numbers
 
 
-def _from_epoch(values: Numbers, column: RawColumn, about: Findings) -> Numbers:
-    """Subtract the first time if the clock counts from 1970 or 1904."""
+def _from_epoch(values: Numbers, column: RawColumn, unit: str, about: Findings) -> Numbers:
+    """Subtract the first time if the clock counts from 1900, 1904 or 1970."""
     if not values.present.any():
         return values
     first = float(values.value[int(np.argmax(values.present))])
+    if known_unit(unit) == "day" and is_day_number(first):
+        about.notes.append(
+            f"{column.name} counts days since 1900, as a spreadsheet does: it is taken from its first row."
+        )
+        return Numbers(np.where(values.present, values.value - first, 0.0), values.present)
     for scale, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
         if epoch := is_epoch(first / scale):
-            about.notes.append(f"{column.name} counts {epoch} ({unit}): it is taken from its first row, {first:.6f}.")
+            about.notes.append(
+                f"{column.name} counts {epoch} ({unit}); times are counted from its first row, {first:.6f}."
+            )
             return Numbers(np.where(values.present, values.value - first, 0.0), values.present)
     return values
 
@@ -268,7 +285,7 @@ def _runs(
         known = np.flatnonzero(columns["time"].present)
         starts[known[1:][np.diff(columns["time"].value[known]) < 0.0]] = 1
     number = np.cumsum(starts) + 1
-    about.notes.append(f"{number[-1]} runs: one from each restart of the time or of the header to the next.")
+    about.notes.append(f"{number[-1]} runs: a run begins where the time or the header restarts.")
     return tuple(str(each) for each in number.tolist())
 
 

@@ -10,23 +10,27 @@ if TYPE_CHECKING:
 
 CANONICAL = {"length": "mm", "time": "s", "force": "N"}
 WRITTEN = {
-    "s": "s sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondo secondi",
+    "s": "s sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondo secondi "
+    "\u0441 сек 秒 초",
     "ms": "ms msec millisecond milliseconds millisekunde millisekunden milliseconde millisecondes milisegundos "
-    "millisecondi",
+    "millisecondi мс 毫秒 ミリ秒",
     "us": "us usec µs microsecond microseconds mikrosekunden",
     "ns": "ns",
+    "ps": "ps",
     "min": "min minute minutes minuten minutos minuti",
     "h": "h hr hrs hour hours stunde stunden std heures horas ore",
     "day": "d day days tage",
-    "m": "m meter metre meters metres mètre mètres metro metros metri",
+    "m": "m meter metre meters metres mètre mètres metro metros metri м",
     "cm": "cm",
-    "mm": "mm millimeter millimetre millimeters millimetres millimètre millimètres milímetro milímetros millimetri",
+    "mm": "mm millimeter millimetre millimeters millimetres millimètre millimètres milímetro milímetros millimetri "
+    "мм 毫米 ミリメートル",
     "um": "um µm micron microns mikron micrometer micrometre micrometers micrometres mikrometer micromètre micromètres "
-    "micrómetros micrometri",
-    "nm": "nm nanometer nanometre nanometers",
+    "micrómetros micrometri мкм 微米",
+    "nm": "nm nanometer nanometre nanometers нм 纳米",
+    "pm": "pm picometer picometre picometers",
     "inch": 'in inch inches zoll "',
     "thou": "mil mils thou",
-    "N": "n newton newtons",
+    "N": "n newton newtons н",
     "mN": "mn millinewton",
     "uN": "un µn",
     "kN": "kn",
@@ -52,7 +56,9 @@ def registry() -> "UnitRegistry[Any]":
 def spelled(text: str) -> str:
     """Normalise the spelling of a unit: one micro sign, no brackets."""
     text = text.strip().strip("[](){}<>").strip().rstrip(".")
-    return text.replace("\u03bc", "µ").replace("Âµ", "µ").replace("Î¼", "µ")
+    text = text.replace("\u03bc", "µ").replace("Âµ", "µ").replace("Î¼", "µ")
+    # One character for a unit, as fonts of East Asia have it.
+    return text.replace("\u339c", "mm").replace("\u339b", "µm").replace("\u339a", "nm").replace("\u33b3", "ms")
 
 
 @cache
@@ -71,7 +77,7 @@ def factor(text: str, dimension: str) -> float | None:
     Raises
     ------
     InstallationError
-        The pint library is not there.
+        The library pint is not installed.
     """
     try:
         units = registry()

@@ -1,4 +1,4 @@
-"""Protocol of an actuator: simulated, behind the Arduino board, a hand-turned screw, or of a plug-in."""
+"""Protocol of an actuator: simulated, driven by the Arduino board, turned by hand, or from a plug-in."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -22,7 +22,7 @@ class StageLimits:
         Largest distance between the target and the position at which the stage stops; the encoder gives the actual
         position.
     encoder_step_mm : float
-        Step of the encoder, of which read positions are multiples; 0 if they are not.
+        Step of the encoder; readings are multiples of this step. 0 for an actuator without encoder steps.
     repeatability_mm : float
         Largest scatter of readings at rest, and of the reference position.
     settling_s : float
@@ -51,7 +51,7 @@ class Alarm:
 class MoveCheck(Protocol):
     """Limits of an actuator as stated in its configuration: sufficient to check a plan without opening the test bed.
 
-    A kind of actuator whose `build` opens hardware provides such an object by `without_hardware(section, folder)`.
+    A kind of actuator whose `build` opens hardware returns a `MoveCheck` from `without_hardware(section, folder)`.
     """
 
     @property
@@ -93,7 +93,7 @@ class Actuator(MoveCheck, Protocol):
 
     @property
     def alarm(self) -> Alarm | None:
-        """Reason why the actuator refuses to move; None if it does not."""
+        """Reason why the actuator refuses to move; None if it does not refuse."""
         ...
 
     def home(self) -> None:
@@ -113,11 +113,11 @@ class Actuator(MoveCheck, Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop at once, from any thread, whatever command is executed; never raises while the connection lasts."""
+        """Stop at once, from any thread, during any command; no exception is raised as long as the connection lasts."""
         ...
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions (mm) since the last call, the oldest first; the last is read now, so that there is at least one."""
+        """Positions (mm) since the last call, the oldest first; the last position is read by this call."""
         ...
 
     def close(self) -> None:

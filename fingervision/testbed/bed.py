@@ -16,7 +16,7 @@ from fingervision.testbed.operators.operator import Operator
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bed:
-    """The parts of one experiment; any of them may be real while the others are simulated.
+    """The parts of one experiment; each part is either real or simulated.
 
     Parameters
     ----------

@@ -57,13 +57,13 @@ def open_bed(
     seed : int, optional
         Seed of everything random in the simulated parts; by default that of the configuration.
     earlier_s : (float, float), optional
-        First and last time of the earlier runs that this one continues on a completely simulated test bed: warming and
-        drift started at the first time, and go on from the last.
+        First and last time of the earlier runs that this run continues on a completely simulated test bed. Warming and
+        drift started at the first time, and continue from the last time.
 
     Raises
     ------
     DataError, InputFileError, UsageError
-        The configuration makes no sense, or a part cannot be opened; what was open by then is closed.
+        The configuration is not valid, or a part cannot be opened; parts that are already open are closed.
     """
     top = read_configuration(name)
     sections = {part: top.table(part) for part in PARTS if part in top.values}
@@ -188,7 +188,8 @@ def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> So
     if not within.lower_mm < within.upper_mm:
         section.refuse(
             None,
-            f"must leave the actuator a way to go, but it reaches from {able.lower_mm:g} to {able.upper_mm:g} mm.",
+            f"must overlap the range of the actuator, but the actuator moves from {able.lower_mm:g} to "
+            f"{able.upper_mm:g} mm.",
         )
     return within
 

@@ -64,7 +64,7 @@ class BedCamera(Protocol):
         Raises
         ------
         DeviceError
-            The camera is stale: no frame came within its patience; or it was cut off.
+            No frame arrived within the camera's time limit, or the camera was disconnected.
         """
         ...
 

@@ -26,7 +26,7 @@ class Kind(Protocol):
     """A module, or another object, that builds one kind of device.
 
     `KEYS` are the settings that a device's section may have in addition to `kind`. `SIMULATED` states that the device
-    needs no hardware; a test bed that consists of such devices only runs in virtual time.
+    needs no hardware; a test bed with simulated devices only runs in virtual time.
     """
 
     KEYS: tuple[str, ...]
@@ -38,7 +38,7 @@ class Kind(Protocol):
 
 
 class PluggedKind:
-    """A kind of device from outside the package: its device is checked, and its exceptions become sentences.
+    """A kind of device from outside the package: its device is checked, and exceptions become errors of one sentence.
 
     Parameters
     ----------

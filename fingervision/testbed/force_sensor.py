@@ -22,7 +22,7 @@ class ForceSensor(Protocol):
         ...
 
     def readings(self) -> tuple[Reading, ...]:
-        """Forces (N) since the last call, the oldest first; the last is read now, so that there is at least one."""
+        """Forces (N) since the last call, the oldest first; the last force is read by this call."""
         ...
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Wrapper for a device from outside the package: it is checked after it is built, and its errors name the device."""
+"""Wrapper for a device from outside the package: the device is checked when it is built, and errors name it."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -27,7 +27,7 @@ def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) 
 
     Returns
     -------
-    The device; whatever it raises from now on is a FingervisionError that names it.
+    The device; every exception that it raises from now on is a FingervisionError that names the device.
 
     Raises
     ------
@@ -69,13 +69,13 @@ def _check_readings(readings: Any, who: str, origin: Origin) -> None:
     if not isinstance(readings, tuple) or not readings or not all(isinstance(one, Reading) for one in readings):
         given = f"{len(readings)} of them" if isinstance(readings, tuple) else f"a {type(readings).__name__}"
         raise PluginShapeError(
-            f"{who} must give a tuple of at least one Reading whenever readings is called, but gave {given}: "
+            f"{who} must return a tuple of at least one Reading at each call of `readings`, but returned {given}: "
             f"{origin.remedy}."
         )
 
 
 class _Guarded:
-    """A proxy of a device that turns its exceptions into errors that name it."""
+    """A proxy of a device that turns exceptions of the device into errors that name the device."""
 
     def __init__(self, device: Any, who: str, origin: Origin) -> None:
         self._device, self._who, self._origin = device, who, origin
@@ -88,7 +88,7 @@ class _Guarded:
         except Exception as error:
             if not hasattr(type(self._device), name):
                 raise
-            _say(self._who, f"tell its {name}", error, self._origin)
+            _say(self._who, f"return its {name}", error, self._origin)
         if not callable(found) or isinstance(found, type):
             return found
 
@@ -98,7 +98,7 @@ class _Guarded:
             except FingervisionError:
                 raise
             except Exception as error:
-                _say(self._who, f"answer to {name}", error, self._origin)
+                _say(self._who, f"return a result from {name}", error, self._origin)
             if name == "readings":
                 _check_readings(answer, self._who, self._origin)
             return answer

@@ -72,7 +72,7 @@ def planned_bed(name: str) -> PlannedBed:
     Raises
     ------
     DataError, InputFileError, UsageError
-        The configuration makes no sense, or its kind of actuator says nothing about itself without its hardware.
+        The configuration is not valid, or its kind of actuator does not state its limits without hardware.
     """
     top = read_configuration(name)
     sections = {part: top.table(part) for part in PARTS if part in top.values}
@@ -91,8 +91,8 @@ def planned_bed(name: str) -> PlannedBed:
     if describe is None:
         sections["actuator"].refuse(
             "kind",
-            "must say what it can do without its hardware, but has no function without_hardware(section, folder): add "
-            "one to its file, or let `bed run` check the recipe when it starts.",
+            "must state its limits without its hardware, but has no function without_hardware(section, folder): add "
+            "this function to its file, or let `bed run` check the recipe at its start.",
         )
     actuator: MoveCheck = describe(sections["actuator"], folder)
     scale = stated_scale(top.table("scale"), folder)

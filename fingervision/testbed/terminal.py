@@ -15,9 +15,9 @@ LOOK_EVERY_S = 0.2
 class Terminal:
     """Keyboard and screen of the person at the test bed.
 
-    If two parts of the program read from the keyboard, each would take lines that are meant for the other. Therefore
-    all lines are read here: a line is the response to a question if one was asked, and otherwise a command of a single
-    letter.
+    If two parts of the program read from the keyboard, each part would take lines that are meant for the other part.
+    Therefore the terminal reads all lines: a line is the response to a question if one was asked, and otherwise a
+    command of a single letter.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class Terminal:
         Raises
         ------
         StateError
-            The run was stopped while the question stood.
+            The run was stopped before the question was answered.
         """
-        # Before the words are seen: an answer may come at once.
+        # Set the flag before the question is printed, because an answer may arrive at once.
         self._asked = self._reader is not None
         self.say(words)
         if self._reader is None:
@@ -67,7 +67,7 @@ class Terminal:
         Parameters
         ----------
         unasked : callable
-            Called with each line that is not a response to a question.
+            Function that is called with each line that is not a response to a question.
         ended : callable
             Returns whether nobody waits for responses any more.
         """

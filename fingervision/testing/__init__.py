@@ -1,7 +1,7 @@
 """Contract tests for authors of plug-ins; the built-in parts of the package pass the same tests.
 
-Derive a class whose name begins with `Test`, state the part to be tested, and run pytest. Each method is one test; a
-failure is reported by a sentence that states what the part must do and what it does::
+Derive a class whose name begins with `Test`, state the part to be tested as a class attribute, and run pytest. Each
+method is one test; a failure is reported by a sentence that states what the part must do and what it does::
 
     # tests/test_creeping_foot.py
     from fingervision.testing import EffectContract
@@ -21,9 +21,9 @@ failure is reported by a sentence that states what the part must do and what it 
 | camera | `CameraContract` | `open_bed()`: a test bed with the camera |
 
 The simplest way to open a test bed is from its file: `open_bed = lambda self: fingervision.testing.bed_at("bed.toml")`.
-This package does not import pytest. Without pytest, `run(EffectContract, effect=EFFECT)` runs all tests and returns a
-sentence for each failed test. `diagnosed(effect, values)` simulates data with an effect, diagnoses these data, and
-returns the report.
+`fingervision.testing` does not import pytest. Without pytest, `run(EffectContract, effect=EFFECT)` runs all tests and
+returns a sentence for each failed test. `diagnosed(effect, values)` simulates data with an effect, diagnoses these
+data, and returns the report.
 """
 
 from fingervision.testing.bed_contract import ActuatorContract, CameraContract, ForceSensorContract, bed_at

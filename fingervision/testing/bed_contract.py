@@ -15,7 +15,7 @@ from fingervision.testbed.reading import Reading
 from fingervision.testing.contract import NotApplicable, hold
 
 WAIT_S, PATIENCE_S = 0.01, 10.0
-"""Time between two requests for a position, and time after which a motion of a millimetre is considered as endless."""
+"""Time between two requests for a position, and time after which a motion of a millimetre is considered endless."""
 SPEED_MM_S, SLOW_MM_S, FAR_MM = 2.0, 0.5, 5.0
 STOPS_WITHIN_S = 0.5
 """Longest time to stop; a motor brakes from 0.5 mm/s in a tenth of this time, and the rest is for a response over a
@@ -79,8 +79,8 @@ class ActuatorContract(_BedContract):
                 at_mm = _until_rest(bed)[-1].value
                 hold(
                     abs(at_mm - to_mm) <= _near_mm(bed),
-                    f"{bed.actuator.name} must come to a stand within {_near_mm(bed):.3g} mm of {to_mm:g} mm, but "
-                    f"stands at {at_mm:g} mm.",
+                    f"{bed.actuator.name} must come to rest within {_near_mm(bed):.3g} mm of {to_mm:g} mm, but rests "
+                    f"at {at_mm:g} mm.",
                 )
 
     def test_a_motion_takes_the_time_that_its_speed_says(self) -> None:
@@ -107,7 +107,7 @@ class ActuatorContract(_BedContract):
             at_mm = _until_rest(bed)[-1].value
             hold(
                 abs(at_mm) <= _still_mm(bed),
-                f"{bed.actuator.name} must stand within {_still_mm(bed):.3g} mm of 0 once homed, but stands at "
+                f"{bed.actuator.name} must rest within {_still_mm(bed):.3g} mm of 0 after homing, but rests at "
                 f"{at_mm:g} mm: state its repeatability_mm.",
             )
 
@@ -119,7 +119,10 @@ class ActuatorContract(_BedContract):
             speed_mm_s = _speed_mm_s(bed, SLOW_MM_S)
             bed.actuator.jog(speed_mm_s)
             before += _watched(bed, 1.0)
-            hold(bed.actuator.busy, f"{bed.actuator.name} must jog until stopped, but stands ({bed.actuator.alarm}).")
+            hold(
+                bed.actuator.busy,
+                f"{bed.actuator.name} must jog until it is stopped, but is at rest ({bed.actuator.alarm}).",
+            )
             bed.actuator.stop()
             asked_s = bed.clock.now_s()
             readings = before + _until_rest(bed)
@@ -128,7 +131,8 @@ class ActuatorContract(_BedContract):
             stops_within_s = STOPS_WITHIN_S + bed.actuator.limits.settling_s
             hold(
                 stopping_s < stops_within_s,
-                f"{name} must stand {stops_within_s:g} s after a stop, but moved on for {stopping_s:.2g} s.",
+                f"{name} must come to rest within {stops_within_s:g} s after a stop, but moved on for {stopping_s:.2g} "
+                "s.",
             )
             went_mm, due_mm = (
                 readings[-1].value - before[0].value,
@@ -136,13 +140,15 @@ class ActuatorContract(_BedContract):
             )
             hold(
                 abs(went_mm - due_mm) <= _known_mm(bed, speed_mm_s),
-                f"{bed.actuator.name} must go {due_mm:.3g} mm at {speed_mm_s:g} mm/s, but went {went_mm:.3g} mm.",
+                f"{bed.actuator.name} must move by {due_mm:.3g} mm at {speed_mm_s:g} mm/s, but moved by {went_mm:.3g} "
+                "mm.",
             )
             _wait(bed, 0.5)
             later_mm = bed.actuator.readings()[-1].value
             hold(
                 abs(later_mm - readings[-1].value) <= _still_mm(bed),
-                f"{bed.actuator.name} must stand after a stop, but went on by {later_mm - readings[-1].value:.3g} mm.",
+                f"{bed.actuator.name} must be at rest after a stop, but moved on by "
+                f"{later_mm - readings[-1].value:.3g} mm.",
             )
 
     def test_readings_come_in_order_and_between_question_and_answer(self) -> None:
@@ -163,11 +169,11 @@ class ActuatorContract(_BedContract):
             ):
                 move = partial(bed.actuator.move, to_mm, mm_s)
                 _refused(move, f"a move to {to_mm:g} mm at {mm_s:g} mm/s")
-            hold(not bed.actuator.busy, f"{bed.actuator.name} must stand after a refused motion, but moves.")
+            hold(not bed.actuator.busy, f"{bed.actuator.name} must be at rest after a refused motion, but moves.")
             after_mm = bed.actuator.readings()[-1].value
             hold(
                 abs(after_mm - before_mm) <= _still_mm(bed),
-                f"{bed.actuator.name} must not move when it refuses, but went to {after_mm:g} mm.",
+                f"{bed.actuator.name} must not move when it refuses a motion, but moved to {after_mm:g} mm.",
             )
 
     def test_a_busy_actuator_refuses_another_motion(self) -> None:
@@ -186,7 +192,7 @@ class ActuatorContract(_BedContract):
 
     def _needs_motor(self) -> None:
         if not self.has_motor:
-            raise NotApplicable("a stage turned by hand has no set speed, and is at rest once its reading is typed")
+            raise NotApplicable("a stage turned by hand has no set speed, and is at rest when its reading is typed in")
 
 
 class ForceSensorContract(_BedContract):
@@ -197,12 +203,13 @@ class ForceSensorContract(_BedContract):
         with self._bed() as bed:
             sensor = bed.force_sensor
             if sensor is None:
-                raise NotApplicable("this bed has no force sensor")
+                raise NotApplicable("this test bed has no force sensor")
             seen = _check_order(bed, sensor.readings, sensor.name, asked=False)
             largest = max(abs(reading.value) for reading in seen)
             hold(
                 largest <= sensor.full_scale_n,
-                f"{sensor.name} must tell forces up to {sensor.full_scale_n:g} N, but told {largest:g} N.",
+                f"{sensor.name} must return forces up to its full scale of {sensor.full_scale_n:g} N, but returned "
+                f"{largest:g} N.",
             )
 
 
@@ -214,21 +221,21 @@ class CameraContract(_BedContract):
         with self._bed() as bed:
             camera = bed.camera
             if camera is None:
-                raise NotApplicable("this bed has no camera")
+                raise NotApplicable("this test bed has no camera")
             shots = [camera.next() for _ in range(5)]
             indices = [shot.index for shot in shots]
             hold(
                 indices == list(range(indices[0], indices[0] + 5)),
-                f"Frames must be counted without holes, but are {indices}.",
+                f"Frame numbers must be consecutive, but are {indices}.",
             )
             for a, b in pairwise(shots):
                 hold(
                     a.device_s < b.device_s and a.arrived_s < b.arrived_s,
-                    f"Times must rise from frame {a.index} to {b.index}, but are {a.device_s:g} and {b.device_s:g} s "
-                    f"on the camera's clock, {a.arrived_s:g} and {b.arrived_s:g} s on the bed's.",
+                    f"Times must increase from frame {a.index} to {b.index}, but are {a.device_s:g} and {b.device_s:g} "
+                    f"s on the camera's clock, {a.arrived_s:g} and {b.arrived_s:g} s on the test bed's clock.",
                 )
             item = shots[-1].item()
-            hold(item.time_s == shots[-1].device_s, "A frame must bear the time of its shot, but bears another.")
+            hold(item.time_s == shots[-1].device_s, "A frame must have the time of its exposure, but has another time.")
             described = camera.description
             if isinstance(item, Frame):
                 size = item.width_px, item.height_px
@@ -264,8 +271,8 @@ def _still_mm(bed: Bed) -> float:
 def _known_mm(bed: Bed, speed_mm_s: float) -> float:
     """Uncertainty (mm) of a motion's length from readings: encoder steps, scatter, and uncertain times.
 
-    Start and end of a motion each lie between two readings. What the stage may move in that time, and while it settles,
-    is added.
+    Start and end of a motion each lie between two readings. The distance that the stage may move between these
+    readings, and while it settles, is added.
     """
     limits = bed.actuator.limits
     return limits.encoder_step_mm + 2.0 * limits.repeatability_mm + (2.0 * WAIT_S + limits.settling_s) * speed_mm_s
@@ -283,7 +290,7 @@ def _until_rest(bed: Bed) -> tuple[Reading, ...]:
         seen += _watched(bed, WAIT_S)
         hold(
             bed.clock.now_s() < until_s,
-            f"{bed.actuator.name} must end its motion by itself, but moves for {PATIENCE_S:g} s.",
+            f"{bed.actuator.name} must end its motion by itself, but has moved for {PATIENCE_S:g} s.",
         )
     return (*seen, *bed.actuator.readings())
 
@@ -318,17 +325,17 @@ def _check_order(
         _wait(bed, 0.04)
         before_s = bed.clock.now_s()
         given = readings()
-        hold(bool(given), f"{name} must give at least one reading at each call, but gave none.")
+        hold(bool(given), f"{name} must return at least one reading at each call, but returned none.")
         newest, now_s = given[-1], bed.clock.now_s()
         hold(
             not asked or before_s <= newest.asked_s <= newest.got_s <= now_s,
-            f"{name} must take its newest reading between question and answer ({before_s:.6g} to {now_s:.6g} s), but "
-            f"says {newest.asked_s:.6g} to {newest.got_s:.6g} s.",
+            f"{name} must take its newest reading between request and answer ({before_s:.6g} to {now_s:.6g} s), but "
+            f"states {newest.asked_s:.6g} to {newest.got_s:.6g} s.",
         )
         seen += given
     hold(
         all(a.device_s < b.device_s for a, b in pairwise(seen)) and all(one.asked_s <= one.got_s for one in seen),
-        f"{name} must give its readings in the order of their times, but does not.",
+        f"{name} must return its readings in the order of their times, but does not.",
     )
     return seen
 

@@ -5,7 +5,7 @@ from unittest import SkipTest
 
 
 class ContractError(AssertionError):
-    """A plug-in (effect, model, device) violates its contract; the message states what it must do, and what it does."""
+    """A plug-in (effect, model, device) violates its contract; the message states the requirement and the violation."""
 
 
 class NotApplicable(SkipTest):
@@ -32,7 +32,7 @@ def run(contract: type, **given: Any) -> dict[str, str]:
     contract : type
         The contract class, such as `EffectContract`.
     **given
-        What the contract asks for: `effect=EFFECT`.
+        Attributes that the contract requires, such as `effect=EFFECT`.
 
     Returns
     -------

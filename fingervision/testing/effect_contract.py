@@ -30,7 +30,7 @@ def bench() -> History:
     run = np.concatenate([up, np.full(40, 1.4), up[::-1]])
     return History(
         input_mm=np.concatenate([run, run[::-1]]),
-        # What limits the speed of one run does not limit the other's.
+        # The runs have different speeds, so that a speed limit affects only one of them.
         time_s=np.concatenate([0.04 * np.arange(run.size), 0.04 * run.size + 0.08 * np.arange(run.size)]),
         runs=(slice(0, run.size), slice(run.size, 2 * run.size)),
         rest_gap_mm=REST_GAP_MM,
@@ -42,7 +42,7 @@ def bench() -> History:
 
 
 def neutral_values(effect: Effect, history: History) -> dict[str, float]:
-    """Parameter values at which the effect must change nothing; parameters of shape get their starting values."""
+    """Parameter values at which the effect must change nothing; shape parameters get their starting values."""
     return {
         p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) if p.neutral is None else p.neutral
         for p in _searched(effect, history)
@@ -115,7 +115,7 @@ class EffectContract:
                 response = self._chain().respond({self.effect.name: values})
                 hold(
                     bool(np.all(np.isfinite(response.left_mm)) and np.all(np.isfinite(response.right_mm))),
-                    f"The effect {self.effect.name} must answer with finite numbers at {_told(values)}, but does not.",
+                    f"The effect {self.effect.name} must return finite numbers at {_told(values)}, but does not.",
                 )
 
     def test_the_same_values_give_the_same_answer(self) -> None:
@@ -125,7 +125,8 @@ class EffectContract:
         moved_mm = _moved_mm(first, again)
         hold(
             moved_mm == 0.0,
-            f"The effect {self.effect.name} must answer alike to the same values, but differs by {moved_mm:.3g} mm.",
+            f"The effect {self.effect.name} must return the same result for the same values, but the results differ by "
+            f"{moved_mm:.3g} mm.",
         )
 
     def test_memory_starts_each_run_at_rest(self) -> None:
@@ -138,8 +139,8 @@ class EffectContract:
             off_mm = abs(float(moved.gap_mm[run][0] - bare.gap_mm[run][0]))
             hold(
                 off_mm <= ROUNDING_MM,
-                f"The effect {self.effect.name} must start each run at rest, but run {number} starts {off_mm:.3g} mm "
-                "beside it.",
+                f"The effect {self.effect.name} must not depend on earlier runs at the start of a run, but run "
+                f"{number} starts with a deviation of {off_mm:.3g} mm.",
             )
 
     def test_a_mirrored_picture_mirrors_the_answer(self) -> None:
@@ -154,8 +155,8 @@ class EffectContract:
         )
         hold(
             moved_mm <= ROUNDING_MM,
-            f"The effect {self.effect.name} must be mirrored by a mirrored picture, but differs by {moved_mm:.3g} mm: "
-            "state in `odd` the parameters that change their sign.",
+            f"The effect {self.effect.name} must have a mirrored result in a mirrored picture, but differs by "
+            f"{moved_mm:.3g} mm: state in `odd` the parameters that change their sign.",
         )
 
     def test_without_the_data_that_it_needs_it_is_excluded(self) -> None:
@@ -170,7 +171,8 @@ class EffectContract:
             searched = self.effect.search(without) if needed else "not asked"
             hold(
                 isinstance(searched, str) and len(searched) > 0,
-                f"The effect {self.effect.name} must be excluded with a reason without {words}, but is searched for.",
+                f"The effect {self.effect.name} must be excluded, with a reason, from data without {words}, but is "
+                "searched for.",
             )
 
     def test_without_times_it_works_unless_it_says_that_it_needs_them(self) -> None:
@@ -197,7 +199,7 @@ class EffectContract:
             chain = MeasuringChain(MODEL, wave, {}, curved=curved)
             seen = self._respond(chain, {"delay_s": 0.07})
             errors_mm.append(float(np.max(np.abs(seen.gap_mm - late_mm)[5:-5])))
-        # Lines miss it by a step squared over eight, curves by the step's third power.
+        # The error of lines is the step squared over eight; the error of curves is of third order in the step.
         hold(
             errors_mm[0] > 0.01 and errors_mm[1] < 0.2 * errors_mm[0],
             f"The effect {self.effect.name} must delay a sine better along curves than along lines, but misses it by "
@@ -221,7 +223,7 @@ class _ChainOf:
             effect = replace(effect, act=effect.act_curved)  # type: ignore[arg-type]  # the law of the same stage
         effect = guarded(effect)
         self._chain = replace(chain)
-        # A cached property of a frozen record: its value for this chain alone.
+        # Set the value of a cached property of a frozen record, for this chain only.
         self._chain.__dict__["effects"] = {effect.name: effect}
 
     def respond(self, settings: dict[str, dict[str, float]]) -> Response:

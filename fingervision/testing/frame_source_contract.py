@@ -28,7 +28,7 @@ class FrameSourceContract:
         """The kind accepts its own recording, and does not accept a missing file."""
         hold(bool(self.kind.accepts(self.name)), f"The source must accept {self.name}, but does not.")
         for name in NOWHERE:
-            hold(not self.kind.accepts(name), f"The source must not accept {name!r}, which is nothing, but does.")
+            hold(not self.kind.accepts(name), f"The source must not accept {name!r}, which does not exist, but does.")
 
     def test_it_describes_its_frames(self) -> None:
         """The description agrees with the frames that the source yields."""
@@ -56,9 +56,9 @@ class FrameSourceContract:
         """Frame numbers, including those of lost frames, are consecutive from 0, and times increase."""
         frames = self._frames(self.source())
         indices = [frame.index for frame in frames]
-        hold(indices == list(range(len(frames))), f"Frames must be counted from 0 without holes, but are {indices}.")
+        hold(indices == list(range(len(frames))), f"Frame numbers must be consecutive from 0, but are {indices}.")
         times = [frame.time_s for frame in frames if isinstance(frame, Frame) and frame.time_s is not None]
-        hold(all(a < b for a, b in pairwise(times)), f"Times of frames must rise, but are {times}.")
+        hold(all(a < b for a, b in pairwise(times)), f"Times of frames must increase, but are {times}.")
 
     def test_pixels_are_grey_levels_or_colours(self) -> None:
         """Pixels have 8 or 16 bits, and one or three channels."""
@@ -75,14 +75,14 @@ class FrameSourceContract:
         """A recording that is opened again yields the same frames."""
         source = self.source()
         if not source.description.files:
-            raise NotApplicable("a live source gives other frames each time")
+            raise NotApplicable("a live source yields different frames each time")
         first, again = self._frames(source), self._frames(self.source())
         alike = len(first) == len(again) and all(
             type(a) is type(b)
             and (not isinstance(a, Frame) or not isinstance(b, Frame) or (a.pixels == b.pixels).all())
             for a, b in zip(first, again, strict=False)
         )
-        hold(alike, f"{self.name} must read alike twice, but does not.")
+        hold(alike, f"{self.name} must yield the same frames when it is opened again, but does not.")
 
     def _frames(self, source: FrameSource) -> list[Frame | LostFrame]:
         frames = list(islice(source, LOOKED_AT))

@@ -19,8 +19,9 @@ from fingervision.testing.contract import NotApplicable, hold
 NOISE_MM = 5e-4
 """Random noise of an ordinary set-up (0.02 px at 34 px/mm)."""
 SHARE_OF_SIZE, SHARE_OF_SHAPE = 0.3, 0.382
-"""Position of a hidden parameter between its bounds, as a fraction of the range. A size is well away from its neutral
-value; a shape is at the golden section, away from the middle, which is the only value tried by default."""
+"""Position of a hidden parameter between its bounds, as a fraction of the range. A parameter of size is well away from
+its neutral value. A parameter of shape is at the golden section, away from the middle of its range, which is the only
+starting value by default."""
 
 
 def made_up_history() -> History:
@@ -65,7 +66,7 @@ def hidden_values(effect: Effect, history: History) -> dict[str, float]:
     Raises
     ------
     NotApplicable
-        The effect cannot be looked for on this motion.
+        The effect cannot be detected with this motion.
     """
     searched = effect.search(history)
     if isinstance(searched, str):
@@ -105,11 +106,11 @@ class HiddenEffectContract:
         advice = (
             f"give {' and '.join(shapes)} more starts, so that more than one value is tried between the bounds"
             if shapes
-            else "look whether its bounds and its neutral value are those that are meant"
+            else "check the bounds and neutral values of its parameters"
         )
         hold(
             any(effect.name in names for names in report.alternatives),
             f"The effect {effect.name} was hidden with "
             f"{', '.join(f'{name} = {value:.4g}' for name, value in values.items())} and must be found again, but the "
-            f"diagnosis says {report.verdict}{': ' if named else ''}{' or '.join(named)}: {advice}.",
+            f"diagnosis returned {report.verdict}{': ' if named else ''}{' or '.join(named)}: {advice}.",
         )

@@ -30,7 +30,10 @@ class ModelContract:
         """The gap at input 0 is `rest_gap_mm`, and 0 lies in the range of inputs."""
         model = self.model()
         low, high = model.input_range_mm
-        hold(low < 0.0 < high, f"The inputs of {self.kind.KIND} must reach from below 0 to above, but are {low, high}.")
+        hold(
+            low < 0.0 < high,
+            f"The inputs of {self.kind.KIND} must extend from below 0 to above 0, but are {low, high}.",
+        )
         at_rest = float(model.respond(np.zeros(1)).gap_mm[0])
         hold(
             abs(at_rest - model.rest_gap_mm) < RELATIVE * model.rest_gap_mm,
@@ -42,11 +45,14 @@ class ModelContract:
         model = self.model()
         low, high = model.input_range_mm
         answer = model.respond(np.linspace(low, high, 7))
-        hold(bool(np.all(np.diff(answer.gap_mm) > 0.0)), f"{self.kind.KIND} must open with the input, but does not.")
+        hold(
+            bool(np.all(np.diff(answer.gap_mm) > 0.0)),
+            f"{self.kind.KIND} must open when the input increases, but does not.",
+        )
         apart = float(np.max(np.abs(answer.left_mm + answer.right_mm)))
         hold(
             apart < RELATIVE * float(np.max(np.abs(answer.gap_mm))),
-            f"{self.kind.KIND} must move both fingers alike, but their middle moves by {apart:.3g} mm.",
+            f"{self.kind.KIND} must move both fingers by the same amount, but the midline moves by {apart:.3g} mm.",
         )
 
     def test_its_figures_are_those_of_its_answer(self) -> None:
@@ -57,12 +63,13 @@ class ModelContract:
         slope = float((answer.gap_mm[2] - answer.gap_mm[1]) / (0.5 * high))
         hold(
             abs(slope - figures.gap_per_input) < RELATIVE * abs(slope),
-            f"{self.kind.KIND} must open by its gap per input of {figures.gap_per_input:g}, but opens by {slope:g}.",
+            f"{self.kind.KIND} must have the gap per input that its figures state, {figures.gap_per_input:g}, but has "
+            f"{slope:g}.",
         )
         if answer.force_n is not None:
             stiffness = float(answer.force_n[2] / (0.5 * high))
             hold(
                 abs(stiffness - figures.input_stiffness_n_mm) < RELATIVE * abs(stiffness),
-                f"{self.kind.KIND} must press with its stiffness of {figures.input_stiffness_n_mm:g} N/mm, but "
-                f"presses with {stiffness:g} N/mm.",
+                f"{self.kind.KIND} must have the stiffness that its figures state, {figures.input_stiffness_n_mm:g} "
+                f"N/mm, but has {stiffness:g} N/mm.",
             )

@@ -108,6 +108,6 @@ def fit_profile(
     limits = LIMITS_PX[kind]
     is_fitted, *fit = _fit_profile(kind, t, value, weight, blur, start, bool(is_blur_known), *limits, too_many)
     if not is_fitted:
-        msg = "the parts of the profile's model are indistinguishable"
+        msg = "the parts of the profile's model cannot be distinguished"
         raise np.linalg.LinAlgError(msg)
     return ProfileFit(*fit)

@@ -68,7 +68,7 @@ def made(out: Path) -> dict[str, int]:
 def test_one_two_and_by_hand_are_the_same_and_a_broken_one_is_listed(run: Run, copy: Path, tmp_path: Path) -> None:
     code, out, err = run("batch", "measure", "rec/**/*.mkv", *SCALE, "--out", "two", "--jobs", 2)
     assert code == 3
-    assert "4 of 5 inputs have their result (5 worked on by this call)." in out
+    assert "4 of 5 inputs have a result (5 processed by this call)." in out
     assert err.startswith("fingervision: rec/b/broken.mkv must be a video")
     assert run("batch", "measure", "rec/**/*.mkv", *SCALE, "--out", "one", "--jobs", 1)[0] == 3
     table = lines(Path("two"))

@@ -148,4 +148,4 @@ def test_a_cluster_gives_the_same_and_survives_a_dead_worker(
     assert not list(there.glob(".*"))
     again = batch(tmp_path, f"{recordings}/**/good*.mkv", *SCALE, "--out", there, "--scheduler", address)
     assert again.returncode == 0, again.stderr
-    assert "(0 worked on by this call)" in again.stdout or "nothing to do" in again.stdout
+    assert "(0 processed by this call)" in again.stdout or "nothing to do" in again.stdout

@@ -268,7 +268,7 @@ def test_a_black_recording_has_a_table_and_no_number(run: Run, tmp_path: Path) -
     write_clip(tmp_path / "black.mkv", black, Ffv1())
     code, _, err = run("black.mkv", *SCALE)
     assert code == 1
-    assert "None of the 3 frames gave a number (3 low_contrast)." in err
+    assert "None of the 3 frames could be measured (3 low_contrast)." in err
     assert [row["status"] for row in rows(Path("measured/black.mkv/gaps.csv"))] == ["low_contrast"] * 3
 
 

@@ -149,7 +149,7 @@ def test_a_mechanism_moves_too(tmp_path: Path) -> None:
         (("--frequency", "1:500", "--damping", "modal:2"), r"must give a damping ratio below 0.3"),
         (
             ("--frequency", "1:1e4", "--damping", "paper"),
-            r"is valid for modes up to 3\d\d.* Hz only .* end the band before",
+            r"is valid for modes up to 3\d\d.* Hz only .* end the band below",
         ),
         (("--modes", "0"), r"--modes must be a number from 1 to 40, or a positive frequency"),
         (("--modes", "-5Hz"), r"--modes must be"),

@@ -92,7 +92,7 @@ def test_what_is_no_recording_is_a_sentence(tmp_path: Path, clip: Path) -> None:
     os.mkfifo(tmp_path / "pipe.mp4")
     (tmp_path / "loop").symlink_to("loop")
     assert "is a pipe or a device" in said(tmp_path, "measure", "pipe.mp4", *SCALE)
-    assert "must have a name, but it is empty" in said(tmp_path, "measure", "", *SCALE)
+    assert "must not be empty, but argument" in said(tmp_path, "measure", "", *SCALE)
     assert "is a camera, which does not" in said(tmp_path, "measure", "simulated", *SCALE)
     assert "fingervision: " in said(tmp_path, "measure", "loop", *SCALE)
     assert "ends before frame 7" in said(tmp_path, "measure", str(clip), *SCALE, "--frames", "7:9")

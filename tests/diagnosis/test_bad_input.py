@@ -90,7 +90,7 @@ def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, sc
     report = asked(tmp_path, stage("+-", 2, play_mm=0.0), scale=scale)
     assert report.verdict is Verdict.UNKNOWN
     assert report.effects == ()
-    said = re.search(r"moves (\S+) times as far as the model says: check the units", report.unknown or "")
+    said = re.search(r"moves (\S+) times as far as the model predicts: check the units", report.unknown or "")
     assert said is not None
     assert float(said.group(1)) == pytest.approx(1.0 / scale, rel=0.01)
 
@@ -105,4 +105,4 @@ def test_two_thirds_of_wrong_rows_are_no_noise(tmp_path: Path, offset_mm: float,
     report = asked(tmp_path, table if timed else {name: table[name] for name in ("input_mm", "gap_mm")})
     assert report.verdict is Verdict.UNKNOWN
     assert report.effects == ()
-    assert "the rows are no one measurement with one noise" in (report.unknown or "")
+    assert "the rows are not one measurement with one noise" in (report.unknown or "")

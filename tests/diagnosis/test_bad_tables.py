@@ -99,7 +99,7 @@ def test_a_refused_table_leaves_no_empty_folder(tmp_path: Path, command: str) ->
     ("kind", "words"),
     [
         ("right", None),
-        ("scattered", "lie together"),
+        ("scattered", "of the rows agree"),
         ("shifted", "two groups about 0.4 mm"),
         ("halved", "two groups about 0.4 mm"),
     ],

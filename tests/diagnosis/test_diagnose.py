@@ -141,7 +141,7 @@ def test_table_1_against_comsol_is_an_offset_of_the_gap_or_of_the_input(tmp_path
     assert report.disagreement.before_rms_mm == pytest.approx(0.495, abs=0.001)
     assert report.disagreement.after_rms_mm <= 0.20
     assert report.effects[0].parameters["offset_mm"].value == pytest.approx(0.486, abs=0.005)
-    assert any("set and not measured" in note for note in report.notes)
+    assert any("set instead of measured" in note for note in report.notes)
     assert report.next_run is not None
 
 

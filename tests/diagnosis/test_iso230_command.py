@@ -30,4 +30,4 @@ def test_targets_in_figures_out(tmp_path: Path) -> None:
     assert np.isclose(section["figures"]["B_mean"]["value"], 1e-3 * np.mean(reversals), rtol=0.0, atol=1e-12)
     page = (out / "report.html").read_text()
     assert "ISO 230-2" in page
-    assert "as play makes it" in page
+    assert "as play causes them" in page

@@ -65,7 +65,7 @@ def test_the_scale_of_a_figure_is_that_of_the_rows_that_count(found: Diagnosis) 
     figure = residual_figure({"gap": found.before_mm[:500]}, None, found.data.chain.history, found.left_out)
     axes = figure.axes[-1]
     assert axes.get_ylim()[1] < 2.0 * OFFSET_MM
-    assert "3 of 3 rows left out lie outside the picture" in axes.get_title("right")
+    assert "3 of 3 rows left out lie outside the plot" in axes.get_title("right")
 
 
 def test_the_page_scales_to_the_rows_that_count_and_is_citable(folder: Path, found: Diagnosis, tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_the_page_scales_to_the_rows_that_count_and_is_citable(folder: Path, fou
     made = provenance({"measured": table}, "fingervision diagnose")
     write_answer(tmp_path, found, read_model(folder / "simulation.csv"), made, table)
     page = (tmp_path / "report.html").read_text()
-    assert "3 of 3 rows left out lie outside the picture" in page
+    assert "3 of 3 rows left out lie outside the plot" in page
     assert f"{AUTHORS} ({RELEASED}). fingervision" in page
     cff = Path("CITATION.cff").read_text()
     assert AUTHORS in cff

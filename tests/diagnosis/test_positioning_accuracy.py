@@ -242,7 +242,7 @@ def test_shares_name_the_cause() -> None:
     assert report.share_mm("thermal_drift", "R_up") == pytest.approx(report.measured.value_mm("R_up"))
     assert report.share_mm("position_error_map", "M") == pytest.approx(0.09, rel=0.05)
     words = positioning_words(report)
-    assert "of it is backlash" in words[0]
+    assert "are caused by backlash" in words[0]
     assert "smaller readings where a target is approached from below" in words[0]
     assert "thermal_drift" in words[1]
     assert "position_error_map" not in words[1]

@@ -92,8 +92,8 @@ def test_a_gripper_is_compared_with_its_model() -> None:
     assert found.after.value_mm("E") == pytest.approx(0.0, abs=1e-12)
     document = positioning_document(found)
     assert document["reference"] == "model"
-    assert "not of the axis alone" in document["notes"][0]
-    assert "as play makes it" in positioning_words(found)[0]
+    assert "not the axis alone" in document["notes"][0]
+    assert "as play causes them" in positioning_words(found)[0]
 
 
 @pytest.mark.parametrize("slope", [1.0, -1.0])
@@ -106,7 +106,7 @@ def test_a_reversal_of_the_wrong_sign_is_asked_about(slope: float, play_mm: floa
     assert found.reference == "target"
     assert found.after is None
     assert ("swapped?" in positioning_words(found)[0]) == (play_mm < 0.0)
-    assert ("as play makes it" in positioning_words(found)[0]) == (play_mm > 0.0)
+    assert ("as play causes them" in positioning_words(found)[0]) == (play_mm > 0.0)
 
 
 def test_a_reversal_within_its_uncertainty_has_no_side() -> None:
@@ -127,7 +127,7 @@ def test_a_sweep_has_no_figures_and_says_why() -> None:
     ones = np.ones(60, dtype=bool)
     found = positioning_of_table(inputs, ones, (slice(0, 60),), None, inputs, lambda _: inputs, {})
     assert isinstance(found, NoRepeatedTargets)
-    assert "do not gather" in found.reason
+    assert "form no targets" in found.reason
 
 
 def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:

@@ -135,12 +135,12 @@ def test_the_first_half_of_a_long_rest_is_settling() -> None:
 @pytest.mark.parametrize(
     ("inputs", "words"),
     [
-        (np.linspace(0.0, 1.0, 200), "do not gather"),
+        (np.linspace(0.0, 1.0, 200), "form no targets"),
         (np.sin(np.linspace(0.0, 60.0, 1000)), "."),
         (np.random.default_rng(1).uniform(0.0, 1.0, 300), "."),
         (np.tile([0.0, 4.0], 40), "only 2 different"),
-        (np.array([0.0, 1.0, 2.0, 3.0, 4.0]), "do not gather"),
-        (np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0]), "do not gather"),
+        (np.array([0.0, 1.0, 2.0, 3.0, 4.0]), "form no targets"),
+        (np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0]), "form no targets"),
         (np.full(20, 1.5), "never changes"),
         (np.array([1.0, 2.0]), "fewer than four"),
         (np.tile(0.01 * np.concatenate([np.arange(300), np.arange(300)[::-1]]), 3), "."),

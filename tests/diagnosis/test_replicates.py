@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.noise.replicates import pure_error, resolution, visits
+from fingervision.diagnosis.noise.residual_scatter import most_noise
 
 SCATTER_MM = 0.003
 TARGETS = np.arange(-20.0, 21.0, 5.0)
@@ -103,6 +104,20 @@ def test_few_repeats_tell_nothing() -> None:
 def test_the_digits_of_a_reading_are_found_and_noise_has_none() -> None:
     assert resolution(np.round(np.random.default_rng(1).normal(size=200), 3)) == pytest.approx(0.001)
     assert resolution(np.random.default_rng(1).normal(size=200)) == 0.0
+
+
+def test_readings_at_evenly_spaced_targets_have_the_digits_of_their_file() -> None:
+    # One visit of thirty places 1.545 mm apart: nearly multiples of 1.545, but not to the digits of the file.
+    places = np.linspace(2.24, 47.04, 30)
+    gaps = np.round(places + 1e-3 * np.random.default_rng(2).normal(size=places.size), 6)
+    assert resolution(gaps) <= 1e-6
+    assert resolution(np.arange(40.0) / 34.0) == pytest.approx(1.0 / 34.0), "pixels have digits without end"
+
+
+def test_a_scatter_that_cannot_be_told_is_no_scatter_of_the_last_digit() -> None:
+    # A hold has no second pass over a place, and its readings have seven decimals.
+    noise = np.round(1e-3 * np.random.default_rng(3).normal(size=300), 7)
+    assert most_noise(noise, np.zeros(300), (slice(0, 300),), 3e-8) > 1e-3
 
 
 def test_a_drift_that_few_visits_hide_shows_in_readings_that_follow_one_another() -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fingervision.stage_record.encoder import input_sigma
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
+from fingervision.stage_record.window_blending import blended
 
 Array = NDArray[np.float64]
 RATE_HZ = 8.0
@@ -112,3 +113,17 @@ def test_an_exact_swing_has_no_error() -> None:
     t = _time_s(60.0)
     sigma, _ = input_sigma(0.15 * np.sin(2.0 * np.pi * 0.3 * t), (slice(0, t.size),))
     assert sigma < SIGMA_MM / 20.0
+
+
+def test_blending_keeps_lines_and_takes_out_the_zigzag_of_an_encoder() -> None:
+    rng = np.random.default_rng(8)
+    t = np.cumsum(rng.uniform(0.05, 0.2, 300))
+    whole = (slice(0, 300),)
+    assert blended(0.3 * t, 0.3 * t, t, whole, np.full(300, 0.05)) == pytest.approx(0.3 * t, abs=1e-12)
+    # Half a step a sample: the rounding alternates, and the selected windows with it.
+    t = np.arange(300.0)
+    true = 0.503 * STEP_MM * t
+    recorded = np.round(true / STEP_MM) * STEP_MM
+    found, leverage = smoothed(recorded, t, whole, STEP_MM / np.sqrt(12.0), STEP_MM)
+    rough, smooth = (np.std(np.diff(values - true)) for values in (found, blended(found, recorded, t, whole, leverage)))
+    assert smooth < 0.7 * rough

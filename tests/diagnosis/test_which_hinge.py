@@ -190,7 +190,7 @@ def test_without_a_drawing_channels_are_not_compared_and_that_is_said(tmp_path: 
     simulation.write_text("input_mm,gap_mm\n" + "\n".join(
         f"{u},{rest + (slopes['gap_mm'] - rest) * u}" for u in (-1.0, 0.0, 1.0)))  # fmt: skip
     found = ask(table, simulation, tmp_path / "o")
-    assert any("draws no bodies" in note for note in found["notes"])
+    assert any("has no bodies" in note for note in found["notes"])
 
 
 @pytest.mark.slow

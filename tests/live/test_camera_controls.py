@@ -237,7 +237,7 @@ def test_a_camera_that_is_silent_says_so_and_is_not_changed_later(
     monkeypatch.setattr("fingervision.live.adjustments.ANSWERED_WITHIN_S", 0.2)
     cameras[0].is_stuck = True
     time.sleep(0.05)
-    with pytest.raises(CameraError, match="does not answer, so its exposure was not changed"):
+    with pytest.raises(CameraError, match="does not answer, so that its exposure was not changed"):
         put(session, "exposure", 5.0)
     cameras[0].is_stuck = False
     measured = session.history.count

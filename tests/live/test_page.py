@@ -250,7 +250,7 @@ def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     # How soon is counted by the program, and not by a browser that waits for a busy machine.
     assert SILENT_S + STATE_EVERY_S < SAID_WITHIN_S
     camera.start()
-    says(page, "The source is back")
+    says(page, "The source has returned")
     shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
 
 

@@ -190,7 +190,7 @@ def test_refitted_numbers_answer_as_the_drawing_with_them(drawn: PhysicalGripper
 
 
 def test_a_name_that_is_no_number_of_the_drawing_is_said(gripper: Gripper) -> None:
-    with pytest.raises(DataError, match=r"named as in gripper\.toml, but is hinge\.width_mm"):
+    with pytest.raises(DataError, match=r"its name in gripper\.toml, but is named hinge\.width_mm"):
         redrawn(gripper, "hinge.width_mm", 0.1)
 
 

@@ -97,7 +97,7 @@ def test_refusals_say_what_must_be(tmp_path: Path) -> None:
         ([], H264(), r"at least one frame, but clip.mp4 would have none"),
         (untimed, H264(), r"must have its time, but frame 0 has none"),
         (backwards, H264(), r"increase, but frame 1 is at 0.5 s, after 1 s"),
-        (mixed, H264(), r"frames of a clip must be alike, but frame 1 is \(60, 160\)"),
+        (mixed, H264(), r"frames of a clip must have the same shape and type, but frame 1 is \(60, 160\)"),
         (odd, H264(), r"H264 needs an even width and height, but the frames have 160 x 119 pixels"),
         (wide, Mjpeg(), r"Mjpeg holds 8 bits, but the frames have 16"),
         (some_frames(Camera(bits=16, tint=(1.0, 1.0, 1.0))), Ffv1(), r"FFV1 clips hold colour with 8 bits"),

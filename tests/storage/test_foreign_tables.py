@@ -16,7 +16,8 @@ from tests.storage.foreign.truth import Truth, truths
 
 # Digits of the printed numbers times an exact factor: the rest is the rounding of floating-point numbers.
 SAME_MM = 1e-9
-# Seconds since 1904 are 3.8e9: two neighbouring floating-point numbers are 4.8e-7 s apart there.
+# Seconds since 1904 are 3.8e9: two neighbouring floating-point numbers are 4.8e-7 s apart there,
+# days since 1900 6e-7 s.
 SAME_EPOCH_S = 5e-7
 TRUTHS = truths()
 
@@ -54,7 +55,7 @@ def check(truth: Truth, found: dict[str, np.ndarray]) -> None:
         assert found["runs"] == len(set(truth.columns["run"]))
     assert set(numbers) <= set(found)
     for name, values in numbers.items():
-        on_epoch = name == "time_s" and truth.table.stem.startswith(("unix", "labview_seconds"))
+        on_epoch = name == "time_s" and truth.table.stem.startswith(("unix", "labview_seconds", "spreadsheet"))
         same = SAME_EPOCH_S if on_epoch else SAME_MM
         np.testing.assert_allclose(found[name], values, atol=same, rtol=1e-12, err_msg=name)
 

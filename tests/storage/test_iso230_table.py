@@ -157,14 +157,14 @@ def test_directions_against_the_times_are_exchanged_and_told(tmp_path: Path) -> 
         for words in (("up", "down"), ("backward", "forward"))
     )
     assert wrong.rows == right.rows
-    assert any("taken as swapped, and exchanged" in note for note in wrong.notes)
+    assert any("the two directions were exchanged" in note for note in wrong.notes)
     assert not any("swapped" in note for note in right.notes)
 
 
 def test_directions_against_the_order_of_rows_are_asked_about(tmp_path: Path) -> None:
     for words, asked in ((("up", "down"), False), (("down", "up"), True)):
         read = read_iso230_table(write(tmp_path, travelled(words, timed=False)))
-        assert any("are the directions swapped?" in note for note in read.notes) == asked
+        assert any("are the two directions exchanged in the table?" in note for note in read.notes) == asked
     # Sorted by target, or shuffled, the order says nothing.
     for text in (long_form(), long_form(shuffled=True), matrix(), stacked()):
         assert not any("swapped" in note for note in read_iso230_table(write(tmp_path, text)).notes)

@@ -81,7 +81,7 @@ def test_macros_are_not_looked_at(tmp_path: Path) -> None:
     path = rewritten(binary.excel_plain(tmp_path), xl__vbaProject_dot_bin=b"\xd0\xcf\x11\xe0 Sub Auto_Open()")
     table = read_measured_table(path.rename(tmp_path / "macros.xlsm"))
     np.testing.assert_allclose(table.gap_mm, binary.GAP_MM, atol=1e-9)
-    assert any("macros not looked at" in note for note in table.notes)
+    assert any("without its macros" in note for note in table.notes)
 
 
 def test_a_formula_that_was_never_calculated_is_told_by_its_cell(tmp_path: Path) -> None:
@@ -208,7 +208,7 @@ def test_prose_given_as_a_model_is_said_to_be_none(tmp_path: Path) -> None:
     prose = tmp_path / "README.md"
     lines = [f"* part {k}, " + "which has, " * (k % 4) + "a hinge" for k in range(12)]
     prose.write_text("# A gripper\n\n" + "\n".join(lines), encoding="utf-8")
-    with pytest.raises(DataError, match="is no model") as caught:
+    with pytest.raises(DataError, match="is not a model") as caught:
         read_model(prose)
     assert "simulation table" in str(caught.value)
     assert "FMU" in str(caught.value)

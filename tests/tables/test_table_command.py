@@ -101,7 +101,7 @@ def test_times_make_a_measured_table_of_it(tmp_path: Path) -> None:
 
 def test_two_open_questions_suggest_two_columns(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("alpha,beta,gamma\n0,1,2\n1,2,3\n2,4,5\n", encoding="utf-8")
-    with pytest.raises(OpenQuestionError, match=r"columns\.input=alpha --set columns\.gap=beta"):
+    with pytest.raises(OpenQuestionError, match=r"columns\.input=beta --set columns\.gap=gamma"):
         call("table", tmp_path / "log.csv", "--as", "measured")
 
 

@@ -90,7 +90,7 @@ gap_mm = {gap_mm}
         ),
         (
             'kind = "hold"\nat_mm = 0.2\nseconds = 1\nframes = "many"',
-            "frames in line 7 of {path} must be \"continuous\" or a number for each point, but is 'many'.",
+            "frames in line 7 of {path} must be \"continuous\" or a number of frames for each point, but is 'many'.",
         ),
     ],
 )
@@ -128,7 +128,7 @@ def test_a_sine_needs_an_actuator_that_goes_anywhere(tmp_path: Path) -> None:
     assert str(raised.value) == (
         f"kind in line 4 of {recipe} cannot be executed: a sine consists of many short moves to intermediate positions"
         ", but this actuator can only move to the target positions of its step data. Use a triangle or a staircase "
-        "between two of these positions. Nothing was moved."
+        "between two target positions of the step data. Nothing was moved."
     )
     assert not (tmp_path / "run").exists()
 
@@ -196,7 +196,7 @@ def test_an_alarm_stops_the_run_and_is_said(tmp_path: Path) -> None:
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.tex").write_text("mine")
-    with pytest.raises(OutputError, match=r"must be a new or empty folder, but .* holds thesis\.tex"):
+    with pytest.raises(OutputError, match=r"must be a new or empty folder, but .* contains thesis\.tex"):
         run(tmp_path, steps(MOVE))
     assert (tmp_path / "run" / "thesis.tex").read_text() == "mine"
 
@@ -204,7 +204,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
 def test_a_demonstration_leaves_other_files_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("mine")
     for out, sentence in (
-        (tmp_path, f"--out must be a new or empty folder, but {tmp_path} holds thesis.tex: name another."),
+        (tmp_path, f"--out must be a new or empty folder, but {tmp_path} contains thesis.tex: name another folder."),
         (tmp_path / "thesis.tex", f"--out must be a folder, but {tmp_path / 'thesis.tex'} is a file: name another."),
     ):
         with pytest.raises(OutputError) as raised:

@@ -291,7 +291,7 @@ def test_steps_are_run_in_their_sequence_if_the_controller_keeps_these(
     done = CliRunner().invoke(cli, words)
     assert done.exit_code == 0, done
     assert controller.codes == [0, 2, 3, 1]
-    assert done.output.splitlines()[-1] == "step 1: 5.500 to 0.000 mm, stands at 0.000 mm"
+    assert done.output.splitlines()[-1] == "step 1: 5.500 to 0.000 mm, at rest at 0.000 mm"
     (tmp_path / "sequence.toml").write_text(sequence.replace("target_mm = 5.0", "target_mm = 5.5"), encoding="utf-8")
     done = CliRunner().invoke(cli, words)
     assert str(done.exception).startswith("Step 2 must be the same as in the motor controller, but ")

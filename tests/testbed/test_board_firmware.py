@@ -100,7 +100,7 @@ def test_busy_and_alarm_are_read_back(emulated: EmulatedBoard, board: Board) -> 
     while board.dropped is None:
         board.wait(0.01)
     assert board.dropped == "the motor controller raised its alarm"
-    with pytest.raises(DeviceError, match=r"^The board must be cleared before it moves again, because the motor"):
+    with pytest.raises(DeviceError, match=r"^The board must be cleared before a new motion, because the motor"):
         board.run(3, 1.0)
 
 
@@ -127,7 +127,7 @@ def test_a_silent_computer_loses_the_drive_line_within_a_tenth_of_a_second(
     while strict_board.dropped is None:
         strict_board.wait(0.01)
     assert strict_board.dropped == (
-        "the board had heard nothing from this program for 80 ms (is the computer overloaded?)"
+        "the board received no message from this program for 80 ms (is the computer overloaded?)"
     )
 
 
@@ -216,8 +216,8 @@ def test_a_reset_in_the_middle_is_said_and_lets_go_of_every_line(emulated: Emula
     with pytest.raises(DeviceError) as raised:
         until_lost(board)
     assert str(raised.value) == (
-        f"The board on {emulated.port} was reset in the middle, by its button, its supply or another program; all its "
-        "lines are off: begin again."
+        f"The board on {emulated.port} was reset during the run, by its button, its power supply or another program; "
+        "all its lines are off: start again."
     )
     assert emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) is None, since=len(emulated.edges) - 5)
 
@@ -229,7 +229,7 @@ def test_a_pulled_cable_is_said_and_drops_the_drive_line(emulated: EmulatedBoard
     pulled_s = emulated.done_s(emulated.say("unplug"))
     down = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 0, since=since)
     assert down.host_s - pulled_s <= 0.1
-    with pytest.raises(DeviceError, match=rf"^The board on {emulated.port} was lost \(.*\): is its cable in\?"):
+    with pytest.raises(DeviceError, match=rf"^The board on {emulated.port} was lost \(.*\): check that its cable is"):
         until_lost(strict_board)
 
 
@@ -239,7 +239,7 @@ def test_two_programs_on_one_port(emulated: EmulatedBoard, board: Board) -> None
     # The emulator holds the other end open too; on a real port the process is that of the other program.
     assert re.fullmatch(
         rf"The port {emulated.port} must be free, but another program \(process \d+\) has it open: "
-        "close that one first.",
+        "close that program first.",
         str(raised.value),
     )
     board.wait(0.05)  # the first is not disturbed

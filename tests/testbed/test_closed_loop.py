@@ -53,7 +53,7 @@ def test_the_demonstration_finds_what_it_hid_and_says_each_step(tmp_path: Path) 
     assert done.exception is None, done.output
     lines = done.output.splitlines()
     assert "named: The model lacks backlash (full width of the play 0.1" in done.output
-    assert "Hidden was backlash (play_mm = 0.12): found after one run." in lines
+    assert "Hidden effect: backlash (play_mm = 0.12). It was found after one run." in lines
     page = Path(lines[-1].removeprefix("Report: "))
     assert "backlash" in page.read_text(encoding="utf-8")
 

@@ -184,7 +184,7 @@ def test_letters_on_a_terminal_pause_go_on_and_stop(tmp_path: Path, typed: tuple
             sleep(0.05)
 
     os.write(typing, b"p\n")
-    wait_until(lambda: "Paused: p and Enter go on, q and Enter end the run." in said())
+    wait_until(lambda: "The run is paused: type p and Enter to continue it, or q and Enter to end it." in said())
     frames = frames_in(video)
     sleep(0.5)
     assert frames_in(video) == frames

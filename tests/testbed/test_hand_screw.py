@@ -48,11 +48,11 @@ def test_enter_alone_means_that_it_stands_there() -> None:
 
 def test_a_slip_of_the_finger_is_asked_for_again() -> None:
     actuator, screen = screw("12.5\none\n3.5\n")
-    with pytest.raises(StateError, match=r"^The reading must be typed in mm, but was not, 3 times"):
+    with pytest.raises(StateError, match=r"^The reading must be typed in mm, but 3 inputs were not valid"):
         actuator.move(1.25, 1.0)
     assert "A reading must lie between -1 and 6 mm, but is 12.5.\n" in screen.getvalue()
     assert "A reading must be a number in mm, but is 'one'.\n" in screen.getvalue()
-    assert "The reading must lie near 1.250 mm, but is 3.5.\n" in screen.getvalue()
+    assert "The reading must be within 1 mm of 1.250 mm, but is 3.5 mm.\n" in screen.getvalue()
     assert actuator.readings()[-1].value == 0.0
 
 

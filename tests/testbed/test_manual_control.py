@@ -76,7 +76,7 @@ def test_the_commands_say_where_it_stands() -> None:
         (["home"], "homed: 0.000 mm"),
         (["move", "-0.3", "--speed-mm-s", "2"], "moved: -0."),
         (["jog", "1", "--for-s", "0.2"], "jogged: 0."),
-        (["stop"], "The simulated bed stands: "),
+        (["stop"], "The simulated test bed is at rest: "),
     ):
         done = CliRunner().invoke(cli, ["bed", *words])
         assert done.exit_code == 0, done

@@ -52,7 +52,7 @@ def test_a_camera_that_ends_is_said_and_the_motor_stands(tmp_path: Path) -> None
     bed = open_bed(str(live_camera_at(tmp_path)))
     assert bed.camera is not None
     bed.camera.close()
-    with pytest.raises(DeviceError, match="must give frames while the test bed works, but it ended: the motor was"):
+    with pytest.raises(DeviceError, match="must send frames while the test bed works, but it ended: the motor was"):
         run_recipe(read_recipe(recipe_at(tmp_path, TWO_MOVES)), bed, tmp_path / "run")
     assert not bed.actuator.busy
 

@@ -128,8 +128,8 @@ def test_a_time_too_short_is_answered_with_the_shortest_and_that_is_enough(tmp_p
         ("pushing_force_n = 3.0", "pushing_force_n = 6.0",
          "Step 2 must push with at most 5.5 N, but pushing_force_n is 6."),
         ("positioning_time_s = 0.2", "positioning_time_s = 0.2\nspeed_mm_s = 3",
-         "speed_mm_s in line 7 of {path} must not stand beside positioning_time_s, from which it follows: "
-         "leave one out."),
+         "speed_mm_s in line 7 of {path} must not be given together with positioning_time_s, which determines it: "
+         "leave one of the two out."),
         ("positioning_time_s = 0.2", "",
          "[step] in line 3 of {path} must state positioning_time_s, or speed_mm_s, acceleration_mm_s2, "
          "deceleration_mm_s2, but states neither."),
@@ -143,9 +143,9 @@ def test_a_time_too_short_is_answered_with_the_shortest_and_that_is_enough(tmp_p
         ("target_mm = 5.0", "number = 16\ntarget_mm = 5.0",
          "number in line 4 of {path} must be between 1 and 15, but is 16."),
         ("target_mm = 0.5", "number = 1\ntarget_mm = 0.5",
-         "number in line 8 of {path} must be another than those before, but 1 comes again."),
+         "number in line 8 of {path} must differ from the numbers of all earlier steps, but 1 occurs twice."),
         ("name =", "sequence = [1, 4]\nname =",
-         "sequence in line 2 of {path} must be a list of numbers of steps that there are (1, 2, 3), but "
+         "sequence in line 2 of {path} must be a list of the numbers of existing steps (1, 2, 3), but "
          "is [1, 4]."),
         ("target_mm = 5.0", "taget_mm = 5.0",
          "taget_mm in line 4 of {path} is not known: did you mean target_mm?"),

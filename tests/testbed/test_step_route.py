@@ -61,6 +61,6 @@ def test_a_jog_takes_the_fastest_step_of_its_direction_that_is_slow_enough() -> 
     with pytest.raises(LimitError) as raised:
         jog_step(STEPS, -0.5, TOP_MM_S)
     assert str(raised.value) == (
-        "A jog at -0.5 mm/s must have a relative step with a negative target that is no faster, but the controller has "
-        "none: store one in it."
+        "A jog at -0.5 mm/s must have a stored relative step with a negative target and at most this speed, but the "
+        "controller has none: store such a step."
     )

@@ -23,7 +23,7 @@ GAP = "gap_mm"
 FEWEST_ROWS = 20
 """Least number of rows with every channel; with fewer, the noise covariance of the channels cannot be estimated."""
 LEAST_PRESENT = 0.5
-"""Least share of rows in which a channel must be present: rows without it are lost for all channels."""
+"""Least share of rows in which a channel must be present: a row without this channel is not used for any channel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,11 +37,11 @@ class BodyEvidence:
     findings : PlaceFindings
         Faulty hinge, link or pivot, if there is one.
     rows : ndarray of int, shape (k,)
-        Indices of these rows.
+        Indices of the rows that have all compared channels.
     names : tuple of str
-        The channels as the table calls them.
+        Names of the channels in the table.
     time_s : ndarray of float, shape (k,), or None
-        Times of those rows; None where the table has none.
+        Times of these rows; None if the table has no times.
     """
 
     prediction: BodyPrediction
@@ -53,7 +53,7 @@ class BodyEvidence:
 
 def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
     """Return the object that predicts from a model's drawing; None if the model has no drawing."""
-    # isinstance would work the answers out to look for them.
+    # isinstance would compute the predictions only to test whether they exist.
     return cast(DrawnMechanism, model.base).places if hasattr(type(model.base), "places") else None
 
 
@@ -83,14 +83,14 @@ def body_evidence(
     known, notes = known_channels(answers, tuple(table.channels)), []
     unknown = [name for name in table.channels if name not in known]
     if unknown:
-        notes.append(f"not compared, for the model foretells no such channel: {', '.join(unknown)}.")
+        notes.append(f"not compared, because the model does not predict them: {', '.join(unknown)}.")
     scarce = [name for name in known if float(table.channels[name].present.mean()) < LEAST_PRESENT]
     if scarce:
-        notes.append(f"not compared, for more than half of their readings are missing: {', '.join(scarce)}.")
+        notes.append(f"not compared, because more than half of their readings are missing: {', '.join(scarce)}.")
     names = [name for name in known if name not in scarce]
     still = [name for name in names if np.ptp(table.channels[name].value[table.channels[name].present]) == 0.0]
     if still:
-        notes.append(f"not compared, for they stand at one value in every row: {', '.join(still)}.")
+        notes.append(f"not compared, because they have the same value in every row: {', '.join(still)}.")
     names = [name for name in names if name not in still]
     if not names:
         return None, tuple(notes)
@@ -141,7 +141,7 @@ def added_everywhere(answers: PlaceAnswers, input_mm: Array, sizes: Mapping[str,
     answers : PlaceAnswers
         The drawing.
     input_mm : ndarray of float, shape (n,)
-        What the mechanism received.
+        Input that the mechanism received.
     sizes : mapping of str to float
         Size of each explanation by its full key.
     """

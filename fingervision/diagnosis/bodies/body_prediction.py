@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 _BENT_NODES = (-1.0, -0.5, 0.35, 0.7, 1.0)
 """Positions, as shares of the input's range on either side, at which equilibria in the deformed shape are computed."""
 _SLIP_NODES = np.geomspace(1e-3, 1e3, 121)
-"""Inputs relative to the play's radius at which the slip of a pivot is tabulated; beyond the last, the pin lies at the
-edge of its hole."""
+"""Inputs relative to the play's radius at which the slip of a pivot is tabulated; beyond the last input, the pin lies
+at the edge of its hole."""
 FORCE = "force_n"
 
 
@@ -68,7 +68,7 @@ class BodyPrediction:
     def bent(self) -> Array:
         """Change of the prediction if equilibrium is computed in the deformed shape, shape (n, channels).
 
-        The change is interpolated by a polynomial of order 2 to 4 in the input.
+        The change by large rotation is interpolated by a polynomial of order 2 to 4 in the input.
         """
         model, names = self.answers.model, self.answers.channels
         reach = float(np.abs(self.input_mm).max())
@@ -134,11 +134,11 @@ class BodyPrediction:
 def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float) -> Array:
     """Displacement of a pin in a pivot with play, along x and y, without friction; shape (n, 2).
 
-    The pin takes the position in its hole with the least elastic energy: with the force F on it per unit of input u,
-    and the stiffness S against a displacement s, the energy s S s / 2 - u F s is minimised over the disc of half the
+    The pin takes the position in its hole with the least elastic energy: with the force F on the pin per unit of input
+    u, and the stiffness S against a displacement s, the energy s S s / 2 - u F s is minimised over the disc of half the
     play (a trust-region problem: More and Sorensen (1983), SIAM Journal on Scientific and Statistical Computing 4, 553,
-    DOI 10.1137/0904038). Near zero load the pin follows the load; under larger loads it lies against the hole, on the
-    side to which the load points.
+    DOI 10.1137/0904038). Near zero load the pin follows the load; under larger loads the pin lies against the hole, on
+    the side to which the load points.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float)
     def length(beyond: Array) -> Array:
         return np.asarray(np.hypot(*(nodes * (load / (stiffness + beyond[:, None])).T)))
 
-    # Newton's iteration on 1 / |s| converges from the left of the root; bisection on a bracket is as quick here.
+    # Find the root by bisection, which is as fast here as Newton's iteration on 1 / |s|.
     low = np.zeros(nodes.size)
     high = nodes * float(np.hypot(*load)) + 1e-12
     outside = length(low) > 1.0

@@ -12,14 +12,15 @@ Flags = NDArray[np.bool_]
 _KNOTS = 8
 """Number of pieces of the spline over the input, whose fit is not counted as noise, whatever its cause."""
 _FEWEST_A_PIECE = 12
-"""Rows that a piece needs: its coefficient then takes a twelfth of their noise at most."""
+"""Least number of rows in a piece: the piece's coefficient then absorbs at most a twelfth of their noise."""
 _OUTLIER = 5.0
 """Standard deviations from the spline beyond which a row is excluded: 1 in 2 million by chance."""
 _MOST_CORRELATED = 0.97
-"""Largest correlation of neighbouring rows: beyond it the noise is a drift over some 30 rows, and its sum diverges."""
+"""Largest correlation of neighbouring rows: noise with a larger correlation is a drift over some 30 rows, and the sum
+of its correlations diverges."""
 _RANK = 1e-9
-"""Smallest variance, relative to the largest, of the scaled channels: a smaller one means a channel that is determined
-exactly by the others."""
+"""Smallest variance, relative to the largest, of the scaled channels: a smaller variance means that a channel is
+determined exactly by the other channels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +81,7 @@ def channel_noise(
     Parameters
     ----------
     residual : ndarray of float, shape (n, channels)
-        Measured minus predicted.
+        Measured minus predicted values.
     input_mm : ndarray of float, shape (n,)
         Inputs.
     runs : tuple of slice
@@ -117,9 +118,10 @@ def channel_noise(
             squares += np.sum(mixed[run] ** 2, axis=0)
             pairs += max(run.stop - run.start - 1, 0)
         found = products / np.maximum(squares, 1e-300)
-        # A fitted curve takes some of the slow part with it: Marriott and Pope's bias, (1 + 3 rho) / n a constant.
+        # A fitted curve absorbs some of the slow noise. Correct the bias of the correlation rho, (1 + 3 rho) / n per
+        # constant (Marriott and Pope).
         found += (1.0 + 3.0 * found) * curves.shape[1] / max(2 * pairs, 1)
-        # Less than chance gives is none: a wrong correlation of 2 / sqrt(n) costs nothing that shows.
+        # A correlation that could be due to chance is set to zero: an error of 2 / sqrt(n) has no visible effect.
         correlation = np.where(found > 2.0 / np.sqrt(max(pairs, 1)), np.clip(found, 0.0, _MOST_CORRELATED), 0.0)
     return ChannelNoise(mixing, correlation, runs, kept, sd, degrees)
 

@@ -44,7 +44,7 @@ def measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
 def composed(
     first: "Diagnosis", second: "Diagnosis", evidence: BodyEvidence, answers: PlaceAnswers, notes: tuple[str, ...]
 ) -> "Diagnosis":
-    """Combine the diagnosis from the poses and that from the gap into one report."""
+    """Combine the diagnosis from poses and the diagnosis from the gap into one report."""
     members, rest = evidence.findings.members, second.report
     best = members[0]
     keys = list(dict.fromkeys(member.candidate.key for member in members))
@@ -67,11 +67,11 @@ def composed(
     share = float(np.clip(1.0 - (after_mm / max(before_mm, 1e-300)) ** 2, 0.0, 1.0))
     view = next_view(evidence, answers)
     said = set_words(members)
-    sentence = f"Poses of the bodies tell the place: {said} (95 %)."
+    sentence = f"The poses of the bodies show the place: {said} (95 %)."
     if len(keys) > 1:
-        sentence = f"Poses of the bodies tell the place but for this set: {said} (95 % each)."
+        sentence = f"The poses of the bodies leave these places possible: {said} (95 % each)."
     if rest.verdict is not Verdict.AGREES:
-        sentence += f" Beside it: {rest.sentence}"
+        sentence += f" In addition: {rest.sentence}"
     report = replace(
         rest,
         verdict=verdict,

@@ -6,8 +6,8 @@ from math import hypot
 from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
 
 _MIRRORED = 1e-3
-"""Largest distance between a place and another's mirror image, as a share of the drawing's size, at which the two are
-partners."""
+"""Largest distance between one place and the mirror image of another place at which the two are partners, as a share of
+the drawing's size."""
 
 
 def mirror_of(prediction: BodyPrediction) -> Callable[[str], str]:
@@ -38,7 +38,7 @@ def mirror_of(prediction: BodyPrediction) -> Callable[[str], str]:
 
 
 def mirrored_channels(prediction: BodyPrediction) -> dict[str, tuple[str, float]]:
-    """Channels whose mirror image was measured too, with the sign that relates the two."""
+    """Channels whose mirror image was measured too, with the sign that relates the two channels."""
     mirrored, found = mirror_of(prediction), {}
     for name in prediction.channels:
         body, dot, part = name.rpartition(".")

@@ -19,7 +19,8 @@ ASSUMED = {"_mm": 0.001, "mrad": 0.05, "ce_n": 0.01}
 """Assumed standard uncertainty of a reading of a proposed view, if no similar quantity was measured: a pose of a link
 of 15 mm at 34 px/mm; a load cell with 0.2 % of 5 N."""
 MOST_MEMBERS = 6
-"""Explanations, best first, that a view is to separate: 15 pairs; the time it takes grows with their square."""
+"""Number of explanations, best first, that a view must separate (six explanations form 15 pairs); the computing time
+grows with the square of this number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +46,10 @@ class NextView:
 
 
 def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
-    """Choose the view that best separates the members of an ambiguity set; None if no view separates any.
+    """Choose the view that best separates the members of an ambiguity set; None if no view separates them.
 
     The criterion is the squared whitened distance that a view adds between the best explanation and every other one.
-    The size of the other explanation is refitted to the view and the measured data together, with free constants
+    The size of each other explanation is refitted to the view and the measured data together, with free constants
     (T-optimality: Atkinson and Fedorov (1975), Biometrika 62, 57, DOI 10.1093/biomet/62.1.57).
 
     Parameters
@@ -78,9 +79,8 @@ def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
         if told:
             least = min(gain for gain in gains if gain > ALIKE)
             words = (
-                f"measuring {label} as well (u {_stated(channels, sigma)}) is expected to tell "
-                f"{best.candidate.key} from {' and from '.join(told)} (expected chi-square "
-                f"{least:.0f} and more)."
+                f"measuring {label} as well (u {_stated(channels, sigma)}) is expected to distinguish "
+                f"{best.candidate.key} from {' and from '.join(told)} (expected chi-square {least:.0f} or more)."
             )
             found.append((min(gains), len(told), NextView(channels, float(min(gains)), told, words)))
     return max(found, key=lambda entry: (entry[1], entry[0]))[2] if found else None
@@ -94,7 +94,7 @@ def _distinct(members: Sequence[Fitted]) -> list[Fitted]:
 
 
 def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
-    """Whitened distance of two explanations in the measured data plus the new view, with the second refitted."""
+    """Whitened distance of two explanations in measured data plus new view, with the second explanation refitted."""
     norm = float(other.signature @ other.signature + two @ two)
     shared = float(best.signature @ other.signature + one @ two)
     total = float(best.signature @ best.signature + one @ one)

@@ -22,8 +22,8 @@ Added = Callable[[float], Array]
 PAIRS = (DrawnPart.LINKS_ALIKE, DrawnPart.LINKS_OPPOSITE)
 """Parts of a drawing that consist of two links changed together."""
 _LEAST_SCALE = 0.05
-"""Least relative change of the opening per relative change of a link's length; with less, the link does not act as a
-lever of the opening."""
+"""Least relative change of the opening per relative change of a link's length; a link with a smaller ratio does not act
+as a lever of the opening."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +71,7 @@ class Candidate:
 
 
 def candidates_of(prediction: BodyPrediction) -> tuple[Candidate, ...]:
-    """List candidates: effects with a place in the drawing, and those without one that poses can distinguish."""
+    """List candidates: effects with a place in the drawing, and effects without a place that poses can distinguish."""
     found = [*_hinges(prediction), *_links(prediction), *_pivots(prediction)]
     found += [*_pairs(prediction, found), *_without_place(prediction)]
     return tuple(found)
@@ -115,7 +115,7 @@ def _links(prediction: BodyPrediction) -> list[Candidate]:
                     way = np.subtract(points[end], points[start])
                     place = f"{body}, {' to '.join(sorted((one, other)))}"
                     found += _link(prediction, place, f"{end} sits off", _moved(numbers[end], way))
-        # A probe hangs on the nearest flexure of its body.
+        # A probe is linked to the nearest flexure of its body.
         for probe, at in mechanism.probes.items():
             own = [name for name in points if name in numbers]
             if own and prediction.answers.body_of_probe(probe) == number:

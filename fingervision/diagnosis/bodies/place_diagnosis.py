@@ -75,8 +75,8 @@ def diagnose_with_bodies(
     first = explain(table if answers is None else _beside_condensed(table, model, answers), model)
     if answers is None:
         named = ", ".join(table.channels)
-        return _noted(first, (f"{named}: not compared, for the model draws no bodies; give a gripper.toml or "
-                              "mechanism.toml as --model.",))  # fmt: skip
+        return _noted(first, (f"{named}: not compared, because the model has no bodies; "
+                              "give a gripper.toml or mechanism.toml as --model.",))  # fmt: skip
     driven_mm = _driven_input(first)
     evidence, notes = body_evidence(table, answers, driven_mm, rng)
     if evidence is None:
@@ -94,7 +94,7 @@ def diagnose_with_bodies(
     second = explain(_beside_condensed(seen, model, answers), model)
     left_mm, whole_mm = (each.report.disagreement.before_rms_mm for each in (second, first))
     if left_mm < STANDING_SHARE * whole_mm:
-        # The form of an explanation is off by that much of it: no second cause is named for the rest.
+        # The formula of an explanation may be inexact by this share: no second cause is named for the remainder.
         second = _place_alone(second)
     return measured_bodies(composed(first, second, evidence, answers, notes), evidence)
 
@@ -115,7 +115,8 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
             unseen_after_rms_mm=d.unseen_before_rms_mm,
             counted_after_rms_mm=d.counted_before_rms_mm,
         ),
-        remaining=f"The remaining difference is {d.before_rms_mm:.3g} mm RMS: noise, or the form of the explanation.",
+        remaining=f"The remaining difference is {d.before_rms_mm:.3g} mm RMS: noise, or inexactness "
+        "of the explanation's formula.",
     )
     return replace(done, report=report, after_mm=done.before_mm)
 
@@ -156,7 +157,7 @@ def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswer
         middle = 0.5 * sum(
             added[f"{probe}_{axis}_mm"] * way[k] for probe in (first, last) for k, axis in enumerate("xy")
         )
-        # A picture may show the drawing upside down: the side to which the middle goes tells.
+        # A picture may show the drawing upside down: the direction in which the midline moves shows whether it does.
         rest = table.midline_mm - np.median(table.midline_mm)
         sign = 1.0 if float(rest @ (middle - middle.mean())) >= 0.0 else -1.0
         changes["midline_mm"] = table.midline_mm - sign * middle
@@ -179,9 +180,11 @@ def _nothing_named(evidence: BodyEvidence) -> str:
     if evidence.findings.structure:
         return (
             f"poses of bodies ({compared}): they differ from the drawing in a way that no single hinge, link or pivot "
-            "explains; what is said above is the gap's answer alone."
+            "explains; the result above is that of the gap alone."
         )
-    return f"poses of bodies ({compared}) agree with the drawing: no hinge, link or pivot differs that would show."
+    return (
+        f"poses of bodies ({compared}) agree with the drawing: no hinge, link or pivot differs by a detectable amount."
+    )
 
 
 def _where(report: DiagnosisReport, evidence: BodyEvidence, answers: PlaceAnswers) -> tuple:  # type: ignore[type-arg]

@@ -78,7 +78,7 @@ class PlaceFindings:
 
 
 def apart(truth: Fitted, other: Fitted) -> float:
-    """Squared whitened distance of an explanation from another one, minimised over the other's size."""
+    """Squared whitened distance of one explanation from another, minimised over the size of the other explanation."""
     norm = float(other.signature @ other.signature)
     if norm <= 0.0:
         return float(truth.signature @ truth.signature)

@@ -1,4 +1,4 @@
-"""Nuisance parameters beside a faulty place: constants, rotations, bends, and errors of the drawing's own model."""
+"""Nuisance parameters in addition to a faulty place: constants, rotations, bends, and errors of the drawing's model."""
 
 from collections.abc import Sequence
 
@@ -22,12 +22,12 @@ FORCE_SLOPE_ERROR = 0.05
 """Relative uncertainty of the force: the modulus of a printed or rolled sheet is not known better (mechanics.md,
 section 5)."""
 BY_EDGES = 3.0
-"""Prior standard deviation of the coefficient of `BodyPrediction.by_edges`: it is 0 for poses of the bodies' areas, 1
-for poses from all straight edges, and may be two or three for poses from those edges that a picture shows. The table
-does not say which applies."""
+"""Prior standard deviation of the coefficient of `BodyPrediction.by_edges`: the coefficient is 0 for poses of the
+bodies' areas, 1 for poses from all straight edges, and perhaps two or three for poses from those edges that a picture
+shows. The table does not state how the poses were measured."""
 HINGE_ERROR, OWN_HINGE_ERROR = 0.01, 0.003
 """Relative errors of a hinge's stiffness: of the hinge tables compared with brick elements, including the root in the
-body (`models/README.md`); and the part not shared with the hinge's mirror image."""
+body (`models/README.md`); and the part that is not shared with the hinge's mirror image."""
 SCALE_ERROR = 3e-4
 """Relative uncertainty of the picture's scale, from a reference of 2 mm known to a micrometre and its edges
 (measuring.md)."""
@@ -120,9 +120,10 @@ class PlaceNuisances:
     def unknown_part(self, rows: Array) -> Array:
         """Fit of the nuisance parameters to a residual; returns the part of constants, rotation and bend only.
 
-        The result has shape (n, channels).
+        The returned array has shape (n, channels).
 
-        Possible model errors are fitted too, but stay in the residual, because they may be the sought disagreement.
+        Possible model errors are fitted too, but stay in the residual, because they may be the disagreement to be
+        found.
         """
         padded = np.concatenate([self._noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
         shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit

@@ -23,18 +23,20 @@ NOT_REFUTED = 6.0
 FALSE_CLAIMS = 0.02
 """False positive rate: share of tables with noise alone in which the largest gain exceeds the threshold."""
 DRAWS = 4000
-"""Draws of noise: the 98 % quantile is then the eightieth largest, and known to a ninth of the tail's probability."""
+"""Draws of noise: the 98 % quantile is then the eightieth largest value, and the probability of exceeding it is known
+to a ninth."""
 REFINED = 0.25
-"""Gain relative to the largest one below which a candidate is not refined."""
+"""Ratio to the largest gain below which a candidate is not refined."""
 STRUCTURE = 1e-3
 """Significance level below which the residual of an explanation contains structure."""
 STRUCTURE_SHARE = 0.05
 """Structure relative to the explained part that is attributed to the inexact form of the explanation (`STANDING_SHARE`
 for the gap)."""
 PLAYS_MM = np.geomspace(0.002, 0.5, 25)
-"""Plays that are tried: from a fifteenth of a pixel at 34 px/mm to the catalogue's bound, a quarter apart."""
+"""Plays that are tried, in steps of a quarter, from a fifteenth of a pixel at 34 px/mm to the catalogue's bound."""
 STEPS = 4
-"""Refinements of a size: each changes it by 1.4 at most, so that four cover the quarter between two plays tried."""
+"""Number of refinements of a size: each changes the size by a factor of at most 1.4, so that four refinements cover the
+interval between two plays that are tried."""
 
 
 class PlaceSearch:
@@ -94,7 +96,8 @@ class PlaceSearch:
             unit = self.signature(candidate, float(play_mm)) / play_mm
             norm = float(unit @ unit)
             ratio = float(unit @ left) / max(norm * play_mm, 1e-300)
-            # A width explains itself where what is left asks for about that width.
+            # The gain is that of the play at its full size, without a fitted factor: it is largest where the residual
+            # requires about this play.
             signature = play_mm * unit
             found.append((float(2.0 * signature @ left - signature @ signature), float(play_mm), norm, ratio))
         gain, size, norm, ratio = max(found)
@@ -132,7 +135,7 @@ class PlaceSearch:
         values, vectors = np.linalg.eigh(units @ units.T)
         draws = rng.standard_normal((DRAWS, values.size)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
         quantile = float(np.quantile(np.max(draws**2, axis=1), 1.0 - FALSE_CLAIMS))
-        # The noise is estimated too: Hotelling's T-squared instead of chi-square.
+        # The noise is estimated too, so that Hotelling's T-squared replaces chi-square.
         count, degrees = self.noise.mixing.shape[1], self.noise.degrees
         return float(quantile * degrees / max(degrees - count - 1, 1))
 
@@ -162,7 +165,7 @@ class PlaceSearch:
         smallest = smallest_sizes(looked, limit)
         claims = best.gain > limit
         singles = [f for f in looked if f.candidate.part not in PAIRS]
-        # Two links that are off together must gain more than chance over every single place.
+        # Two links that differ together must gain significantly more than every single place.
         one = max(singles, key=lambda f: f.gain)
         best = one if best.gain - one.gain < NOT_REFUTED else best
         among = singles if best is one else looked
@@ -181,7 +184,7 @@ class PlaceSearch:
         )
 
     def _alike(self, best: Fitted, other: Fitted) -> bool:
-        """Whether these data cannot distinguish two given explanations."""
+        """Whether two given explanations are indistinguishable in the data."""
         if best.gain - other.gain < NOT_REFUTED:
             return True
         return other.gain > best.gain / 3.0 and min(apart(best, other), apart(other, best)) < ALIKE

@@ -17,10 +17,10 @@ COVER = 2.0
 BINS = 8
 """Number of parts of the input's range in which a pose is compared."""
 SIGNIFICANT = 5.0
-"""Standard deviations of a part's mean from which it is significant: by chance in one of 17 000 tables of a hundred
+"""Standard deviations above which the mean of a part is significant: by chance, in one of 17 000 tables with a hundred
 parts."""
 MOST = 6
-"""Parts or places that a sentence lists: more are no longer read."""
+"""Largest number of parts or places that a sentence lists."""
 
 
 def fitted_words(fitted: Fitted) -> str:
@@ -42,7 +42,7 @@ def fitted_words(fitted: Fitted) -> str:
 
 
 def set_words(members: Sequence[Fitted]) -> str:
-    """Sentence with the result: one place, or the set of places that these data cannot distinguish."""
+    """Sentence with the result: one place, or the set of places that the data cannot distinguish."""
     keys = list(dict.fromkeys(member.candidate.key for member in members))
     if len(keys) == 1:
         return fitted_words(members[0])
@@ -83,4 +83,4 @@ def _joined(channel: str, answers: PlaceAnswers) -> str:
     if body not in numbers:
         return ""
     hinges = [f.name for n, f in enumerate(answers.mechanism.flexures) if numbers[body] in answers.ends(n)]
-    return f" ({body} hangs on {' and '.join(hinges)})" if hinges else ""
+    return f" ({body} is connected to {' and '.join(hinges)})" if hinges else ""

@@ -87,12 +87,12 @@ class AugmentedDataset:
         return self.both.chain.history.input_mm[self.first.chain.history.input_mm.size :]
 
     def moved(self, names: tuple[str, ...], values: Settings) -> Point:
-        """Parameter values for data plus proposed run; an end stop outside the data's range is placed outside both."""
+        """Parameter values for data plus proposed run; an end stop outside the data is placed outside data and run."""
         out: Point = {name: dict(values[name]) for name in names}
         before = {(name, parameter.name): parameter for name, parameter in self.first.parameters(names)}
         for name, now in self.both.parameters(names):
             if (name, now.name) not in before:
-                out[name][now.name] = 0.0  # the start of the new run
+                out[name][now.name] = 0.0  # start state of the new run
                 continue
             was = before[name, now.name]
             near = AT_END * (was.upper - was.lower)
@@ -111,7 +111,7 @@ class AugmentedDataset:
         sigma_mm: tuple[float, ...] | None = None,
         iterations: int = REFITTED,
     ) -> float:
-        """Squared whitened distance D_jk, over both runs, between a true prediction and the refitted rival."""
+        """Squared whitened distance, over data and proposed run, between a true prediction and the refitted rival."""
         target = self.both.whitened(self.moved(tuple(truth), truth))
         start = self.moved(rival.names, rival.values)
         return fit(self.both, rival.names, start, target=target, sigma_mm=sigma_mm, iterations=iterations).score
@@ -127,7 +127,7 @@ class AugmentedDataset:
     ) -> float:
         """Chi-square of an explanation refitted to a target signal, the smallest from several starting points.
 
-        Run offsets are treated as in `distance`.
+        Offsets of runs are treated in the same way as in `distance`.
         """
         names = explanation.names
         begins = [self.moved(names, start) for start in starts]

@@ -35,9 +35,9 @@ MODERATE, SURELY = 75.0, 0.8
 class ExpectedGain:
     """Predicted chi-square gain of a run: its most probable value, an interval, and the probability of that value.
 
-    Either of two explanations may be true, and the two cases often lead to different gains; the median over both cases
-    would lie between these gains, where hardly any gain occurs. `modest` is the most probable gain (chi-square) below
-    `MODERATE`.
+    If one explanation is true, the gain often differs from the gain if the other explanation is true. The median gain
+    over both explanations would lie between the two gains, where hardly any gain occurs. `modest` is the most probable
+    gain (chi-square) below `MODERATE`.
     """
 
     gain: float
@@ -70,8 +70,8 @@ def expected_gain(
     """Predict the gain of a run from its posterior predictive distribution given the measured data.
 
     For each draw, a true explanation and noise are drawn from the posterior, the run is simulated with them, and both
-    explanations are refitted to the data and the run together. The run's own noise gives the difference of two
-    chi-squares a standard deviation of 2 sqrt(gain).
+    explanations are refitted to the data and the run together. The noise of the proposed run gives the difference of
+    two chi-squares a standard deviation of 2 sqrt(gain).
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def expected_gain(
         for values, first in zip(truths, noisy, strict=True):
             run = AugmentedDataset.of(data, first, input_mm, rezeroed=rezeroed)
             target = run.expected(values)
-            # A run after a re-zeroing is offset by as much as both runs together then say.
+            # The offset of a run after a re-zeroing is estimated from both runs together.
             sigma_mm = None if rezeroed else _offsets(first, pair[true], rng)
             after = run.score(target, pair[other], starts, sigma_mm) - run.score(target, pair[true], [values], sigma_mm)
             known = sigma_mm if first.offsets.runs > 1 else None
@@ -130,9 +130,9 @@ def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
 def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:
     """Draw the standard deviation of the runs' offsets for each channel; from its prior if there is only one run.
 
-    The prior is zero in half of the draws, because the stage need not be re-zeroed before the run, and otherwise the
-    half-Cauchy prior that a diagnosis of both runs uses for the offsets (`RunOffsets.spread`). With several runs, the
-    spread is drawn from its posterior.
+    In half of the draws the offset is zero, because the stage need not be re-zeroed before the run. In the other half,
+    the prior is the half-Cauchy prior of `RunOffsets.spread`, as in a diagnosis of both runs. With several runs, the
+    standard deviation of the offsets is drawn from its posterior.
     """
     if problem.offsets.runs > 1:
         return problem.offsets.drawn_spread(problem.measured - problem.whitened(explanation.values), rng)

@@ -26,24 +26,24 @@ from fingervision.domain.effect import Array
 REZERO_MIN = 1.5
 """Duration of re-zeroing the stage, in minutes."""
 MOST_MIN, MOST_SAMPLES = 8.0, 6000
-"""Longest run, in minutes and samples; a longer one would be another experiment."""
+"""Longest run that is proposed, in minutes and in samples."""
 NEEDED, BARELY = 30.0, 20.0
-"""Predicted gain needed to decide a pair (9, plus an allowance for noise and parameter uncertainty), and the gain that
-is just sufficient."""
+"""Predicted gain needed to decide between two explanations (9, plus an allowance for noise and parameter uncertainty),
+and the gain that is just sufficient."""
 MOST_TRUTHS, MOST_RIVALS = 4, 8
-"""Most members that are in turn taken as the truth, and rivals of each: more cost time and hardly ever change the
-choice."""
+"""Largest number of explanations that are assumed true in turn, and of rivals of each: larger numbers cost time and
+hardly ever change the choice."""
 COMPARED = 6
 """Number of pairs among which the smallest gain is searched."""
 WITHIN = 1.5
 """A pair counts as separated within the run if knowledge of the runs' offsets would increase the gain by no more than
 this factor."""
 LIKELY = 0.02
-"""Probability relative to the most probable explanation above which another may be taken as the truth."""
+"""Smallest probability, relative to the most probable explanation, of an explanation that is assumed true."""
 SCREENED = 4
 """Iterations of a rival's refit while many runs are compared."""
 SMALLER = ((0.65, SAMPLES_A_STROKE), (0.4, SAMPLES_A_STROKE), (0.65, 6), (0.4, 6), (0.25, 6), (0.12, 6))
-"""Reduced runs that are tried in order: shares of the range, and least number of samples per stroke."""
+"""Reduced runs in the order in which they are tried: share of the range, and least number of samples per stroke."""
 ALIKE = 0.03
 """Difference in the share of decided pairs below which two runs count as equally good."""
 
@@ -88,13 +88,13 @@ class RunPlan:
     def uneven(self) -> float:
         """Largest ratio between the two gains of a pair (the first or the second explanation being true).
 
-        The larger this ratio is, the wider is the interval of the predicted gain.
+        The larger the ratio of the two gains is, the wider is the interval of the predicted gain.
         """
         ahead, back = (np.maximum(g, 1.0) for g in (self.gains[0, 1 : self.gains.shape[0]], self.gains[1:, 0]))
         return float(np.max(np.maximum(ahead / back, back / ahead), initial=1.0))
 
     def apart(self, j: int, k: int) -> float:
-        """Gain between two explanations, the first being an assumed truth; the smaller gain if either may be true."""
+        """Gain between two explanations, of which the first is assumed true; the smaller gain if either may be true."""
         back = self.gains[k, j] if k < len(self.gains) else np.inf
         return float(min(self.gains[j, k], back))
 
@@ -105,7 +105,7 @@ class RunPlan:
         return sorted(found, key=lambda pair: self.apart(*pair))
 
     def worst(self, floor: float) -> float:
-        """Smallest gain among those that are at least `floor`; 0 if there is none."""
+        """Smallest gain among the gains that are at least `floor`; 0 if there is none."""
         settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
         return float(settled.min()) if settled.size else 0.0
 
@@ -157,8 +157,8 @@ class RunChoice:
     def least(self, run: RunPlan) -> tuple[float, tuple[int, int]] | None:
         """The separated pair of explanations with the smallest gain, and this gain; None if no pair is separated.
 
-        Pairs that are separated within the new run come first; a difference in offset between the new run and the old
-        data could also be due to re-zeroing the stage.
+        Pairs of explanations that are separated within the new run come first; a difference in offset between the new
+        run and the old data could also be due to re-zeroing the stage.
         """
         second = AugmentedDataset.of(self.data, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
         found = [(self.shown(run, second, *pair), pair) for pair in run.pairs()[:COMPARED]]

@@ -21,8 +21,8 @@ def next_run(
 ) -> NextRun | None:
     """Choose the run that decides most of the open pairs in the least experiment time.
 
-    Runs within the measured range are tried first: outside it an explanation's formula is not verified, so that a
-    predicted gain is not reliable. The stated gain is that of the pair of explanations that the run separates least.
+    Runs within the measured range are tried first: outside this range an explanation's formula is not verified, so that
+    a predicted gain is not reliable. The stated gain belongs to the pair of explanations that the run separates least.
 
     Parameters
     ----------
@@ -89,5 +89,5 @@ def _promised(
     also = ["+".join(e.names) for e in apart if separated != (0, listed.index(e))]
     left = ["+".join(e.names) for e in members[1:] if all(e is not one for one in apart)]
     words += f", and {leading} from {', '.join(also)}" if also else ""
-    words += f"; no protocol tried separates {leading} from {', '.join(left)}." if left else "."
+    words += f"; none of the candidate protocols separates {leading} from {', '.join(left)}." if left else "."
     return NextRun(plan.name, tuple(plan.steps), promised.stated, promised.interval, pair, words)

@@ -13,7 +13,7 @@ ORDINARY_S, MOST_S = 0.3, 2.0
 FINE = 8
 """Steps per sample when a motion is composed."""
 SAMPLES_A_STROKE = 15
-"""Least number of samples in a stroke: shorter strokes would differ mainly in their corners, which no stage executes
+"""Least number of samples in a stroke: shorter strokes differ mainly in their corners, which no stage executes
 exactly."""
 
 

@@ -10,21 +10,22 @@ from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 
 INDISTINGUISHABLE = 12.0
 """Chi-square below which two explanations count as indistinguishable. A distance of 4 from the truth must be detected,
-and the estimate from which the distance is measured itself deviates from the truth by 1.5 standard deviations: (sqrt(4)
-+ 1.5)^2."""
+and the estimate from which the distance is measured deviates from the truth by 1.5 standard deviations: (sqrt(4) +
+1.5)^2."""
 FREEDOM = 4.0
 """Degrees of freedom of Student's t distribution for the physical priors: typical sizes are known only roughly, so that
 the penalty grows slowly far beyond them (Lange, Little & Taylor 1989)."""
 SURELY = 2.05
-"""Standard deviations: the true explanation is lost in one table of fifty."""
+"""Standard deviations that are allowed for: the true explanation is then lost in one table of fifty."""
 SPARE = 3.0
 """Chi-square that the best explanation gains from the noise in excess of the true explanation."""
 ADMISSIBLE = 15.0
 """Largest chi-square by which an explanation at distance 4 from the truth is worse than the best: 4 + SURELY * 2 *
 sqrt(4) + SPARE."""
 OUT_OF_REACH = (400.0, 200.0)
-"""Squared distance from the best explanation, and chi-square above it, from which no refit is tried: 20 standard
-deviations away, and farther behind than any refit has gained (`INDISTINGUISHABLE` and `ADMISSIBLE` times ten)."""
+"""Squared distance from the best explanation, and chi-square above it, from which no refit is tried: the explanation is
+20 standard deviations away, and its chi-square is larger by more than any refit has ever gained (ten times
+`INDISTINGUISHABLE` and `ADMISSIBLE`)."""
 STRONG = 6.0
 """Difference in chi-square below which the odds of two explanations with equally many effects are less than 20 to 1,
 which is no strong evidence (2 ln 20; Kass & Raftery 1995, doi:10.1080/01621459.1995.10476572)."""
@@ -43,7 +44,7 @@ def ambiguity_set(
     target = problem.whitened(best.values)
     metric = problem.offsets.metric(best.sigma_mm)
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
-    # Where the noise is known badly, so is every difference that is measured by it.
+    # If the noise is poorly known, so are all differences in chi-square.
     admissible = ADMISSIBLE * (1.0 + noise_doubt(problem))
 
     def join(other: Explanation) -> None:
@@ -57,22 +58,24 @@ def ambiguity_set(
             imitation = _imitation(problem, best, other, best.sigma_mm)
             distance = imitation.score
             if distance < INDISTINGUISHABLE and other.score - best.score >= admissible:
-                # What can look like the best explains the data nearly as well: the search had stopped on its way.
+                # An explanation that can imitate the best one must explain the data nearly as well: its own search had
+                # stopped too early, and is continued.
                 again = fit(problem, other.names, imitation.values, iterations=MANY_STEPS)
                 other = min(other, again, key=lambda explanation: explanation.score)
         worse = other.score - best.score
-        # If the best is true, it leads by this distance; where it leads by far less, its form is not the truth's
-        # either, and what explains the data nearly as well with no more effects is no worse an answer.
+        # If the best explanation is true, its chi-square is smaller by about this distance. If it is smaller by far
+        # less, its formula is inexact too; an explanation that fits nearly as well, with no more effects, is then
+        # equally acceptable.
         most = max(STRONG, min(admissible, -_least_refuted(distance)))
         contested = worse < most and len(other.names) <= len(best.names)
         if distance >= INDISTINGUISHABLE and worse < admissible:
             distance = min(distance, _imitation(problem, other, best, best.sigma_mm).score)
         distances[other.names] = distance
-        # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it,
-        # and what parameters gain of the noise is nothing either (Akaike 1974).
+        # An explanation that gains little over no effect at all explains nothing: the scatter of the runs hides its
+        # misfit. The average gain of its parameters from noise is subtracted (Akaike 1974).
         idle = _net(nothing, other) < IDLE_SHARE * _net(nothing, best)
         close = distance < INDISTINGUISHABLE and not idle and worse < admissible
-        # More effects fit better whatever is true.
+        # An explanation with more effects always fits better, whatever is true.
         unrefuted = len(other.names) <= len(best.names) and worse < _least_refuted(distance)
         if close or unrefuted or (contested and not idle) or _simpler_form(problem, nothing, best, other):
             members.append(other)
@@ -80,7 +83,8 @@ def ambiguity_set(
     for other in pool:
         join(other)
     if len(best.names) == 1:
-        # Two effects beside one, only where every single one that would do is physically the greater surprise.
+        # Two effects are an alternative to one effect only if every acceptable single effect is physically less
+        # probable.
         most = min(odds(problem, member, rows) for member in members)
         for pair in pairs:
             if odds(problem, pair, rows) < most:
@@ -94,11 +98,11 @@ def _net(nothing: Explanation, explanation: Explanation) -> float:
 
 
 def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
-    """Whether the best explanation may fit better only because its richer formula includes the other's prediction.
+    """Whether the best explanation may fit better only because its richer formula includes the other explanation.
 
     An example is a delay and a well-damped resonance, both of which round corners: the formula of a delay is inexact
-    where the stage reverses between two samples. A difference of this size is attributed to the inexact formula; a
-    larger difference is evidence for the richer formula.
+    where the stage reverses between two samples. A difference in chi-square that the inexactness of formulas can cause
+    is attributed to it; a larger difference is evidence for the richer formula.
     """
     worse = other.score - best.score
     return (
@@ -112,15 +116,15 @@ def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, oth
 def _least_refuted(distance: float) -> float:
     """Difference in chi-square above which an explanation counts as refuted in favour of another.
 
-    If an explanation is true, the other's chi-square is larger by `distance` on average, with a standard deviation of 2
-    sqrt(distance) (Cox 1961). Two explanations that such data could distinguish are both kept if the present data
-    favour neither.
+    If an explanation is true, the chi-square of the other explanation is larger by `distance` on average, with a
+    standard deviation of 2 sqrt(distance) (Cox 1961). Two explanations are both kept if the present data favour
+    neither, even if data of this kind could distinguish them.
     """
     return -distance + SURELY * 2.0 * float(np.sqrt(max(0.0, distance))) + SPARE
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
-    """Fit one explanation to another's prediction; its score is D_jk, the squared whitened distance that remains.
+    """Fit one explanation to another's prediction; the score is the squared whitened distance that remains.
 
     In both directions the run offsets have the spread found for the best explanation, because a worse explanation would
     hide its misfit in a larger spread.
@@ -132,8 +136,8 @@ def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_m
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
     """Drop explanations that only imitate an effect that the drawing predicts and that is found as predicted.
 
-    Without this effect, the agreement with the drawing's prediction would be a coincidence. For example, an end stop at
-    exactly the input at which the drawn fingers meet is the contact of these fingers.
+    Otherwise, the agreement of the fitted effect with the drawing's prediction would be a coincidence. For example, an
+    apparent end stop at exactly the input at which the fingers meet in the drawing is the contact of the fingers.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:

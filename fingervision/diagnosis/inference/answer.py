@@ -56,8 +56,8 @@ def judged(data: Observations, found: Findings) -> Answer:
     n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges
     is_larger = stands.after_mm > stands.before_mm or rms_mm(after, n, edges) > rms_mm(before, n, edges)
     if is_larger or stands.before_mm < digit:
-        # What makes the disagreement larger, outliers included, explains nothing, and less than the digit of a reading
-        # that stands still is its rounding, the same in every hold.
+        # Effects that increase the disagreement (outliers included) explain nothing. A disagreement below the last
+        # digit of the readings is only rounding, which is constant in every hold.
         data, found = without_names(data, found, None if stands.before_mm < digit else found.unknown)
         after, stands = before, standing(data, found.problem, before, before)
     return Answer(data, found, before, after, stands)

@@ -11,8 +11,8 @@ from fingervision.domain.effect import Array
 AT_BOUND = 1e-6
 """Distance from a bound, as a share of the parameter's range, within which a parameter counts as lying at the bound."""
 TRIALS = 5
-"""Number of damping values tried in one iteration, each eight times the one before: the last gives a step along the
-gradient."""
+"""Number of damping values tried in one iteration, each eight times the one before: the largest value gives a step
+along the gradient."""
 SMALLEST_GAIN, SMALLEST_GAIN_SHARE = 0.02, 1e-5
 """Smallest reduction of chi-square, absolute and relative, for which the search continues: less changes parameters by
 under a hundredth of a standard deviation."""
@@ -119,8 +119,9 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
 def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Array:
     """Minimise a quadratic form within bounds, to the accuracy that a search step needs.
 
-    A parameter that would exceed its bound is fixed at the bound, and the others are solved for again. If that
-    parameter were only clipped, the others would keep values that belong to a step that is not taken.
+    A parameter that would exceed its bound is fixed at the bound, and the other parameters are solved for again. If the
+    parameter at its bound were only clipped, the other parameters would keep values that belong to a step that is not
+    taken.
 
     Parameters
     ----------
@@ -164,7 +165,8 @@ def _free(x: Array, pull: Array, normal: Array, lower: Array, upper: Array) -> N
 def _in_own_units(normal: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Scale the free part of the normal matrix so that each parameter is in units of its own standard error.
 
-    Without scaling, a time constant in hours beside micrometres would make the matrix singular.
+    Without scaling, parameters as different as a time constant in hours and a play in micrometres would make the matrix
+    singular.
     """
     part = normal if free.all() else normal[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.maximum(np.diag(part), 1e-300))

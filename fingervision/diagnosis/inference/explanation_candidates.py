@@ -14,25 +14,29 @@ from fingervision.domain.parameter import Parameter
 
 Progress = Callable[[float], None]
 SCANNED = 6
-"""Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
+"""Number of explanations in addition to which an effect with jumps is tried at all its sizes: the position of its jumps
+depends on the other effects."""
 BEGINS = 4
-"""Signatures from which a single effect is fitted: time constants and widths have several valleys, seldom more."""
+"""Number of signatures from which a single effect is fitted, because chi-square over time constants and widths has
+several local minima."""
 REFINED = 8
-"""Extensions that are refitted thoroughly: what lies behind these after seven steps has never come out first."""
+"""Number of extensions that are refitted thoroughly: in tests, no extension with a lower rank after seven steps ever
+became the best."""
 PROMISE = 0.5
-"""Share of the asked gain that a signature must promise before its refit is tried: a refit between the shapes of the
-grid gains a fifth more at most (`REFIT_MARGIN`), along a valley of the effects before it seldom twice as much."""
+"""Share of the required gain that a signature must have before its refit is tried. A refit between the grid points
+gains at most a fifth more (`REFIT_MARGIN`), and joint refitting with earlier effects seldom twice as much."""
 LEAST_GAIN = 4.0
 """Least chi-square gain of an effect's signature for which a refit is tried."""
 FEW_ROWS = 0.1
-"""Share of the rows affected by an end stop or a contact below which only the ends of strokes give evidence for it;
-with more rows the encoder's rounding averages out."""
+"""Share of the rows affected by an end stop or a contact below which only the ends of strokes give evidence for it; on
+more rows, the encoder's rounding averages out."""
 ALIKE = 12.0
 """Squared whitened distance below which two predictions count as equal, as in the ambiguity set."""
 STEPS_HIDDEN = 1.0
 """Encoder steps below which an effect is indistinguishable from rounding."""
 FINEST, COARSEST = 0.003, 0.02
-"""Relative spacing of the sizes tried for a jump: at most two thousand sizes, and no fewer than signatures."""
+"""Smallest and largest relative spacing of the sizes that are tried for a jump: at most two thousand sizes, and at
+least as many as signatures."""
 FINE_VALUES = 4_000_000
 """Largest number of values in all such predictions: 32 MB."""
 SWAPS_REFITTED = 24
@@ -66,7 +70,7 @@ def _finely(problem: Problem, parameter: Parameter) -> Array:
     history = problem.chain.history
     steps = np.concatenate([np.diff(history.input_mm[run]) for run in history.runs])
     moving = np.abs(steps[np.abs(steps) > 0.0])
-    # A stroke is at most the range, and a jump comes at a sample.
+    # A stroke covers at most the range, and a jump occurs at a sample.
     apart = float(np.clip(np.median(moving) / max(history.input_span_mm, 1e-300), FINEST, COARSEST))
     begins = parameter.starting_values()
     count = int(float(np.log(begins[-1] / begins[0])) / apart) + 1
@@ -89,18 +93,18 @@ def extended(
     Parameters
     ----------
     problem, atoms
-        The data, and what each effect would add.
+        The data, and the signatures of all effects.
     bases : list of Explanation
         Explanations to which one effect is added.
     most, refined : int
         Extensions that are refitted, and how many of them thoroughly.
     progress : callable
-        Told the share that is done.
+        Called with the share of the work that is done.
     scanned : int
-        Bases beside which an effect that jumps is tried at all its sizes.
+        Number of base explanations to which an effect with jumps is added at all its sizes.
     asked : mapping of str to float or None
-        Fall of chi-square by each effect below which nobody will believe in it; extensions that promise less than half
-        of it are not refitted. None to try all.
+        Least significant gain in chi-square of each effect. Extensions whose signatures promise less than half of this
+        gain are not refitted. None to try all.
     """
     owner = np.array(atoms.names)
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
@@ -136,10 +140,10 @@ def extended(
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Replace each effect of the best explanation by every other effect; the others start at their fitted values.
+    """Replace each effect of the best explanation by every other effect; remaining effects start at fitted values.
 
-    An effect that was fitted alone has absorbed the influence of both effects; its parameters are then so far from the
-    joint optimum that a joint search starting there would not find it.
+    An effect that was fitted alone has absorbed the influence of a second effect; its parameters are then so far from
+    the joint optimum that a joint search starting there would not find it.
     """
     if not pairs:
         return pairs
@@ -168,7 +172,7 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of the additional part of the larger explanation, as a share of its total change of the prediction."""
+    """Change of the prediction by the additional part of the larger explanation, as a share of the total change."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
     if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
@@ -178,7 +182,8 @@ def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> 
 def within_a_step(problem: Problem, explanation: Explanation) -> bool:
     """Whether one of the effects acts like rounding: by less than an encoder step, on few rows or at stroke ends.
 
-    Each effect is judged alone: what an effect with memory makes of a few rows beside another goes on after them.
+    Each effect is judged alone, because an effect with memory that acts together with another effect also changes later
+    rows.
     """
     history = problem.chain.history
     if history.input_step_mm == 0.0:
@@ -199,12 +204,12 @@ def within_a_step(problem: Problem, explanation: Explanation) -> bool:
 
 
 def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explanation]) -> list[Explanation]:
-    """Keep the explanations that change the prediction by more than the error of the recorded input does.
+    """Keep the explanations whose change of the prediction exceeds the error of the recorded input.
 
-    The explanations that are dropped only follow the rounding errors of an encoder. For example, a delay within one
-    step of an encoder gained 225 in chi-square in this way, and hid an offset beside a play that changed the prediction
-    by twenty times as much. If even the best explanation only follows the rounding errors, explanations with other
-    effects may do so as well: then only additions to the smaller explanation are kept.
+    Explanations with a smaller change are dropped, because they only follow the rounding errors of an encoder. For
+    example, a delay within one step of an encoder gained 225 in chi-square, and hid an offset and a play that changed
+    the prediction by twenty times as much. If even the best explanation only follows rounding errors of an encoder,
+    explanations with other effects may do so as well: only extensions of the smaller explanation are then kept.
     """
     beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
     if beyond[:1] == larger[:1]:
@@ -213,10 +218,10 @@ def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explan
 
 
 def without_roundings(problem: Problem, explanation: Explanation) -> Explanation:
-    """Drop effects without which the others, refitted, predict the same but for the error of the recorded input.
+    """Drop effects without which the refitted other effects predict the same within the recorded input's error.
 
-    For example, a delay of a small part of an encoder step beside a play and an offset follows the roundings, whichever
-    of the three was found first.
+    For example, in addition to a play and an offset, a delay by a small part of an encoder step only follows rounding
+    errors, whichever of the three effects was found first.
     """
     while problem.chain.history.input_sigma_mm > 0.0 and len(explanation.names) > 1:
         kept = [{n: v for n, v in explanation.values.items() if n != name} for name in explanation.names]

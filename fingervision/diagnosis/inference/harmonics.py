@@ -1,6 +1,6 @@
 """Harmonics of a named cyclic error: a real screw has harmonics that the catalogue's sine does not include.
 
-If the harmonics are small, they are attributed to the named effect.
+Small harmonics are attributed to the named cyclic error.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from fingervision.effects import catalogue
 ORDERS = (2, 3)
 """Orders of the harmonics that accompany the first harmonic of a screw or resolver."""
 LARGEST = 0.25
-"""Amplitude relative to the first harmonic above which another harmonic counts as a separate cause."""
+"""Ratio to the amplitude of the first harmonic above which another harmonic counts as a separate cause."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

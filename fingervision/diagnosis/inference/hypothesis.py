@@ -36,7 +36,7 @@ class Explanation:
     residual : ndarray of float, shape (m,)
         Whitened target minus prediction.
     covariance : ndarray of float, shape (p, p)
-        Covariance of the parameters in their order; zero rows for those at a bound.
+        Covariance of the parameters in their order; rows of parameters at a bound are zero.
     free : int
         Number of the effects' parameters that are not at a bound.
     sigma_mm : tuple of float
@@ -74,9 +74,9 @@ class Problem:
     effects : mapping of str to Effect
         Effects that the data can show.
     form_share : float
-        Share (as a ratio of amplitudes) of the explained part that the formula of an effect may leave as residual.
+        Ratio of the residual that the formula of an effect may leave to the explained part (amplitudes).
     stalled : frozenset of str
-        Effects suggested by readings that stay constant at an end of the range.
+        Effects that readings suggest which stay constant at an end of the range.
     mapped : float
         Squared whitened length of the part that a map of position errors explains in addition to every explanation; 0
         without a map.

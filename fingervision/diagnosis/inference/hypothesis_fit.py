@@ -37,7 +37,7 @@ class _JointSquares:
     sigma_mm : tuple of float or None
         Fixed spread of the run offsets; None to estimate it from the residual.
     latest : dict of bytes to ndarray
-        Last prediction, by its parameters: a step that is accepted is where the next derivatives begin.
+        Last prediction, by its parameters: the next derivatives are computed at the accepted step.
     """
 
     problem: Problem
@@ -141,8 +141,9 @@ def fit(
         spread, penalty = problem.offsets.spread(found.residual)
         cost = problem.offsets.squared(found.residual, problem.offsets.metric(spread))
     own = np.array([parameter.run is None for _, parameter in listed], dtype=bool)
-    # A start is anywhere between -1 and 1 beforehand, with a variance of 1/3; one at its end was chosen as well.
-    # It costs no more than a parameter does, or a play would be the greater surprise than two effects that imitate it.
+    # The prior of a start state is uniform between -1 and 1, with a variance of 1/3; this also holds for a start state
+    # at a bound. The penalty is at most that of a free parameter; otherwise a play would be less probable than two
+    # effects that imitate it.
     prices = np.log1p(np.diag(found.normal)[~own] * START_VARIANCE)
     return Explanation(
         names=order,
@@ -177,7 +178,7 @@ def _bounds(listed: list[tuple[str, Parameter]]) -> tuple[Array, Array]:
 
 
 def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
-    """Group parameters whose derivatives one prediction gives: start states of different runs affect separate rows."""
+    """Group parameters that share one prediction for their derivatives: start states of runs affect separate rows."""
     groups: dict[object, list[int]] = {}
     for i, (name, parameter) in enumerate(listed):
         groups.setdefault(i if parameter.run is None else name, []).append(i)

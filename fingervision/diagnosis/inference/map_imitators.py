@@ -1,7 +1,7 @@
 """Effects that a map of position errors can represent: functions of position alone, except a straight line.
 
-If a map is fitted too, no data can distinguish such an effect from the map, however large the effect is. Effects with
-reversal, memory or dependence on time can be distinguished from a map.
+If a map is fitted too, no data can distinguish an effect that is a function of position from the map, however large the
+effect is. Effects with reversal, memory or dependence on time can be distinguished from a map.
 """
 
 from dataclasses import replace
@@ -14,8 +14,8 @@ from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.domain.effect import Array, Flags
 
 LINE_SHARE = 1e-3
-"""Share of the squared length that a straight-line fit may leave of an effect that counts as a line: ratios and offsets
-deviate from a line by so little over a stroke. A map contains no straight line."""
+"""Share of the squared length that a straight-line fit may leave of an effect that counts as a line: over a stroke,
+ratios and offsets deviate from a line by less. A map contains no straight line."""
 CURVE_SHARE = 0.02
 """Share of the squared length, beyond the line, that a curve over position may leave of an effect that counts as a map:
 14 % in amplitude, less than the inexactness of effects' formulas for real stages (ISO 230-2 reversals: 19 to 24 %)."""
@@ -52,7 +52,8 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
 def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
     """Find effects of an explanation that act like a map at their fitted parameters.
 
-    An example is a cyclic error with a period of half the range, because a map can follow so smooth a curve.
+    An example of such an effect is a cyclic error with a period of half the range, because a map can follow a curve as
+    smooth as this one.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def _of_the_place(problem: Problem) -> list[str]:
 def _reason(problem: Problem) -> str:
     history = problem.chain.history
     span = f"{history.input_mm.min():g} to {history.input_mm.max():g} mm"
-    return f"beside a map of position errors it is a part of the map: over {span} it depends on the place alone"
+    return f"it cannot be distinguished from the map of position errors: over {span} it depends on the position alone"
 
 
 def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[Flags, Flags]:

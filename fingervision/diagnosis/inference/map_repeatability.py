@@ -1,4 +1,4 @@
-"""Check that a map of position errors is repeatable: a map fitted to some passes must predict the others.
+"""Check that a map of position errors is repeatable: a map fitted to some passes must predict the remaining passes.
 
 By definition, a map of position errors is the same at each visit of a position (ISO 230-2). A curve over the input can
 also be fitted to runs that differ in gain, or to a creep interrupted by stops, but such a curve does not predict a run
@@ -19,12 +19,12 @@ cost as much."""
 
 
 def foretells_other_passes(problem: Problem, explanation: Explanation, position_map: PositionMap) -> bool:
-    """Cross-validate a map: predict each part (run, or visit of the positions in a single run) from all others.
+    """Cross-validate a map: predict each part (run, or visit of the positions in a single run) from all other parts.
 
-    The log predictive density of a part of the data is that of all rows minus that of the other rows (Geisser & Eddy
-    1979, doi:10.1080/01621459.1979.10481632). The sum of the log predictive densities over the parts must be larger
-    with the map than without it, and no part may contradict the others by very strong evidence: the error of a single
-    run is not a map.
+    The log predictive density of a part of the data is the log density of all rows minus that of all rows outside the
+    part (Geisser & Eddy 1979, doi:10.1080/01621459.1979.10481632). The sum of the log predictive densities over the
+    parts must be larger with the map than without it, and no part may contradict the other parts by very strong
+    evidence: the error of a single run is not a map.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def foretells_other_passes(problem: Problem, explanation: Explanation, position_
 
 
 def _gain(gram: Array, aim: Array) -> float:
-    """Twice the log marginal likelihood with a map, minus that without a map."""
+    """Difference of twice the log marginal likelihood with and without a map."""
     inner = np.eye(aim.size) + gram
     return float(aim @ np.linalg.solve(inner, aim) - np.linalg.slogdet(inner)[1])
 

@@ -157,7 +157,7 @@ def _along_curves(effect: Effect) -> Effect:
 def admissible(
     effects: Mapping[str, Effect], history: History, without: frozenset[str]
 ) -> tuple[dict[str, Effect], dict[str, str]]:
-    """Effects that these data can show, and the reasons for excluding the others."""
+    """Effects that the data can show, and the reasons for excluding all other effects."""
     able: dict[str, Effect] = {}
     excluded: dict[str, str] = {}
     for name, effect in effects.items():
@@ -166,6 +166,6 @@ def admissible(
             excluded[name] = "left out by request"
         elif isinstance(searched, str):
             excluded[name] = searched
-        elif not effect.curve:  # a curve is estimated as a whole beside the others
+        elif not effect.curve:  # a curve is estimated as a whole, in addition to the effects
             able[name] = effect
     return able, excluded

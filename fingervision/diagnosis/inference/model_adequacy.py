@@ -77,7 +77,7 @@ def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) ->
 
 
 def _explained(problem: Problem, found: Explanation) -> float:
-    """Squared whitened length of an explanation's change of the prediction, without what run offsets absorb."""
+    """Squared whitened length of an explanation's change of the prediction, without the share of run offsets."""
     changed = problem.whitened(found.values) - problem.whitened({})
     return problem.offsets.squared(changed, problem.offsets.metric(found.sigma_mm))
 
@@ -86,8 +86,8 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     """Name the generic shapes that effects only imitate, in a sentence; None if the effects themselves are the cause.
 
     Three effects can fit almost any shape, and must therefore explain the data much better than generic shapes do. One
-    or two effects count as imitations only if the shapes fit much better, by more than the inexactness of the effects'
-    formulas.
+    or two effects count as imitations only if generic shapes fit much better, by more than the inexactness of the
+    effects' formulas.
 
     Parameters
     ----------
@@ -100,7 +100,8 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     several = len(found.names) > 2
     columns, rows = shapes.columns, int(problem.measured.size)
     basis = _Basis.of(problem, columns)
-    # Where repeats tell the noise, readings at rest show of a play what a probe shows as well, with its form's errors.
+    # If the noise is known from repeats, a probe can also represent a play in readings at rest, including the
+    # inexactness of the play's formula: such probes are excluded.
     same = several or problem.form_share > SMALL_SHARE
     barred = _is_an_effect_itself(problem, found, basis) if same else np.zeros(columns.shape[1], dtype=bool)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
@@ -124,11 +125,11 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
 
 
 def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation, shapes: Array) -> bool:
-    """Whether an explanation with added shapes differs from that of the effects by less than the input's error.
+    """Whether an explanation with added shapes differs from the explanation by effects by less than the input's error.
 
-    For example, a step over the input at the first line of an encoder is an offset: beyond this line, where the strokes
-    reverse, the mean position of the stage is not that of the line. Differences in the constants of the runs are
-    ignored.
+    For example, a step over the input at the first line of an encoder is only an offset, because strokes reverse beyond
+    this line, and the mean position of the stage is then not the position of the line. Differences between explanations
+    in the constants of the runs are ignored.
 
     Parameters
     ----------
@@ -158,9 +159,9 @@ def _size_in_runs(problem: Problem, change: Array) -> float:
 def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
     """Mark the probes that have the shape of one of the effects, or are straight lines; shape (k,).
 
-    For example, in readings at rest, play is merely a difference between the two directions, and the probe with this
-    shape is not another explanation. A ramp over time in addition to an offset has the shape of warming; in addition to
-    a map of position errors, every function of position counts as a line.
+    For example, in readings at rest, play is merely a difference between the two directions, and a probe that describes
+    this difference is not another explanation. A ramp over time in addition to an offset has the shape of warming; in
+    addition to a map of position errors, every function of position counts as a line.
     """
     metric, design = problem.offsets.metric(found.sigma_mm), problem.offsets.design
     norm = np.maximum(basis.beside_offsets(metric), 1e-12)
@@ -185,7 +186,7 @@ def _beside(design: Array, metric: Array, columns: Array) -> Array:
 def own_shapes(problem: Problem, explanation: Explanation) -> list[Array]:
     """Change of the whitened prediction by each effect of an explanation, with the other effects present.
 
-    Each of these changes has shape (m,).
+    The change by each effect has shape (m,).
     """
     whole, values = problem.whitened(explanation.values), explanation.values
     others = [{other: values[other] for other in explanation.names if other != name} for name in explanation.names]
@@ -230,7 +231,8 @@ def remaining_structure(
     coefficient = float(dot[top]) / float(norm[top])
     if below_the_input(problem, _size_in_runs(problem, coefficient * shapes.before_whitening(top))):
         return None, words
-    # A small part of what is explained: the form of an effect, or of a map between its nodes, is no truer than that.
+    # A small part of the explained change is attributed to the inexactness of an effect's formula, or of a map between
+    # its nodes.
     if gain[top] < problem.form_share**2 * (_explained(problem, best) + problem.mapped):
         return None, words
     return words, None

@@ -41,8 +41,9 @@ def noise_doubt(problem: Problem) -> float:
     """Largest relative standard uncertainty, over the channels, of the noise power at low frequency.
 
     The power at zero frequency is proportional to (1 + rho) / (1 - rho), and an autoregression determines rho with
-    standard uncertainty sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). If a spectrum is fitted without its
-    lowest frequencies, the noise power there is less well determined (`noise_by_spectrum`).
+    standard uncertainty sqrt((1 - rho^2) / n): the relative uncertainty of the power is therefore 2 / sqrt((1 - rho^2)
+    n). If a spectrum is fitted without its lowest frequencies, the noise power at the lowest frequencies is less well
+    determined (`noise_by_spectrum`).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
@@ -64,9 +65,10 @@ def linear_thresholds(
     """Significance threshold of each effect: the gain that its best signature seldom exceeds in noise alone.
 
     The signatures of one effect, one for each starting value of its parameters, form a family. The best of many
-    signatures gains more from noise than a single signature does; a common threshold for all families would be that of
-    the largest family. Therefore each family is compared with its own upper quantile, and the probability of an excess
-    in any family is limited: all families contribute equally to the false positives (Beran 1988).
+    signatures gains more from noise than a single signature does; a common threshold for all families would be
+    determined by the largest family. Therefore each family of signatures is compared with its own upper quantile, and
+    the probability that any family exceeds its quantile is limited: all families contribute equally to the false
+    positives (Beran 1988).
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def linear_thresholds(
         norm = np.einsum("ij,ij->j", kept, kept)
     usable = norm > 1e-9 if among is None else among & (norm > 1e-9)
     owner = np.array(names)
-    # The noise itself is estimated, from as many samples as there are.
+    # The noise level itself is uncertain, because it is estimated from the samples.
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
     margin = 1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))
     tail, excess = {}, np.full(LINEAR_DRAWS, -np.inf)
@@ -102,7 +104,7 @@ def linear_thresholds(
         if not mine.any():
             continue
         gains = np.max(taken[mine], axis=0) * doubt
-        # Refitting finds what lies between the shapes of the grid; a single column has no shape.
+        # Refitting also reaches values between the grid points; an effect with a single column has no grid.
         gains = gains * margin + 1.5 if mine.sum() > 1 else gains
         tail[name] = float(np.quantile(gains, OWN_QUANTILE))
         excess = np.maximum(excess, gains - tail[name])
@@ -144,7 +146,7 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
 
 
 def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
-    """Whether an explanation contains jumps at poorly known inputs, so that a misplaced jump shifts all later ones."""
+    """Whether an explanation contains jumps at poorly known inputs, so that a misplaced jump shifts all later jumps."""
     unsure = problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()
     return bool(unsure) and any(parameter.rugged for _, parameter in problem.parameters(names))
 
@@ -175,7 +177,7 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
 def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
     """Smallest gain required of the effects that are added to those of `base`.
 
-    This gain is infinite for an effect that run offsets can imitate completely.
+    The required gain is infinite for an effect that run offsets can imitate completely.
     """
     return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
 
@@ -192,17 +194,17 @@ def exceeds_noise(
     """Whether a gain above the thresholds is also larger than the largest gain that one more effect has in noise alone.
 
     The thresholds are computed with nonlinear parameters (such as a period, or the position of an end stop) on a grid.
-    A fit also finds values between the grid points, and therefore reduces chi-square further, even in noise. Each
-    simulated table is therefore fitted like the measurement: first with `base`, then with `base` and each of the most
-    promising effects. `suspects` are the effects, with parameters, that fit the measurement best; they are tried on
-    every simulated table.
+    A fit of the parameters also finds values between the grid points, and therefore reduces chi-square further, even in
+    noise. Each simulated table is therefore fitted like the measurement: first with `base`, then with `base` and each
+    of the most promising effects. `suspects` are the effects, with parameters, that fit the measurement best; they are
+    tried on every simulated table.
     """
     owner = np.array(atoms.names)
     asking = np.array([thresholds.get(name, np.inf) for name in atoms.names])
     found: list[float] = []
     quantile = 0.0
     doubt = noise_doubt(problem)
-    # Jumps that went astray have to be found again as thoroughly as the measurement's were.
+    # Misplaced jumps must be searched for as thoroughly as in the measurement.
     astray = jumps_astray(problem, base.names)
     steps, draws = (MANY_STEPS, FEWEST) if astray else (5, DRAWS)
     for _ in range(draws if problem.chain.history.input_mm.size <= LONG else min(draws, LONG_DRAWS)):
@@ -214,14 +216,15 @@ def exceeds_noise(
         starts = [{**alone.values, **suspect} for suspect in suspects]
         asked = [name for suspect in suspects for name in suspect]
         for _ in range(len(asked) + REFITTED):
-            # What the measurement speaks for first, wherever it suits this draw; then what suits the draw best.
+            # First try the effects that the measurement suggests, then those that fit this draw best.
             among = owner == asked.pop(0) if asked else np.ones(owner.size, dtype=bool)
             top = int(np.argmax(np.where(among, above, -np.inf)))
             if np.isfinite(above[top]) and among[top]:
                 name = atoms.names[top]
                 starts.append({**alone.values, name: atoms.begin(top, float(coefficient[top]))})
                 above[owner == name] = -np.inf
-        # What jumps leave that went astray is noise of a level of its own, in the measurement and in every draw.
+        # After a failed jump fit, use the measured residual level as the noise level, in the measurement and in every
+        # draw.
         luck = base.score / alone.score if astray else float(np.exp(doubt * rng.standard_normal()))
         fits = [fit(shaken, tuple(start), start, target=target, iterations=6) for start in starts]
         found.append(
@@ -230,7 +233,7 @@ def exceeds_noise(
             else -min(thresholds.values(), default=0.0)
         )
         quantile = rare(found)
-        # The quantile's own error is that of a mean and of GUMBEL standard deviations together.
+        # The error of the quantile combines that of the mean and that of GUMBEL standard deviations.
         error = float(np.std(found)) * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(found)))
         if len(found) >= FEWEST and abs(excess - quantile) > SURELY * error:
             break

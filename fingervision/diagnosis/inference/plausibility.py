@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binom
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
@@ -21,8 +22,8 @@ ENDS = (0.05, 0.95)
 DELAYS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 """Delays at which the measured motion is compared."""
 SWAPPED_SIGMAS = 6.0
-"""Standard errors by which the gap must lead at reversals before exchanged directions are suspected: far more than the
-residual of any other effect."""
+"""Standard errors by which the gap must lead at reversals before exchanged directions are suspected: the residual of
+any other effect leads by far less."""
 SWAPPED_SHARE = 0.5
 """Least share of the squared disagreement that a leading play must explain: the rest may be due to other effects."""
 LEAST_NORM = 1e-6
@@ -36,13 +37,18 @@ NARROW = 0.25
 """Standard deviations about zero within which values are counted: normal noise has 20 % there, Laplace's 30 %,
 Student's with three degrees of freedom 31 %, a sinusoid 11 %."""
 SHARES = (0.05, 0.4)
-"""Shares of values there below which they form two groups, and above which most of them repeat far better than the
-rest: beyond what any one noise of the above has."""
+"""Share of values within `NARROW` below which the values form two groups, and share above which most values repeat far
+better than the rest. No single noise distribution named above has such shares."""
 STRETCH_SIGMAS = 3.0
-"""Standard deviations, each 1 / sqrt(n), by which neighbours must be alike for rows to lie in stretches:
-a servo at rest repeats far better than on its way, and nothing is wrong with it."""
+"""Significance, in standard deviations of 1 / sqrt(n), of the correlation of neighbouring rows above which rows lie in
+stretches. A servo, for example, repeats far better at rest than in motion; such rows are not wrong."""
 FEWEST_VALUES = 30
-"""Values from which such a share is told from 20 %: 40 % of 30 are 2.8 standard deviations more."""
+"""Least number of values with which such a share can be distinguished from that of normal noise (`BY_CHANCE`)."""
+NORMAL_SHARE = 0.2
+"""Share of normal values within `NARROW` standard deviations."""
+BY_CHANCE = 1e-3
+"""Probability of such an extreme count under normal noise above which the count is attributed to chance: in 42 rows of
+one noise, rounded to a quarter of the noise, 40 % agreed by chance (probability 0.002)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,26 +64,27 @@ def gross_mistake(data: Observations) -> Finding | None:
     gap, predicted = data.table.gap_mm, data.chain.respond({}).gap_mm
     if np.ptp(predicted) == 0.0:
         return None
-    # Ranks and quantiles resist rows that are wrong; a stage that follows late is looked at as late as it may be.
+    # Ranks and quantiles are robust against wrong rows; for a stage with a delay, several delays are tried.
     order = max((_order(gap, late) for late in _later(data)), key=abs)
     way, predicted_way = (float(np.diff(np.quantile(values, ENDS))[0]) for values in (gap, predicted))
     if order < -LEAST_CORRELATION:
         return Finding(
-            "the measured gap falls where the model says that it rises: input_mm or the gap "
-            "is mirrored (the sign of one column is turned round), or the model belongs to another rig.",
+            "the measured gap falls where the model predicts a rise: input_mm or the gap is mirrored (its sign is "
+            "wrong), or the model belongs to another test bed.",
             blocks=True,
         )
     if abs(order) < LEAST_CORRELATION:
         return Finding(
-            f"the measured gap does not follow the model (rank correlation {order:.2f}): the model has nothing to do "
-            "with these data, or most rows are wrong; look at the columns before anything is named.",
+            f"the measured gap does not follow the model (rank correlation {order:.2f}): the model does not belong to "
+            "these data, or most rows are wrong; check the columns first.",
             blocks=True,
         )
     ratio = way / max(predicted_way, 1e-300)
     if not 1.0 / LARGEST_RATIO < ratio < LARGEST_RATIO:
         return Finding(
-            f"the measured gap moves {ratio:.3g} times as far as the model says: check the units of the gap and of the "
-            "model (a factor of 1000 is micrometres for millimetres), no effect of the catalogue makes so much.",
+            f"the measured gap moves {ratio:.3g} times as far as the model predicts: check the units of the gap and of "
+            "the model (a factor of 1000 means micrometres instead of millimetres), because no effect of the "
+            "catalogue is so large.",
             blocks=True,
         )
     return None
@@ -93,7 +100,7 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     found : Explanation
         The answer.
     problem : Problem
-        Its noise; gross errors that were set aside do not count.
+        Estimation problem with its noise; gross errors that were set aside do not count.
     """
     n = data.chain.history.input_mm.size
     kept = ~problem.whitener.aside[:n]
@@ -101,7 +108,7 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     if residual_mm.size < FEWEST_VALUES or data.position_map is not None or data.run_gains is not None:
         return None
     sigma = float(np.std(residual_mm))
-    # Digits that are coarser than the band put all values, or none, into it.
+    # If the digits of the readings are coarser than the band, either all values or none lie in it.
     if NARROW * sigma < resolution(data.table.gap_mm):
         return None
     both = (residual_mm, found.residual[:n][kept])
@@ -109,17 +116,20 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     together = min(_share_near(values, float(np.median(values))) for values in both)
     if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
         return None
-    if between < SHARES[0]:
+    count = residual_mm.size
+    if between < SHARES[0] and binom.cdf(round(between * count), count, NORMAL_SHARE) < BY_CHANCE:
         above = residual_mm > np.mean(residual_mm)
         apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
-        words = f"what is left falls into two groups about {apart_mm:.2g} mm apart"
-    elif together > SHARES[1]:
-        words = f"{100.0 * together:.0f} % of the rows lie together, and the others off them by {sigma:.2g} mm and more"
+        words = f"the residual consists of two groups about {apart_mm:.2g} mm apart"
+    elif together > SHARES[1] and binom.sf(round(together * count) - 1, count, NORMAL_SHARE) < BY_CHANCE:
+        words = (
+            f"{100.0 * together:.0f} % of the rows agree, and the remaining rows differ from them by {sigma:.2g} mm or "
+            "more"
+        )
     else:
         return None
     return Finding(
-        f"the rows are no one measurement with one noise: {words}; look at the rows that lie apart before anything is "
-        "named.",
+        f"the rows are not one measurement with one noise: {words}; check the rows that differ first.",
         blocks=True,
     )
 
@@ -177,7 +187,7 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
         return None
     return Finding(
         f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "
-        "mechanism does: are the directions swapped, or the sign of the gap's error?",
+        "mechanism does: check whether the directions are swapped, or the sign of the gap's error is wrong.",
         blocks=True,
     )
 

@@ -19,7 +19,8 @@ from fingervision.effects.position_error_map import EFFECT, covariance, curve_va
 
 NAME = EFFECT.name
 SET_POINTS = 60
-"""Number of different inputs up to which each input is a node of the curve; for more, nodes are equidistant."""
+"""Number of different inputs up to which each input is a node of the curve; for more inputs, the nodes are
+equidistant."""
 NODES = 13
 """Number of nodes of a curve over many inputs: about the number of positions at which error maps are tabulated."""
 SMOOTH = 0.1
@@ -31,10 +32,10 @@ repeatable."""
 LENGTHS, SIZES = 10, 25
 """Numbers of correlation lengths and sizes that are tried."""
 EVENLY = 200
-"""Number of positions that represent the range of a continuous motion, so many that the ends have no more than their
-share."""
+"""Number of positions that represent the range of a continuous motion, so many that the two ends do not have too much
+weight."""
 SLOPE_STEP = 1e-3
-"""Step, as a share of the range, for differentiating the prediction by the input."""
+"""Step, as a share of the range, for the derivative of the prediction with respect to the input."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,23 +91,24 @@ class PositionMap:
         best, covariance_of_best = estimated_coefficients(problem, explanation, self.coefficients.size, behind)
         curve = self.root_mm @ best
         rms = float(np.sqrt(np.mean(curve**2)))
-        # Derivative of the root mean square by the curve, over the curve's posterior covariance.
+        # Propagate the curve's posterior covariance to its root mean square, by the derivative with respect to the
+        # curve.
         slope = self.root_mm.T @ (curve / (curve.size * max(rms, 1e-300)))
         u = float(np.sqrt(max(float(slope @ covariance_of_best @ slope), 0.0)))
         return replace(self, coefficients=best, rms_mm=Estimate(rms, u, "mm"))
 
 
 def why_no_map(history: History, path: InputPath | None) -> str | None:
-    """Reason why these data cannot show a repeatable map; None if they can."""
+    """Reason why the data cannot show a repeatable map; None if they can."""
     history = history if path is None else path.history
     narrowed = EFFECT.search(history)
     if isinstance(narrowed, str):
         return narrowed
     if history.time_s is None:
-        return "the table has no time_s, so nothing tells how often each place was passed"
+        return "the table has no time_s, so that it is unknown how often each position was passed"
     travel = sum(float(np.sum(np.abs(np.diff(history.input_mm[run])))) for run in history.runs)
     if travel < PASSES * history.input_span_mm:
-        return "each place was passed once, and what was seen once is not known to repeat"
+        return "each position was passed only once, so that the repeatability of its error is unknown"
     return None
 
 
@@ -149,7 +151,7 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
             load = 1.0 + size**2 * value
             gains[i, j] = float(np.sum(size**2 * share / load) - np.sum(np.log(load)))
     i, j = divmod(int(np.argmax(gains)), SIZES)
-    # Size and length are two numbers chosen by the data.
+    # The penalty is that of two fitted numbers, size and length.
     choice = 2.0 * float(np.log(max(2, problem.measured.size)))
     root_mm = sizes[j] * roots[i]
     inner = np.eye(nodes_mm.size) + root_mm.T @ gram @ root_mm

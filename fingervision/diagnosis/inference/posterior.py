@@ -26,7 +26,7 @@ SCALES = (0.02, 0.1, 0.4, 1.2)
 """Step sizes of the local walk relative to the widths from the curvature: one of them is suitable if the curvature is
 misleading."""
 START_STEP = 1e-3
-"""Step for the derivative by a start state."""
+"""Step for the derivative with respect to a start state."""
 JUMPS = 0.01
 """Initial relative width of the walk for parameters on which the prediction depends discontinuously."""
 
@@ -35,7 +35,7 @@ JUMPS = 0.01
 class _Coordinates:
     """Coordinates of the sampler: reciprocals of radii and periods, logarithms of times, other parameters unchanged.
 
-    In these coordinates, a log likelihood with long, curved contours in the parameters is nearly parabolic.
+    In the sampler's coordinates, a log likelihood with long, curved contours in the parameters is nearly parabolic.
     """
 
     listed: tuple[tuple[str, Parameter], ...]
@@ -108,11 +108,11 @@ def _widths(problem: Problem, explanation: Explanation, walk: _Coordinates, best
     step = np.maximum(1e-4 * np.abs(best), 1e-6 * span)
     covariance = np.diag(span**2)
     for _ in range(2):
-        # The difference is taken again over the width that it gave: a play's prediction is no smooth function.
+        # Repeat the differences over the width found, because the prediction of a play is not smooth.
         normal = _curvature(problem, explanation, walk, best, step) + np.diag(1.0 / span**2)
         covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         step = np.clip(np.sqrt(np.diag(covariance)), 1e-9 * span, 0.1 * span)
-    # What jumps has no derivative; the walk has to find its width from a hundredth of its size downwards.
+    # Parameters with jumps have no derivative: the walk starts with a width of a hundredth of the parameter.
     covariance[rugged] = 0.0
     covariance[:, rugged] = 0.0
     covariance[rugged, rugged] = (JUMPS * best[rugged]) ** 2
@@ -123,10 +123,10 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
     """Sample the posterior under flat priors within the bounds (Metropolis et al. 1953; Tierney 1994).
 
     The curvature at the best fit ignores bounds and non-parabolic likelihoods: a fraction estimated as zero is still
-    uncertain, and the prediction has no derivative by the size of a jump. Independent proposals from the curvature
-    alternate with local steps of several sizes, so that both kinds of posterior are explored. The spreads of the runs'
-    offsets, and noise levels within `noise_doubt`, are sampled too, so that the posterior has Student's tails (Box &
-    Tiao 1973).
+    uncertain, and the prediction has no derivative with respect to the size of a jump. Independent proposals from the
+    curvature alternate with local steps of several sizes, so that parabolic and irregular posteriors are both explored.
+    The spreads of the runs' offsets, and noise levels within `noise_doubt`, are sampled too, so that the posterior has
+    Student's tails (Box & Tiao 1973).
 
     Returns
     -------
@@ -206,7 +206,7 @@ def settled(
     explanation : Explanation
         Explanation whose covariance is the mean square of the draws about its values. Noise of relative size
         `FORM_SHARE` is added for the inexactness of an effect's formula, in as many independent shapes as the catalogue
-        distinguishes. The size of a jump is not known better than the recorded input.
+        has. The size of a jump is not known better than the recorded input.
     found : tuple of dict
         The draws.
     """

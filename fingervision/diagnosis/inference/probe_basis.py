@@ -78,7 +78,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
     if history.time_s is not None:
         t = history.clock_s if history.shared_clock else np.concatenate([np.arange(n)[run] for run in history.runs]) / n
         begin, length = float(t.min()), max(float(np.ptp(t)), 1e-9)
-        # Without a shared clock t counts samples, as shares of the table.
+        # Without a shared clock, time is the sample number as a share of the table.
         length_s = length if history.shared_clock else length * n * history.sample_time_s
         for k in range(1, fine):
             at = begin + length * k / fine
@@ -93,8 +93,8 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         sense = np.sign(np.where(np.abs(speed) > 0.1 * np.max(np.abs(speed)), speed, 0.0))
         shapes += [
             ("a difference between opening and closing", sense),
-            ("another slope opening than closing", sense * (u - low)),
-            ("something that follows the speed", speed),
+            ("a different slope for opening and closing", sense * (u - low)),
+            ("a part proportional to the speed", speed),
         ]
         for index, run in enumerate(history.runs):
             mask = np.zeros(n)
@@ -104,7 +104,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         if len(history.runs) > 1:
             mask = np.zeros(n)
             mask[run] = u[run] - np.mean(u[run])
-            shapes.append((f"another slope in run {index + 1}", mask))
+            shapes.append((f"a different slope in run {index + 1}", mask))
     shapes += [(f"curvature of order {k} over the input", ((u - low) / span) ** k) for k in (2, 3, 4)]
     channels = [(1.0, 0.0, 0.0, "the gap")]
     if history.both_edges:
@@ -118,7 +118,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
     shapes = shapes[:: max(1, len(shapes) * len(channels) // most)]
     words = tuple(f"{label} in {channel}" for *_, channel in channels for label, _ in shapes)
     bare = np.array([shape for _, shape in shapes]).T
-    # A shape is whitened once in each channel: the edges' shapes are sums of the gap's and the midline's.
+    # Each shape is whitened once per channel; shapes of the edges are sums of those of gap and midline.
     shares = np.array(
         [
             [gap, midline, force][: 1 + history.both_edges] + [force] * history.force

@@ -17,7 +17,7 @@ from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, li
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
-from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.diagnosis.input.input_uncertainty import below_the_input, mean_slope
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
@@ -31,11 +31,11 @@ Effected = TypeVar("Effected", bound=RunGains | PositionMap)
 
 
 def beside_gains(state: Searched, look: Look) -> Searched:
-    """Search with run-to-run gains included, and keep the result if it is much more probable.
+    """Search with gains that differ between runs, and keep the result if it is much more probable.
 
-    If a named effect changes the prediction more than the gains do, the gains are nuisance parameters; if there is no
-    such effect, they are structure without a name. If further effects are not much more probable than such gains, the
-    gains are kept, because naming an effect claims more than stating a scatter.
+    If a named effect changes the prediction more than the gains of the runs do, the gains are nuisance parameters. If
+    no named effect does, the gains are structure without a name. If further effects are not much more probable than
+    gains that differ between runs, the gains are kept, because naming an effect claims more than stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
@@ -55,11 +55,14 @@ def beside_gains(state: Searched, look: Look) -> Searched:
     beside = look.again(replace(state.data, run_gains=gains), known)
     stands = standing_of(beside.data, beside.found)
     if not stands.is_little:
-        # What all runs share is an effect, and was taken for their scatter.
+        # A common mean of the gains is an effect, and must not be part of their scatter.
         apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
         if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
             beside = apart
-    if not _does_more(beside):
+    left = standing_of(beside.data, beside.found)
+    # Gains of runs that stay at one place are no more than offsets, and may be anything: what they leave is looked at.
+    worse = not left.is_little and left.after_mm > standing_of(state.data, found).after_mm
+    if worse or not _does_more(beside):
         return state
     fewer = len(beside.found.best.names) < len(found.best.names)
     least = -LEAST_GAIN if explained and fewer else LEAST_GAIN
@@ -87,7 +90,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
     else:
         first, gain = likeliest_map(found.problem, found.best)
         if gain < LEAST_GAIN and found.best.names:
-            # What was named may itself stand for a part of the map.
+            # A named effect may represent a part of the map.
             first, gain = likeliest_map(found.problem, found.nothing)
         if gain < LEAST_GAIN and not asked:
             return state
@@ -97,7 +100,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
     plain = _without(beside.found.problem, first)
     parts = imitating_parts(plain, first, beside.found.best)
     if parts and not parts.keys() & look.forced:
-        # The map was estimated beside what stands for a part of it.
+        # The map was estimated together with effects that represent a part of it: estimate it again without them.
         names = tuple(name for name in beside.found.best.names if name not in parts)
         rest = fit(plain, names, beside.found.best.values, iterations=20) if names else plain.nothing()
         first, _ = likeliest_map(plain, rest)
@@ -114,20 +117,22 @@ def beside_map(state: Searched, look: Look) -> Searched:
     if asked:
         return beside
     if below_the_input(plain, float(np.sqrt(np.mean(second.fitted_mm**2)))):
-        # A stage that returns to its places is rounded alike there by its encoder, which is no effect.
+        # If a stage returns to the same positions, its encoder rounds them equally; these errors are no effect.
         said = _words_on_roundings(second, plain)
         return look.again(replace(state.data, roundings=second, notes=(*state.data.notes, said)), beside.found.best)
-    # Beside effects that explain the data, a map that takes none of their places is what their forms leave over.
+    # If effects explain the data and the map replaces none of them, the map only describes the inexactness of their
+    # formulas.
     stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
     worse = found.unknown is None and beside.found.unknown is not None
     return beside if not (stays or worse) and _gained(state, beside, second) > LEAST_GAIN else state
 
 
 def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
-    rms_um, sigma_um = 1e3 * repeated.rms_mm.value, 1e3 * problem.chain.history.input_sigma_mm
+    gap_mm = float(np.sqrt(np.mean(repeated.fitted_mm[: problem.chain.history.input_mm.size] ** 2)))
+    rms_um, sigma_um = 1e3 * gap_mm / mean_slope(problem), 1e3 * problem.chain.history.input_sigma_mm
     return (
-        f"the recorded input errs alike by {rms_um:.2g} um RMS whenever it comes to the same places: as this is less "
-        f"than its own standard uncertainty, {sigma_um:.2g} um, it is no {NAME}."
+        f"the error of the recorded input repeats at the same positions ({rms_um:.2g} um RMS): as this is less than "
+        f"its standard uncertainty, {sigma_um:.2g} um, it does not count as {NAME}."
     )
 
 
@@ -147,7 +152,7 @@ def _likelier(
     for begin in {e.names: e for e in begins if len(e.names) <= len(found.best.names)}.values():
         known, (effect, _) = begin, estimated(problem, begin)
         for _ in range(ROUNDS):
-            # What the effects stood in for is the random effect's now.
+            # Refit the effects, because the random effect now explains what they imitated.
             known = _refitted(_beside(problem, effect), known)
             effect, _ = estimated(problem, _left(problem, known))
         known = _refitted(_beside(problem, effect), known)
@@ -169,7 +174,7 @@ def _line(problem: Problem) -> Explanation:
 
 
 def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """Add the columns of a random effect to those that are refitted for every explanation."""
+    """Add the columns of a random effect to the columns that are refitted for every explanation."""
     drawn = problem.whitener.drawing
     columns = effect.columns_mm if drawn is None else np.hstack([effect.columns_mm, drawn])
     return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=columns)))

@@ -1,7 +1,7 @@
 """Reference slots measured during a run: a camera error affects slot and gap, a gripper error only the gap.
 
 The gap alone cannot distinguish a wrong scale from a wrong lever ratio, nor an edge bias from a wrong rest gap; a
-measured slot of known width can.
+measured slot of known width can distinguish them.
 """
 
 from collections.abc import Mapping
@@ -19,9 +19,10 @@ from fingervision.domain.response import Response
 from fingervision.effects import catalogue, that_show
 
 REFUTED = 9.0
-"""Chi-square per slot by which another explanation foretells it better: three standard uncertainties."""
+"""Difference in chi-square per slot above which an explanation is refuted by another that predicts the slot better:
+three standard uncertainties."""
 STEP = 0.1
-"""Step of a parameter, in its standard uncertainties, for what its uncertainty does to a slot."""
+"""Step of a parameter, in standard uncertainties, for propagating its uncertainty to the width of a slot."""
 
 Values = Mapping[str, Mapping[str, float]]
 
@@ -29,7 +30,7 @@ Values = Mapping[str, Mapping[str, float]]
 def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Findings, tuple[str, ...]]:
     """Drop the explanations that a reference slot contradicts, and report the result of the slots.
 
-    If the slots contradict all explanations, none is dropped: then something else is wrong, which a sentence reports.
+    If the slots contradict all explanations, none is dropped, and a sentence reports that something else is wrong.
 
     Returns
     -------
@@ -54,7 +55,7 @@ def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Finding
     best = min(left, key=lambda e: e.score + costs[members.index(e)])
     others = [e for e in left if e is not best]
     told = replace(found, best=best, alternatives=(best, *others))
-    return told, (*said, f"that rules out {dropped}.")
+    return told, (*said, f"the measured width of the reference slot rules out {dropped}.")
 
 
 def seen_mm(data: Observations, values: Values, size_mm: float) -> float:
@@ -75,7 +76,7 @@ def _surprise(data: Observations, explanation: Explanation, slot: ReferenceSlot)
 
 
 def _u_mm(data: Observations, explanation: Explanation, slot: ReferenceSlot) -> float:
-    """Standard uncertainty of the difference (mm): from the slot, its picture, and the explanation's parameters."""
+    """Standard uncertainty of measured minus predicted slot width (mm): from slot, picture and parameters."""
     values = {name: dict(given) for name, given in explanation.values.items()}
     listed = [(name, key) for name in explanation.names for key in values[name]]
     slopes = np.zeros(len(listed))
@@ -94,6 +95,6 @@ def _sentence(data: Observations, explanation: Explanation, slot: ReferenceSlot)
     fits = "as" if _surprise(data, explanation, slot) < REFUTED else "but"
     answer = "+".join(explanation.names) or "the model"
     return (
-        f"the reference slot of {slot.size_mm:g} mm measures {slot.measured_mm:.4f} mm, {fits} {answer} foretells "
+        f"the reference slot of {slot.size_mm:g} mm measures {slot.measured_mm:.4f} mm, {fits} {answer} predicts "
         f"{expected_mm:.4f} mm."
     )

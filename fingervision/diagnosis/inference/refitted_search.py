@@ -8,13 +8,18 @@ from scipy.stats import t as student
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.needed_effects import with_simpler_parts, without_unneeded_effects
+from fingervision.diagnosis.inference.needed_effects import (
+    with_simpler_parts,
+    without_fits_to_structure,
+    without_unneeded_effects,
+)
 from fingervision.diagnosis.inference.position_map import (
     NAME,
 )
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
+from fingervision.diagnosis.inference.record_errors import with_record_errors
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched, problem_of
 from fingervision.diagnosis.inference.verdict import standing_of
@@ -23,12 +28,12 @@ from fingervision.diagnosis.input.observations import Observations
 
 BY_ACCIDENT = 1e-3
 """Probability of the observed or a larger mean of the runs' offsets by chance (Student's t), below which the offsets
-are given a common cause."""
+are assumed to have a common cause."""
 LOWERED = 0.9
 """Largest ratio of the residuals with and without such a common cause for which it is accepted."""
 MOST_SEARCHES = 3
-"""Most searches: the second is nearly always the last, and none is needed if the prediction depends linearly on the
-drawing's dimensions."""
+"""Most searches: the second search is nearly always the last, and no repetition is needed if the prediction depends
+linearly on the drawing's dimensions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +62,7 @@ def refitted_search(
     without: frozenset[str],
     progress: Progress,
 ) -> Refitted:
-    """Search with interpolation between samples, a position map, gains of runs, and refitted dimensions, in turn.
+    """Search; repeat it with curved interpolation, a position map, gains of runs, and refitted dimensions.
 
     Parameters
     ----------
@@ -139,8 +144,9 @@ def _beside_drawing(state: Searched, look: Look) -> Searched:
 def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
     """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, without_unneeded_effects(state.data, state.found)
-    found = with_simpler_parts(data, found)
+    found = with_simpler_parts(data, without_fits_to_structure(data, found))
     best, posterior = settled(found.problem, found.best, rng)
+    best = with_record_errors(data, found.problem, best, rng)
     found = _with_best(found, best)
     if data.position_map is not None:
         data = replace(

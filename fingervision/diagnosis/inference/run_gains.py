@@ -1,7 +1,7 @@
 """Gains that differ from run to run: a random effect on the ratio of gap to input, added to every explanation.
 
 For example, a part that is clamped again for each run, or a polymer at another temperature, moves by slightly more or
-less in each run. Like the runs' offsets, these gains are zero-mean random effects (Laird & Ware 1982,
+less in each run. Like the offsets of runs, the gains of runs are zero-mean random effects (Laird & Ware 1982,
 doi:10.2307/2529876), because their common mean is a ratio error, which is an effect of the catalogue.
 """
 
@@ -60,8 +60,8 @@ class RunGains:
         """Sentence with the estimated scatter of the runs' gains."""
         each = ", ".join(f"{100.0 * self.sd * number:+.2g}" for number in self.coefficients - self.coefficients.mean())
         return (
-            f"the gain differs from run to run (by {each} %): taken as the runs' own scatter, like their offsets, and "
-            "not as an effect."
+            f"the gain differs from run to run (by {each} %): this counts as scatter between the runs, like their "
+            "offsets, and not as an effect."
         )
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
@@ -93,7 +93,7 @@ def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGain
     gap_mm = problem.chain.stacked(explanation.values)[:n]
     raw = np.zeros((problem.measured.size, len(history.runs)))
     for column, run in enumerate(history.runs):
-        # About the run's mean: what else a gain does is an offset.
+        # A gain acts about the mean of its run, because its remaining part is an offset.
         raw[run, column] = gap_mm[run] - gap_mm[run].mean()
     gram, aim = normal_equations(problem, explanation, raw)
     value, vector = np.linalg.eigh(gram)

@@ -31,16 +31,17 @@ TRIPLE_SHARE = 0.15
 """Least share of the whole change of the prediction that a third effect must contribute (`added_share`): three effects
 can fit almost anything."""
 PAIRS_REFITTED = 60
-"""Number of pairs that are refitted jointly, those first whose signatures gain most: 27 effects have 351 pairs."""
+"""Number of pairs that are refitted jointly, in the order of their signatures' gain: 27 effects have 351 pairs."""
 PART_OF_UNKNOWN = 9.0
 """Ratio, in chi-square, of the part that an effect explains to the remaining residual above which the effect is
 reported in addition to *unknown*: the residual is then a third of the disagreement, as RMS."""
 PAIRS_EXTENDED = 6
-"""Pairs of different predictions to which a third effect is added: three of them may be one pair by three names."""
+"""Number of pairs with different predictions to which a third effect is added."""
 LIKELIEST = 6
-"""Explanations, best first, among which Schwarz's criterion chooses: those of one prediction are seldom more."""
+"""Number of explanations, best first, among which Schwarz's criterion chooses: seldom do more explanations have the
+same prediction."""
 TRIPLES_REFITTED = 24
-"""Triples refitted jointly, those first whose signatures take the most: a fifth of what all pairs would be."""
+"""Number of triples that are refitted jointly, in the order of their signatures' gain."""
 BASES = 14
 """Number of single effects to which a second effect is added."""
 
@@ -55,7 +56,7 @@ def search(
     """Find the best explanation, the indistinguishable ones, and the remaining structure.
 
     The search fits one, then two, then three effects, tests for the verdict *unknown*, and collects the ambiguity set;
-    each of these functions returns a new state.
+    each step of the search returns a new state.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def search(
     known : Explanation or None
         Explanation found by an earlier search of the same measurement, from whose residual the noise is estimated.
     """
-    state = _one_effect(noise_known(problem_beside, known), rng, forced)
+    state = _one_effect(replace(noise_known(problem_beside, known), known=known), rng, forced)
     progress(0.3)
     state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
     state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
@@ -84,7 +85,8 @@ def search(
 def _one_effect(state: SearchState, rng: np.random.Generator, forced: frozenset[str]) -> SearchState:
     """Fit every effect alone; keep the simplest that is as good as the best, if its gain is significant."""
     problem = state.problem
-    singles = [e for e in single_effects(problem, state.atoms, 20) if not within_a_step(problem, e)]
+    alone = state.with_known(single_effects(problem, state.atoms, 20), 1)
+    singles = [e for e in alone if not within_a_step(problem, e)]
     evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
     state = replace(state, singles=singles, evidence=evidence)
     if not singles:
@@ -103,10 +105,11 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     if not state.best.names:
         return state
     problem, singles = state.problem, state.singles
-    pairs = extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress)
+    pairs = state.with_known(extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress), 2)
     pairs = [e for e in swapped(problem, state.atoms, pairs) if not within_a_step(problem, e)]
     state = replace(state, pairs=pairs)
-    # Beside a simpler form a second effect would gain what the richest has gained already.
+    # Pairs are compared with the best single effect: compared with a simpler formula, a second effect would gain what a
+    # richer formula has already gained.
     shown = _beside_roundings(state, pairs)
     if not shown:
         return state
@@ -121,9 +124,9 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
 def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:
     """Keep pairs of effects that change the prediction by more than the recorded input's error.
 
-    If the best pair is not among them, its effects only follow the rounding errors of an encoder. Another pair may
-    follow the same rounding errors with a larger amplitude, and is kept only if its effects gain significantly when
-    they are added to the best pair.
+    If the best pair changes the prediction by less, its effects only follow the rounding errors of an encoder. Another
+    pair may follow the same rounding errors with a larger amplitude, and is kept only if its effects gain significantly
+    when they are added to the best pair.
     """
     shown = beyond_the_input(state.problem, state.singles[0], pairs)
     if not shown or shown[0] is pairs[0]:
@@ -145,20 +148,21 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     bases = different(problem, pairs, PAIRS_EXTENDED)
     asked = None if state.evidence is None else state.evidence.thresholds
     tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH, asked=asked)
-    triples = [e for e in tried if not within_a_step(problem, e)]
+    triples = [e for e in state.with_known(tried, 3) if not within_a_step(problem, e)]
     state = replace(state, triples=triples)
     if not triples:
         return state
     share = added_share(problem, state.best, triples[0])
     if share == 0.0:
-        # The best third effect follows the roundings of the input, and so may the others.
+        # The best third effect only follows the rounding of the input, and so may all other ones.
         return state
     large = share > TRIPLE_SHARE
     if not (large or completes(state, state.best, triples[0])) or not state.speaks_for(triples, state.best):
         return state
     imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
     if imitation is not None:
-        # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
+        # If the third effect changes little, the structure that it imitates remains in the residual, and the probes
+        # will report it.
         return replace(state, imitation=imitation) if large else state
     triples.sort(key=lambda e: e.bic(state.values))
     again = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
@@ -167,7 +171,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
 
 
 def _beyond_roundings(state: SearchState) -> SearchState:
-    """Drop effects that only follow the errors of the recorded input; explanations of the rest are the peers then."""
+    """Drop effects that only follow the errors of the recorded input; the remaining explanations are then the peers."""
     best = without_roundings(state.problem, state.best)
     if best is state.best:
         return state
@@ -188,7 +192,8 @@ def _without_imitations(state: SearchState) -> SearchState:
 def _gated(state: SearchState, rng: np.random.Generator) -> SearchState:
     """Test the residual of the best explanation with generic probes."""
     unknown, left_over = remaining_structure(state.problem, state.shapes, state.best, rng)
-    # What is small beside all that was explained is left over, whether probes found it or a third effect.
+    # Structure that is small compared with the explained change is reported as remaining, whether probes or a third
+    # effect found it.
     if unknown is None and left_over is None:
         unknown = state.imitation
     return replace(state, unknown=state.unknown if unknown is None else unknown, left_over=left_over)
@@ -230,7 +235,7 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     """Choose the best explanation that contains every effect that the user requires.
 
     The required effects are also added to the best explanation that was found without them, because an effect that is
-    small beside two others is in none of the pairs that fit.
+    much smaller than two other effects is in none of the pairs that fit.
     """
     problem = state.problem
     able = forced & set(problem.effects)

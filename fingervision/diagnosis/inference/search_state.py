@@ -8,6 +8,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     single_effects,
 )
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.model_adequacy import shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, signatures
@@ -20,8 +21,8 @@ NOISY = 2.0 * 2.0**0.5
 """Excess of the chi-square of noise over the number of rows n that occurs now and then, in units of sqrt(n): two
 standard deviations sqrt(2 n)."""
 ROUGH = 2
-"""Starts, and explanations refitted thoroughly, of a first search that is for the noise alone; where its fit is poor,
-the chi-square of the answer says so, and the search is repeated (`searched.QUIET`)."""
+"""Number of starts, and of explanations refitted thoroughly, in a first search whose only purpose is to estimate the
+noise. If its fit is poor, the chi-square of the result shows this, and the search is repeated (`searched.QUIET`)."""
 SHORT = 100
 """Number of samples below which the noise is estimated with single effects only."""
 
@@ -47,13 +48,13 @@ class Findings:
 
 
 def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -> bool:
-    """Whether the larger explanation removes nearly all of the smaller one's residual, as a true one does.
+    """Whether the larger explanation removes nearly all of the residual of the smaller one, as a true explanation does.
 
-    The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
-    added to the smaller explanation fits part of that inexactness, however large the residual is. If the larger
-    explanation has other effects instead, and leaves only noise, no more than the typical inexactness of formulas is
-    allowed for the smaller one. For example, a creep whose residual was 70 times the noise (3.6 % of what it explained)
-    imitated a ratio and an offset, which together leave only noise.
+    The residual of the smaller explanation must clearly exceed the noise and the inexactness of its formula. An effect
+    that is added to the smaller explanation fits part of the inexactness of its formula, however large the residual is.
+    If the larger explanation has other effects instead, and leaves only noise, no more than the typical inexactness of
+    formulas is allowed for the smaller explanation. For example, a creep whose residual was 70 times the noise (3.6 %
+    of the explained change) imitated a ratio and an offset, which together leave only noise.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows
@@ -82,6 +83,8 @@ class SearchState:
         All explanations with one effect, and the most probable ones with two and three, best first.
     evidence : Evidence or None
         Criterion for the significance of gains.
+    known : Explanation or None
+        Explanation found by an earlier search of the same measurement.
     imitation, unknown, left_over : str or None
         Description of a probe that effects only imitate; of structure that no effect explains; of remaining structure
         that is small.
@@ -97,6 +100,7 @@ class SearchState:
     pairs: list[Explanation] = field(default_factory=list)
     triples: list[Explanation] = field(default_factory=list)
     evidence: Evidence | None = None
+    known: Explanation | None = None
     imitation: str | None = None
     unknown: str | None = None
     left_over: str | None = None
@@ -106,13 +110,28 @@ class SearchState:
         """Number of measured values, at least 2."""
         return max(2, int(self.problem.measured.size))
 
+    def with_known(self, found: list[Explanation], count: int) -> list[Explanation]:
+        """Add the explanation of an earlier search, refitted with the present noise, if it has `count` effects.
+
+        With a smaller noise, minima of chi-square are narrower, and a search from signatures may miss the minimum that
+        was found before. For example, a delay with a speed limit that left only noise was replaced by a resonance that
+        left ten times as much.
+        """
+        known = self.known
+        if known is None or len(known.names) != count or not set(known.names) <= set(self.problem.effects):
+            return found
+        again = fit(self.problem, known.names, known.values, iterations=MANY_STEPS)
+        rest = [e for e in found if e.names != again.names or e.score <= again.score]
+        kept = rest if any(e.names == again.names for e in rest) else [*rest, again]
+        return sorted(kept, key=lambda explanation: explanation.score)
+
     def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
         """Whether the best of some explanations gains more over `base` than noise alone would."""
         return self.evidence is not None and self.evidence.speaks_for(found, base)
 
 
 def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> SearchState:
-    """Estimate the noise from the residual of the known effects, or of those from a rough first search."""
+    """Estimate the noise from the residual of the known effects, or of effects from a rough first search."""
     if known is not None:
         problem = problem_beside(known)
         nothing = problem.nothing()
@@ -120,7 +139,7 @@ def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: 
     problem = problem_beside(None)
     atoms = signatures(problem)
     rough = single_effects(problem, atoms, 4, ROUGH)
-    # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
+    # A pair that is fitted to few samples absorbs their noise, so that the noise would be underestimated.
     many = problem.chain.history.input_mm.size >= SHORT
     pairs = extended(problem, atoms, rough[:3], 16, lambda _: None, scanned=1, refined=ROUGH) if many else []
     first = [*rough[:1], *pairs[:1]]

@@ -13,10 +13,11 @@ from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 
 QUIET = 3.0 * 2.0**0.5
-"""Square roots of the rows by which a chi-square must fall short of them before the noise was taken for too large:
-three of its standard deviations, sqrt(2 n)."""
+"""Deficit of chi-square relative to the number of rows n, in units of sqrt(n), above which the assumed noise was too
+large: three standard deviations sqrt(2 n) of chi-square."""
 MOST_REPEATS = 2
-"""Searches repeated with a smaller noise: beside the right effects its estimate hardly changes any more."""
+"""Largest number of repeated searches with a smaller noise: with the right effects, the estimate of the noise hardly
+changes any more."""
 
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
@@ -58,8 +59,8 @@ class Look:
 def _noise_is_too_large(found: Findings) -> bool:
     """Whether the result leaves a residual far smaller than the noise by which it was judged.
 
-    The noise is estimated from the residual of a rough first fit. If that first fit is poor, its errors count as
-    correlated noise, and with so large a noise a second effect is never found.
+    The noise is estimated from the residual of a rough first fit. If the first fit is poor, its errors count as
+    correlated noise, and a second effect cannot be found because the assumed noise is too large.
     """
     rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
     return bool(found.best.score < rows - QUIET * rows**0.5)

@@ -14,8 +14,8 @@ START_MOVES = 1e-3
 
 
 SAME_SIZE = (0.2, 3.0)
-"""Coefficients of a column without an amplitude that still mean its own size: beyond them a neighbour on the grid of
-sizes, which is a factor of two to three away, describes the residual better."""
+"""Range of the fitted coefficient in which a column without an amplitude still means its own size. Beyond this range, a
+neighbouring size of the grid, a factor of two to three away, describes the residual better."""
 BEYOND_BOUNDS = 0.3
 """Share of a parameter's range by which a linear estimate may exceed it: the refit, which is not linear, may come back
 within the bounds."""
@@ -143,6 +143,6 @@ def derivatives(problem: Problem, explanation: Explanation) -> Array:
 
 
 def tangents(problem: Problem, explanation: Explanation) -> Array:
-    """Derivatives of the whitened prediction by an explanation's parameters, scaled to unit length; shape (m, p)."""
+    """Derivatives of the whitened prediction with respect to parameters, scaled to unit length; shape (m, p)."""
     whitened = problem.whitener.columns(derivatives(problem, explanation))[0]
     return np.asarray(whitened / np.maximum(np.linalg.norm(whitened, axis=0), 1e-300))

@@ -1,8 +1,8 @@
 """Uncertain dimensions of the drawing, refitted within their uncertainties together with the effects.
 
-The dimensions theta are random effects (Henderson 1950): y = M(theta) + J (theta - theta_0), with theta - theta_0
-normally distributed about zero with the stated uncertainty. The Jacobian J is evaluated at the last estimate; the prior
-stays centred on the drawn value.
+The dimensions theta are random effects (Henderson 1950): the measurement is M(theta_0) + J (theta - theta_0), with the
+model M, its Jacobian J and the drawn values theta_0; theta - theta_0 is normally distributed about zero with the stated
+uncertainty. The Jacobian J is evaluated at the last estimate; the prior stays centred on the drawn value.
 """
 
 from collections.abc import Mapping
@@ -50,7 +50,7 @@ class DrawingRefit:
 
 
 def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, float]) -> DrawingRefit:
-    """Differentiate the prediction by the drawing's uncertain dimensions, at their present values.
+    """Differentiate the prediction with respect to the drawing's uncertain dimensions, at their present values.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
             for step in (-STEP, STEP)
         ]
         column = (ends[1] - ends[0]) / (2.0 * STEP)
-        if np.any(np.abs(column) > 1e-12):  # a density or a yield stress moves nothing
+        if np.any(np.abs(column) > 1e-12):  # a density or a yield stress does not change the prediction
             columns.append(column)
             names.append(name)
     size = chain.stacked({}).size

@@ -109,13 +109,14 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     aside = isolated(after_mm[:n], problem.whitener.aside[:n], runs)
     noises = [noise.total_mm for noise in problem.whitener.noises]
     if history.commanded:
-        # What the stage does after each jump is no noise, and passes for it in the spectrum.
+        # The motion of the stage after each jump is not noise, but would count as noise in the spectrum.
         parts = np.split(after_mm, len(data.channels))
         digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
         settled = [max(scatter_in_holds(history, part), digits) for part in parts]
         noises = [min(noise, scatter or noise) for noise, scatter in zip(noises, settled, strict=True)]
     elif history.time_s is not None and data.repeats is None:
-        # Slow structure passes for correlated noise, which leaves traces in what changes from sample to sample.
+        # Slow structure could count as correlated noise; true correlated noise is also visible in the changes from
+        # sample to sample.
         parts = np.split(after_mm, len(data.channels))
         digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
         most = [most_noise(part, history.input_mm, runs, digits) for part in parts]
@@ -143,7 +144,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
 
 def isolated(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
-    """Mark the rows set aside that stand alone; all others are part of the disagreement.
+    """Mark the rows set aside that are isolated; all other rows set aside are part of the disagreement.
 
     Parameters
     ----------
@@ -158,10 +159,10 @@ def isolated(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags
 
 
 def _leans(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
-    """Mark the rows set aside as gross errors that are the peak of something wider, and so part of the disagreement.
+    """Mark the rows set aside as gross errors that are the peak of a wider deviation, and so part of the disagreement.
 
-    A gross error stands alone. Beside a peak, the nearest row that was kept lies off in the same direction by more than
-    half as much.
+    A gross error is isolated. Next to the peak of a wider deviation, the nearest row that was kept deviates in the same
+    direction by more than half as much.
     """
     leans = np.zeros(aside.size, dtype=bool)
     for run in runs:
@@ -178,7 +179,8 @@ def _leans(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
     """Subtract each run's deviation from the mean of all runs; a significant offset shared by all runs remains.
 
-    The mean is not significant if random zeroing of the runs, judged by their scatter, would cause as large a mean.
+    A mean offset is not significant if random zeroing of the runs, judged by their scatter, would cause a mean as
+    large.
     """
     means = np.array([values[run].mean() for run in runs])
     common = float(means.mean())
@@ -205,15 +207,16 @@ def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict
     """Return the verdict that follows from the residual, and describe any *unknown* structure."""
     named = bool(found.best.names) or mapped
     remains = (
-        f"{1e3 * stands.after_mm:.3g} um RMS remain where {1e3 * stands.noise_mm:.2g} um are noise, "
-        f"{100.0 * stands.share:.0f} % of the disagreement"
+        f"{1e3 * stands.after_mm:.3g} um RMS remain, {100.0 * stands.share:.0f} % of the disagreement; noise would be "
+        f"{1e3 * stands.noise_mm:.2g} um"
     )
     if found.unknown is not None:
         return Verdict.UNKNOWN, found.unknown
     if not named and stands.aside_share > MANY_ASIDE:
         return (
             Verdict.UNKNOWN,
-            f"{100.0 * stands.aside_share:.0f} % of the rows lie far off the model, the others on it",
+            f"{100.0 * stands.aside_share:.0f} % of the rows deviate far from the model, the remaining rows agree with "
+            "it",
         )
     if not named:
         return (Verdict.AGREES, None) if stands.is_noise else (Verdict.UNKNOWN, remains)

@@ -7,8 +7,8 @@ from fingervision.domain.effect import Array
 
 FREEDOM = 3.0
 """Factor on the offset's uncertainty for its prior when it is refitted. The offset was found from these same data, so
-that its uncertainty is no independent knowledge: with 3 u the prior adds a ninth of the data's information, whereas
-with u the data would be counted twice, and the uncertainty of a play that is correlated with the offset would be
+that its uncertainty is not independent knowledge: with 3 u the prior adds a ninth of the data's information, whereas
+with u the data would count twice, and the uncertainty of a play that is correlated with the offset would be
 understated."""
 
 
@@ -25,7 +25,7 @@ def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
     history = chain.history
     if u_clock_s == 0.0 or history.time_s is None:
         return np.zeros((chain.stacked({}).size, 0))
-    # Over no more than half a sample the record is straight, and over no less than the offset's doubt is it meant.
+    # Step of the difference: the offset's uncertainty, but at most half a sample, over which the record is straight.
     step_s = min(u_clock_s, 0.5 * history.sample_time_s)
     ends = [chain.with_input(_moved(chain, by_s)).stacked({}) for by_s in (-step_s, step_s)]
     return np.asarray((ends[1] - ends[0]) * (FREEDOM * u_clock_s / (2.0 * step_s)))[:, None]

@@ -10,14 +10,14 @@ HELD_SHARE = 0.5
 """Share of samples equal to the one before, above which an input may be a command; a recorded motion changes in most
 samples."""
 ISOLATED_SHARE = 0.9
-"""Share of jumps that are isolated between equal values; ramps and strokes have neighbouring steps."""
+"""Share of jumps that are isolated between equal values; in ramps and strokes, changes follow each other directly."""
 FEWEST_LINES = 8.0
 """Least number of encoder lines over the range; an encoder with fewer would be useless."""
 LEAST_HOLD = 4
 """Least number of samples in a hold for which the second half shows whether the gap moves or is constant."""
 DWELL = 3.0
-"""Ratio of a hold to the median hold between moves in the same direction, beyond which the stage waits there; the gap
-is then constant for an encoder too."""
+"""Ratio of a hold to the median hold between moves in the same direction, above which the stage itself waits; the gap
+is then constant even if the input is an encoder's record."""
 FOLLOWS = 0.5
 """Slope of the gap within holds, relative to that of a steady motion: 1 for an encoder, 0 for a command; this is the
 limit between them."""
@@ -26,8 +26,8 @@ limit between them."""
 def is_commanded(input_mm: Array, runs: tuple[slice, ...], gap_of_input: Array, gap_mm: Array) -> bool:
     """Whether the input is a command, which stays constant until it jumps.
 
-    The record of a coarse encoder also stays constant and jumps while the stage moves slowly. In that case the gap
-    moves while the record is constant; for a command, the gap is constant too.
+    The record of a coarse encoder also stays constant and jumps while the stage moves slowly. While an encoder's record
+    is constant, the gap moves; while a command is constant, the gap is constant too.
 
     Parameters
     ----------

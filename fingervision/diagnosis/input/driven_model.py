@@ -1,8 +1,8 @@
 """A dynamic model along a measured path, split into its static response and a dynamic remainder.
 
-The chain of effects is evaluated thousands of times, whereas one evaluation of a dynamic model takes seconds. The model
-is therefore split into its static response, a table on which drive effects act, and a dynamic remainder computed once
-along the driven path. The dynamic remainder is computed again along the path after the effects that were found.
+The chain of effects is evaluated thousands of times, but one evaluation of a dynamic model takes seconds. The model is
+therefore split into its static response, a table on which drive effects act, and a dynamic remainder computed once
+along the driven path. The dynamic remainder is computed again along the path that results from the effects found.
 """
 
 from dataclasses import replace

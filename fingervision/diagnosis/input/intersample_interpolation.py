@@ -57,7 +57,7 @@ def delays() -> tuple[str, ...]:
 
 
 def is_delay(effect: Effect) -> bool:
-    """Whether an effect is a delay; only for delays does interpolation by curves matter."""
+    """Whether an effect is a delay; interpolation by curves matters for delays only."""
     return isinstance(effect, DriveEffect | PointEffect) and effect.act_curved is not None
 
 

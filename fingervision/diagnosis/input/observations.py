@@ -65,7 +65,7 @@ class Observations:
     notes : tuple of str
         Remarks that a reader must know.
     refit : DrawingRefit
-        Effect of the drawing's uncertain dimensions on the prediction.
+        Change of the prediction by the drawing's uncertain dimensions.
     clock : ndarray of float, shape (m, p), or None
         Change of the prediction by the uncertain offset between the clocks of input and pictures.
     function : FunctionModel or None
@@ -129,7 +129,7 @@ class Observations:
             residual_mm = residual_mm if nuisance is None else residual_mm - nuisance.fitted_mm
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
-        # A reading is known to its last digit at best: rounding has the standard deviation of a step over root 12.
+        # The noise is at least the rounding of the last digit: its standard deviation is a step over root 12.
         floor = resolution(self.table.gap_mm) / float(np.sqrt(12.0))
         if self.table.u_random_mm is not None:
             floor = max(floor, float(np.median(self.table.u_random_mm)))
@@ -190,15 +190,15 @@ class Observations:
     def with_overshoots(self) -> "Observations":
         """Return the observations with an overshoot wherever two readings at one target indicate a reversal.
 
-        Without such pairs of readings, the observations are returned unchanged.
+        Without two readings at one target, the observations are returned unchanged.
         """
         if not turning_readings(self.table).size:
             return self
         along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
         path = input_path(self.table, self.chain.history, along_mm, commanded=commanded, overshoots=True)
         said = (
-            f"{turning_readings(self.table).size} readings repeat an outermost target: the stage was taken to have run "
-            "over beyond it in between, as in ISO 230-2, which explains the data better."
+            f"{turning_readings(self.table).size} readings repeat an outermost target: an overshoot of the stage "
+            "beyond this target, as in ISO 230-2, is assumed between them, because it explains the data better."
         )
         return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
 
@@ -214,7 +214,7 @@ class Observations:
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
     def driven_again(self, explanation: Explanation, noise_mm: float) -> "Observations | None":
-        """Recompute a dynamic model along the path that the input takes after an explanation's drive effects.
+        """Recompute a dynamic model along the path of the input after an explanation's drive effects.
 
         The function returns None if the recomputed model does not differ significantly.
         """
@@ -225,14 +225,14 @@ class Observations:
         return replace(self, chain=chain) if float(np.sqrt(np.mean(changed**2))) > OF_NOISE * noise_mm else None
 
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
-        """Whether a prediction linearised at other dimensions agrees with this prediction within the noise."""
+        """Whether a prediction linearised at other dimensions agrees with the present prediction within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
         bent -= drawn.refit.columns @ np.subtract([*self.refit.moved.values()], [*drawn.refit.moved.values()])
         missed = problem.whitener.one(bent)
         return float(missed @ missed) < BENT
 
     def refitted(self) -> tuple[str, ...]:
-        """Sentences that say which dimensions of the drawing were refitted, and to which values."""
+        """Sentences on the dimensions of the drawing that were refitted, with their values."""
         drawn = self.model.base
         if not isinstance(drawn, PhysicalModel):
             return ()
@@ -241,7 +241,7 @@ class Observations:
             number = drawn.uncertain[name]
             u = number.u or 0.0
             left = self.refit.known.get(name, 1.0) * u
-            far = ": it lies farther off than the drawing states" if abs(by) > DOUBTFUL else ""
+            far = ": it differs by more than the drawing's uncertainty" if abs(by) > DOUBTFUL else ""
             out.append(
                 f"{name} was refitted to {number.value + by * u:.6g} +-{left:.2g}, "
                 f"drawn as {number.value:g} +-{u:.2g}{far}."

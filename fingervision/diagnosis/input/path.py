@@ -9,10 +9,11 @@ from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.measured_table import MeasuredTable
 
 AT_REST_S = 5.0
-"""Time between rows from which on they count as separate readings at rest: in ISO 230-2 a stage rests for some seconds
-at each target, while cameras and data loggers record a motion at least every few seconds."""
+"""Shortest time between rows that count as separate readings at rest: in ISO 230-2 a stage rests for some seconds at
+each target, while cameras and data loggers record a motion at least every few seconds."""
 AT_REST_REVISITED_S = 1.0
-"""The same time if rows return to exactly equal inputs: these are set-points, not samples of a motion."""
+"""Shortest time between readings at rest if rows return to exactly equal inputs: such inputs are set-points, not
+samples of a motion."""
 REVISITED_SHARE = 0.5
 """Share of rows with an input that also occurs in another row, above which the record consists of set-points."""
 OVERSHOOT = 0.5
@@ -23,7 +24,8 @@ ARRIVED = 0.5
 FINE_STEPS = 8
 """Points of the path per sample after a command's jump: the resolution with which a delay places the jump."""
 FINE_S = 1.5
-"""Time after a jump for which the path is so dense: longer than the longest delay of the catalogue."""
+"""Time after a jump for which the path has `FINE_STEPS` points per sample: longer than the longest delay of the
+catalogue."""
 
 
 def readings_at_rest(table: MeasuredTable) -> Flags:
@@ -131,7 +133,7 @@ def input_path(
                 jumps = along_mm[i] != along_mm[i - 1]
                 jumped_s = time_s[i] if jumps else jumped_s
                 if jumps or time_s[i] - jumped_s < FINE_S:
-                    # A command holds its value until the sample at which it stands changed.
+                    # A command keeps its old value until the sample at which the new value is recorded.
                     inputs += [along_mm[i - 1]] * (FINE_STEPS - 1)
                     times += [time_s[i - 1] + step_s * k / FINE_STEPS for k in range(1, FINE_STEPS)]
                     owners += [int(owner_of[i - 1])] * (FINE_STEPS - 1)

@@ -24,8 +24,8 @@ from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
 UNIT_SHARES = (0.1, 3.0)
-"""Shares of the model's range, after a change of unit, between which the input was apparently given in that unit: runs
-cover at least a tenth of the range, and in the right unit none covers three hundred times it."""
+"""Smallest and largest share of the model's range that the inputs cover, after a change of unit, if the input was
+apparently given in that unit. Runs cover at least a tenth of the range."""
 
 
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
@@ -86,7 +86,7 @@ def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None
 
 
 def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:
-    """Collect what effects may use: input, times and runs."""
+    """Collect the data that effects may use: input, times and runs."""
     rest = model.base.respond(np.zeros(1))
     zero_mm = float(rest.gap_mm[0])
     opening_mm = model.base.respond(table.input_mm).gap_mm - zero_mm
@@ -135,9 +135,11 @@ def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
 def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str, ...]:
     notes = []
     if table.midline_mm is None:
-        notes.append("only the gap was measured: what moves both fingers together cannot show.")
+        notes.append("only the gap was measured: effects that move both fingers together cannot be detected.")
     if recorded.is_motion:
-        notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
+        notes.append(
+            "the fluctuations of the input are also visible in the gap: they are real motion and were not smoothed."
+        )
     return tuple(notes)
 
 
@@ -145,9 +147,9 @@ def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
     if table.u_clock_s <= 0.0:
         return ()
     return (
-        "the clocks of input and pictures were laid on each other by this motion itself "
-        f"(U = {2.0 * table.u_clock_s:.2g} s over the frames, k = 2): a lag that is the same at all times is part of "
-        "that offset, and one is named only beyond its uncertainty.",
+        f"the clocks of input and pictures were synchronised by this motion itself (U = {2.0 * table.u_clock_s:.2g} s "
+        "over the frames, k = 2): a constant lag is part of this offset, so that a lag is named only if it exceeds "
+        "the offset's uncertainty.",
     )
 
 
@@ -166,7 +168,7 @@ def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
     """Whether each run follows a re-zeroing, recognised by its name.
 
-    The result is empty if every run follows a re-zeroing, because then no run shows the earlier zero.
+    Nothing is returned if every run follows a re-zeroing, because then no run shows the earlier zero.
     """
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()

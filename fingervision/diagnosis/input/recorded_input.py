@@ -13,9 +13,11 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
 from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
+from fingervision.stage_record.window_blending import blended
 
 HELD_SAMPLES, SLOW_SAMPLES = 15, 5
-"""Number of samples for which a stage at rest, and a stage that reverses, stays within one or two encoder steps."""
+"""Number of samples for which the input stays within one or two encoder steps: for a stage at rest, and for a stage
+that reverses."""
 STAYING = 0.2
 """Leverage below which neighbouring smoothed values have so many samples in common that their errors are equal."""
 STANDING_SHARE = 1e-3
@@ -37,13 +39,13 @@ class RecordedInput:
     along_mm : ndarray of float, shape (m,)
         Smoothed input of every row that has an input.
     sigma_mm, step_mm : float
-        Standard uncertainty of one recorded value, and the encoder's step; 0 if there is none.
+        Standard uncertainty of one recorded value, and the encoder's step; 0 without an encoder.
     error_mm : ndarray of float, shape (n,)
         Effect of the remaining error on the gap.
     stays : ndarray of bool, shape (n,)
-        Where that error is the same from sample to sample; elsewhere it differs between samples.
+        Samples at which this error is the same from sample to sample; at all others it differs.
     samples : float
-        Number of samples for which it is the same.
+        Number of samples for which the error is the same.
     is_motion : bool
         Whether the fluctuations of the record are also visible in the gap, and were therefore not smoothed.
     commanded : bool
@@ -82,6 +84,7 @@ class RecordedInput:
         if sigma == 0.0:
             return cls.exact(table)
         smooth, leverage = smoothed(snapped_mm, time_s, runs, sigma, step)
+        smooth = blended(smooth, snapped_mm, time_s, runs, leverage)
         if _is_motion(table, model, smooth[rows]):
             return cls.exact(table, is_motion=True)
         samples, stays = 1.0 / float(np.median(leverage)), leverage < STAYING
@@ -145,7 +148,7 @@ def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: fl
 
 
 def _is_motion(table: MeasuredTable, model: CorrectedModel, smooth: Array) -> bool:
-    """Whether the gap follows the input's fluctuations: the slope of gap over input is then one, otherwise zero."""
+    """Whether the gap follows the input's fluctuations: the slope of gap over input is then one, else zero."""
     expected = model.base.respond(table.input_mm).gap_mm - model.base.respond(smooth).gap_mm
     residual = table.gap_mm - model.base.respond(smooth).gap_mm
     a = np.concatenate([np.diff(expected[run]) for run in table.runs])

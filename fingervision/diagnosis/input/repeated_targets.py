@@ -11,23 +11,22 @@ from fingervision.domain.effect import Array, Flags
 Integers = NDArray[np.intp]
 
 FEWEST_TARGETS = 3
-"""Least number of targets of an axis: two positions are the ends of a step, and a range over them is a single
-difference."""
+"""Least number of targets of an axis: two positions are only the ends of one step."""
 SPACING_RATIO = 10.0
 """Least ratio of the distance between neighbouring targets to that between inputs at one target. A stage repeats a
-set-point to its in-position window, which is a small part of any tested spacing; samples of a motion are evenly
-spaced."""
+set-point within its in-position window, which is a small part of any tested spacing, whereas samples of a motion are
+evenly spaced."""
 WIDEST = 0.2
 """Largest range of the inputs at one target, as a share of the distance to the next; otherwise a reading could belong
-to either."""
+to either target."""
 MOST_TARGETS = 200
 """Largest number of targets: ISO 230-2 requires 5 per metre; with 200, five cycles have 2000 rests. More positions are
 samples of a motion, or steps of an encoder."""
 SHORTEST_REST_S = 0.3
-"""Median time between visits below which the stage was in motion: moving, arriving and stopping takes a stage a few
-tenths of a second, and the standard requires rest."""
+"""Median time between visits below which the stage was in motion: a stage takes a few tenths of a second to move,
+arrive and stop, and ISO 230-2 requires readings at rest."""
 SETTLING_ROWS = 4
-"""Number of rows in a visit from which on the first half is left out as settling."""
+"""Least number of rows in a visit of which the first half is left out as settling."""
 LEAST_SHARE = 0.5
 """Least share of the measured rows that must be in repeated visits; otherwise the figures would describe the smaller
 part of the table."""
@@ -44,7 +43,7 @@ class RepeatedTargets:
     direction : ndarray of int, shape (m,)
         +1 for an approach from below, -1 from above, 0 if unknown or still settling: such rows are not used.
     cycle : ndarray of int, shape (m,)
-        Number of the visit of this target from this side, from 0.
+        Number of the visit to this target from this side, counted from 0.
     notes : tuple of str
         Assumptions made, one sentence each.
     """
@@ -66,7 +65,7 @@ class NoRepeatedTargets:
 class _Visit:
     """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after the visit.
 
-    `places` contains all of these rows, including those without a reading.
+    `places` contains all rows of the visit, including rows without a reading.
     """
 
     target: int
@@ -84,9 +83,9 @@ def repeated_targets(
 
     The direction of approach of a visit follows from the last earlier row at another position, with or without a
     reading (such as an overshoot or an approach). If the table lacks rows without a reading, two assumptions are made
-    and reported. First, if a target at an end of the range has two successive readings where all other targets have
-    one, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range, in such
-    a table or in one whose runs all have the same direction, came from beyond that end.
+    and reported. First, if a target at an end of the range has two successive readings where all other targets have one
+    reading, the stage reversed with an overshoot between the two. Second, a run that starts at an end of the range came
+    from beyond this end, if the table has pairs of readings at its ends, or if all its runs have the same direction.
 
     Parameters
     ----------
@@ -144,17 +143,18 @@ def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
     ordered = np.sort(inputs)
     if ordered.size < 4 or ordered[0] == ordered[-1]:
         return NoRepeatedTargets("there are fewer than four readings, or the input never changes")
-    # Equal set-points differ by nothing, or by the rounding of their digits.
+    # Equal set-points differ at most by the rounding of their digits.
     floor = 1e-9 * float(ordered[-1] - ordered[0])
     steps = np.maximum(np.diff(ordered), floor)
     falling = np.sort(steps)[::-1]
-    # No more targets than half the readings can have two: among smaller steps a chance pair makes a large ratio.
+    # At most half as many targets as readings can have two readings each; among smaller steps, a chance pair could have
+    # a large ratio.
     most = min(MOST_TARGETS, ordered.size // 2)
     ratios = (falling[:-1] / falling[1:])[: most - 1]
     last = int(np.argmax(ratios))
     if ratios[last] < SPACING_RATIO:
         return NoRepeatedTargets(
-            "the inputs do not gather at targets: none is visited again, or readings were taken on the way"
+            "the inputs form no targets: no position is visited again, or readings were taken in motion"
         )
     parts = np.split(ordered, np.flatnonzero(steps >= falling[last]) + 1)
     if len(parts) < FEWEST_TARGETS:
@@ -162,8 +162,8 @@ def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
     centres = np.array([part.mean() for part in parts])
     halfwidth = max(max(abs(part[0] - c), abs(part[-1] - c)) for part, c in zip(parts, centres, strict=True))
     if max(np.ptp(part) for part in parts) > WIDEST * float(np.min(np.diff(centres))):
-        return NoRepeatedTargets("the inputs scatter too widely about the places where they gather to be set-points")
-    # Rows without a reading scatter as much, and one of them may lie a little farther off than any that has one.
+        return NoRepeatedTargets("the inputs scatter too widely about their targets to be set-points")
+    # Rows without a reading may lie a little farther from a target than rows with a reading.
     return centres, 2.0 * float(halfwidth) + floor
 
 
@@ -189,7 +189,7 @@ def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwi
 
 
 def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[slice]) -> float | None:
-    """Median time from the first reading of a visit to that of the next one within a run (s)."""
+    """Median time from the first reading of a visit to the first reading of the next visit within a run (s)."""
     first = np.array([visit.rows[0] for visit in visits if visit.rows])
     steps = [np.diff(time_s[first[(first >= run.start) & (first < run.stop)]]) for run in runs]
     together = np.concatenate(steps) if steps else np.empty(0)
@@ -197,7 +197,7 @@ def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[sli
 
 
 def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str, ...]]:
-    """Split pairs of readings at the ends of the range into two visits; give a direction to runs that start there."""
+    """Split pairs of readings at range ends into two visits; give a direction to runs that start at an end."""
     last = centres.size - 1
     inner = [len(visit.places) for visit in visits if 0 < visit.target < last]
     usual = int(np.median(inner)) if inner else 0
@@ -215,7 +215,7 @@ def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str
     began_beyond = False
     for visit in visits:
         if paired and any(visit is turn for turn in turns):
-            # A turn of another number of rows lacks some, and which of its rows came first is not known.
+            # If a reversal has another number of rows, rows are missing, and it is unknown which row came first.
             whole = len(visit.places) == 2 * usual
             for part, side in ((visit.places[:usual], 1), (visit.places[usual:], -1)):
                 rows = tuple(row for row in visit.rows if row in part)
@@ -229,14 +229,16 @@ def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str
     notes = []
     if paired:
         notes.append(
-            "The table has no rows beyond its end targets: of the readings that follow one another there, the first "
-            "was taken as approached from inside, the second from beyond, as in an ISO 230-2 cycle."
+            "The table has no rows beyond its end targets: of two successive readings at an end target, the first is "
+            "assumed to be approached from inside, the second from beyond, as in an ISO 230-2 cycle."
         )
     if began_beyond:
-        notes.append("Runs that begin at an end target were taken to have come from beyond it.")
+        notes.append("Runs that begin at an end target are assumed to have approached it from beyond.")
     unknown = sum(len(visit.rows) for visit in out if not visit.direction)
     if unknown:
-        notes.append(f"{unknown} readings were left out: from which side their target was approached is not known.")
+        notes.append(
+            f"{unknown} readings were left out, because it is not known from which side their target was approached."
+        )
     return out, tuple(notes)
 
 

@@ -12,16 +12,17 @@ SET_SHARE = 1e-5
 """Relative difference from the model's rest gap below which a row at input zero counts as set, because no gap is
 measured with such accuracy."""
 OFF_LINE = 0.01
-"""Share of the simulated range: a table that is straight within half of it has a fault where it deviates by more."""
+"""Share of the simulated range: a table that is otherwise straight within half of this share has a fault where it
+deviates by more."""
 
 MOST_SET = 0.2
-"""Share of the rows at input 0 from which on they are no row that was set, but a measurement that stands there."""
+"""Share of rows at input 0 above which these rows are measurements at rest, not a value that was set."""
 
 
 def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
     """Mark the excluded rows, shape (n,), and give the reasons as sentences.
 
-    Only tables without times are screened, because these are small and made by hand.
+    Only tables without times are screened, because tables without times are small and made by hand.
     """
     out = np.zeros(table.input_mm.size, dtype=bool)
     notes: list[str] = []
@@ -31,8 +32,8 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
     if put.any() and put.sum() < MOST_SET * put.size:
         out |= put
         notes.append(
-            f"the row at input 0 agrees with the simulated rest gap of {rest_gap_mm:.4g} mm to its last digit: "
-            "it was probably set and not measured, and was set aside in the fit."
+            f"the row at input 0 agrees with the simulated rest gap of {rest_gap_mm:.4g} mm to its last digit: it was "
+            "probably set instead of measured, and was set aside in the fit."
         )
     if isinstance(model, TableModel) and model.input_mm.size >= 8:
         gap = model.right_mm - model.left_mm
@@ -45,7 +46,7 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
             places = model.input_mm[faulty]
             out |= np.isin(table.input_mm, places)
             notes.append(
-                f"the simulation lies off its own straight line at input {', '.join(f'{x:g}' for x in places)} mm: "
-                "check those rows of the model; measured rows there were set aside in the fit."
+                f"the simulation deviates from its own straight line at input {', '.join(f'{x:g}' for x in places)} "
+                "mm: check these rows of the model; measured rows at these inputs were set aside in the fit."
             )
     return out, notes

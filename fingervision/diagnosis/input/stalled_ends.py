@@ -18,7 +18,7 @@ LEAST_DIGITS = 5.0
 
 
 def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozenset[str]:
-    """Effects that would make the reading constant at an end of the range where it is constant.
+    """Effects that would explain a constant reading at an end of the range.
 
     Noise changes a reading from row to row; readings that are equal over many rows, while the model moves by many
     digits, have another cause.

@@ -56,7 +56,8 @@ def channel_noises(
     standing = () if explained else standing_still(history)
     if sum(hold.stop - hold.start for hold in standing) < FEWEST_STANDING:
         return everywhere
-    # What nothing explains yet moves with the stage and passes for noise; where the stage stands, less of it does.
+    # Unexplained changes that follow the motion of the stage would count as noise; in holds of the stage they are
+    # smaller.
     holds = over(standing)
     return holds if holds[0].total_mm < everywhere[0].total_mm else everywhere
 
@@ -64,7 +65,7 @@ def channel_noises(
 def noises_of_repeats(errors: list[PureError], floors: list[float]) -> tuple[Noise, ...]:
     """Use the scatter of repeated readings as white noise, because readings seconds apart have independent errors.
 
-    The variance then has the relative standard uncertainty sqrt(2 / degrees), with `degrees` its degrees of freedom.
+    A variance with n degrees of freedom has the relative standard uncertainty sqrt(2 / n).
     """
     found = []
     for error, floor in zip(errors, floors, strict=True):

@@ -38,19 +38,19 @@ class Noise:
 
 
 MEDIAN_SAMPLES, FEWEST_SAMPLES = 7, 9
-"""Samples of the running median, which a pair of outliers cannot move, and the least number of samples of a run for
-which its ends do not make up most of it."""
+"""Number of samples of the running median, which a pair of outliers cannot change, and least number of samples of a run
+for which the ends do not dominate."""
 CROWDED = 4
-"""Outliers among five successive samples that are a motion: a real reversal moves neighbours too, and an outlier stands
-alone or in a pair."""
+"""Number of outliers among five successive samples that indicates a motion: a real reversal also moves its neighbours,
+whereas outliers are single or in pairs."""
 
 
 def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
     """Mark outliers against a running median; shape (n,), True where a value is to be excluded.
 
     Without times the rows have no order, and the median of all values replaces the running median. `sigmas` is the
-    limit; None excludes nothing, because in a short record an effect that acts on a few samples looks like outliers
-    until it is explained.
+    limit of an outlier in standard deviations. None excludes no value, because in a short record an effect that acts on
+    a few samples looks like outliers until it is explained.
     """
     out = np.zeros(residual.size, dtype=bool)
     if sigmas is None:
@@ -64,7 +64,8 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
             rest[run] = values - np.median(windows, axis=1)
         else:
             rest[run] = values - np.median(values)
-    # Whole pixels leave many residuals at exactly zero: the 90 % point sees what the median then misses.
+    # With whole pixels, many residuals are exactly zero, and the median would be zero too: use the 90 % quantile as
+    # well.
     middle, far = np.quantile(np.abs(rest), (0.5, 0.9))
     sigma = max(1.4826 * float(middle), float(far) / 1.645)
     if sigma > 0.0:
@@ -79,7 +80,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
 
 
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
-    """Mark parts of the range with too many deviating samples for gross errors, which occur anywhere in the range."""
+    """Mark parts of the range with more deviating samples than gross errors would cause, which occur anywhere."""
     there = np.zeros(out.size, dtype=bool)
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
@@ -109,7 +110,7 @@ def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) ->
     Parameters
     ----------
     residual : ndarray of float, shape (n,)
-        Measured minus predicted.
+        Measured minus predicted values.
     aside : ndarray of bool, shape (n,)
         Outliers.
     floor_mm : float

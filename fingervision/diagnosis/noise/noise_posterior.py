@@ -19,7 +19,7 @@ def problems_of_drawn_noise(
 ) -> Iterator[Problem]:
     """Yield the estimation problem with `count` random draws of its noise parameters.
 
-    Short runs determine neither level nor correlation of the noise well: both are drawn from their posterior, given the
+    For short runs, level and correlation of the noise are poorly known, and are drawn from their posterior given the
     residual of an explanation. For long records, the noise power at low frequency is drawn.
 
     Parameters
@@ -33,7 +33,7 @@ def problems_of_drawn_noise(
     count : int
         Number of draws.
     rng : numpy Generator
-        For the draws.
+        Generator for the draws.
     """
     for noises in _noises(data, problem, explanation, count, rng):
         whitener = replace(problem.whitener, noises=noises)

@@ -18,8 +18,9 @@ def drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
     """Significance, in standard deviations, of a drift in successive readings; 0 if correlated noise is more probable.
 
     A drift (a smooth curve in time) and correlated reading noise both make successive readings similar, whatever their
-    positions. The more probable of the two, by BIC (Schwarz 1978), is taken as the cause: the log residual variances of
-    the curve, and of predicting each reading from the previous one, are compared with penalties for the parameters.
+    positions. Drift or correlated noise, whichever is more probable by BIC (Schwarz 1978), is assumed to be the cause:
+    the log residual variances of the curve, and of predicting each reading from the previous one, are compared with
+    penalties for the parameters.
     """
     share, sigmas = follows_sigmas(rest, rows)
     if sigmas <= TREND_SIGMAS:
@@ -50,7 +51,7 @@ def without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *s
 
 
 def wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of the repeats' residuals in successive rows; 0 if independent readings could show as much."""
+    """Correlation of the repeats' residuals in successive rows; 0 if it could be due to chance."""
     share, sigmas = follows_sigmas(rest, rows)
     return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
 
@@ -78,6 +79,6 @@ def trend_sigmas(groups: list[Array], pooled: float) -> float:
     neighbours = sum(float(np.sum(np.diff(group) ** 2)) for group in groups)
     pairs = sum(group.size - 1 for group in groups)
     ratio = 0.5 * neighbours / pairs / pooled
-    # Of one group of k: variance (k - 2) / (k^2 - 1); groups count by their pairs.
+    # A group of k readings has the variance (k - 2) / (k^2 - 1); groups are weighted by their numbers of pairs.
     variance = sum((group.size - 1) ** 2 * (group.size - 2) / (group.size**2 - 1) for group in groups) / pairs**2
     return (1.0 - ratio) / float(np.sqrt(variance)) if variance > 0.0 else 0.0

@@ -21,12 +21,14 @@ FEWEST_DEGREES = 4
 """Least degrees of freedom of a scatter; with fewer it is uncertain by more than a factor of 1.4."""
 APART = 0.25
 """Largest remaining share of the scatter's power for which different drifts of positions or sides, or zeros of runs,
-are accepted as its cause: they have many coefficients for a few dozen repeats, and without them the noise is at most a
-factor of 2 too large."""
+are accepted as its cause: such drifts have many coefficients for a few dozen repeats, and without them the noise is
+overestimated by at most a factor of 2."""
 OFF_GRID = 0.02
 """Distance, in grid steps, of a difference from a multiple of the smallest one that is attributed to rounding."""
+MOST_DECIMALS = 10
+"""Number of decimals, in mm, beyond which a digit is that of floating point and not of a reading."""
 BY_ACCIDENT = 1e-3
-"""Probability of so close multiples by chance, below which the differences lie on a grid."""
+"""Probability of so close multiples by chance, below which the differences are assumed to lie on a grid."""
 FEWEST_STEPS = 8
 """Least number of differences between neighbouring values from which a grid is determined."""
 LEVELS = 4096
@@ -74,7 +76,7 @@ def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> N
     runs : tuple of slice
         Rows of the path in each run.
     rows : ndarray of int, shape (n,)
-        Indices of the measured rows.
+        Indices of the measured rows in the path.
 
     Returns
     -------
@@ -142,7 +144,7 @@ def pure_error(
         ends = np.cumsum([group.size for group in groups])[:-1]
         left = float(straight @ straight) / (degrees - TREND_DEGREE)
         if trend_sigmas(np.split(straight, ends), left) > TREND_SIGMAS:
-            # Places that drift apart, as a gain does, or sides that do, as a play that runs in.
+            # Positions may drift differently (a change of gain), or sides of approach (a play that runs in).
             centred = (place_mm - place_mm.mean()) / max(float(np.ptp(place_mm)), 1e-300)
             apart = without_trend(rest, groups, time_s, centred, np.where(label % 2, 0.5, -0.5))
             if float(apart @ apart) / (degrees - 3 * TREND_DEGREE) < APART * left:
@@ -182,7 +184,7 @@ def _without_gross_errors(rest: Array, degrees: int) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Spacing of the grid on which all values lie, as for readings with few digits; 0 without such a grid.
+    """Spacing of the grid on which all values lie, as for readings with few digits; 0 if there is no grid.
 
     If there are too few distinct values to estimate a spacing, a 12-bit reading over their range is assumed.
     """
@@ -192,8 +194,18 @@ def resolution(values: Array) -> float:
         return 0.0
     least = float(np.min(steps))
     multiples = steps / least
-    on_grid = bool(np.all(np.abs(multiples - np.round(multiples)) < OFF_GRID))
+    off = np.abs(multiples - np.round(multiples))
+    # Readings at evenly spaced targets are nearly multiples too, but differ by more than their last written digit.
+    on_grid = bool(np.all(off < OFF_GRID) and np.all(off * least <= (1.0 + multiples) * _last_digit(values)))
     further = int(np.sum(multiples > 1.5))
     if steps.size < FEWEST_STEPS and not (on_grid and (2.0 * OFF_GRID) ** further < BY_ACCIDENT):
         return float(np.ptp(values)) / LEVELS
     return least if on_grid else 0.0
+
+
+def _last_digit(values: Array) -> float:
+    """Unit of the last decimal digit with which the values are written (mm)."""
+    for decimals in range(MOST_DECIMALS):
+        if np.all(np.abs(values - np.round(values, decimals)) < 10.0**-MOST_DECIMALS):
+            return float(10.0**-decimals)
+    return float(10.0**-MOST_DECIMALS)

@@ -1,4 +1,4 @@
-"""Upper bound of the noise in a residual: slow changes are structure, and so is what each pass over a place repeats."""
+"""Upper bound of the noise in a residual: slow changes, and changes that every pass repeats, are structure."""
 
 from itertools import pairwise
 
@@ -15,7 +15,8 @@ WANDERING = 1.65
 """Largest ratio of noise to its scatter within such stretches: that of an autoregression of 0.9 (simulated; 1.3 for
 0.8). With only the limit on the scatter from sample to sample, a third of a creep counted as noise."""
 FEWEST_PAIRS = 20
-"""Fewest readings with another pass over their place: the scatter of as many has a relative uncertainty of a sixth."""
+"""Least number of readings with a second pass over their position: their scatter then has a relative uncertainty of a
+sixth."""
 
 
 def most_noise(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...], digits_mm: float) -> float:
@@ -37,15 +38,15 @@ def most_noise(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...], dig
         (WANDERING, _local_scatter(residual_mm, runs)),
         (1.0, _scatter_between_passes(residual_mm, input_mm, runs)),
     )
-    return min((times * max(scatter, digits_mm) for times, scatter in limits if scatter or digits_mm), default=0.0)
+    return min((times * max(scatter, digits_mm) for times, scatter in limits if scatter is not None), default=0.0)
 
 
-def _scatter_between_passes(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Standard deviation of one reading from the difference of successive passes over the same places; 0 without them.
+def _scatter_between_passes(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...]) -> float | None:
+    """Standard deviation of a reading, from differences of successive passes over a position; None without passes.
 
-    A rough map of position errors looks like noise over time, but the way back repeats it. The mean difference of two
-    passes may be hysteresis and is removed. What is interpolated between two readings has at least half the variance of
-    one, so that the result is not too small for noise that is independent between the passes.
+    A rough map of position errors looks like noise over time, but the return motion repeats it. The mean difference of
+    two passes may be hysteresis and is removed. A value that is interpolated between two readings has at least half the
+    variance of one reading, so that the result is not too small for noise that is independent between the passes.
     """
     found = []
     for run in runs:
@@ -59,8 +60,8 @@ def _scatter_between_passes(residual_mm: Array, input_mm: Array, runs: tuple[sli
                 apart = residual_mm[within] - beside
                 found.append(np.abs(apart - np.median(apart)))
     differences = np.concatenate(found) if found else np.zeros(0)
-    # 0.6745 is the normal median; a bump that only one pass has is large in a few differences only.
-    return float(np.median(differences) / 0.6745 / np.sqrt(1.5)) if differences.size >= FEWEST_PAIRS else 0.0
+    # 0.6745 is the median of |x| for a normal distribution; a bump in a single pass enlarges only few differences.
+    return float(np.median(differences) / 0.6745 / np.sqrt(1.5)) if differences.size >= FEWEST_PAIRS else None
 
 
 def _passes(input_mm: Array) -> list[NDArray[np.int64]]:
@@ -71,15 +72,16 @@ def _passes(input_mm: Array) -> list[NDArray[np.int64]]:
     return [part + 1 for part in np.split(moving, turns) if part.size > 1]
 
 
-def _short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Standard deviation of white noise with the same median third difference; 0 for runs of a few samples."""
+def _short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float | None:
+    """Standard deviation of white noise with the same median third difference; None for runs of a few samples."""
     differences = np.concatenate([np.diff(residual_mm[run], 3) for run in runs])
-    # Third differences of white noise have 1 + 9 + 9 + 1 times its variance; 0.6745 is the normal median.
-    return float(np.median(np.abs(differences))) / 0.6745 / float(np.sqrt(20.0)) if differences.size else 0.0
+    # Third differences of white noise have 1 + 9 + 9 + 1 times its variance; 0.6745 is the median of |x| for a normal
+    # distribution.
+    return float(np.median(np.abs(differences))) / 0.6745 / float(np.sqrt(20.0)) if differences.size else None
 
 
-def _local_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Median standard deviation within stretches, each about its own mean; 0 without stretches.
+def _local_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float | None:
+    """Median standard deviation within stretches, each about its own mean; None without stretches.
 
     The median is used because an unexplained resonance or jump is large in a few stretches only.
     """
@@ -89,4 +91,4 @@ def _local_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
         if size > 1:
             begins = range(run.start, run.stop - size + 1, max(1, size // 2))
             found += [float(np.std(residual_mm[begin : begin + size], ddof=1)) for begin in begins]
-    return float(np.median(found)) if found else 0.0
+    return float(np.median(found)) if found else None

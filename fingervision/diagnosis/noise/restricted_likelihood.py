@@ -34,10 +34,10 @@ class _Likelihood:
 
 
 FEWEST_SAMPLES = 4
-"""Least number of samples of a run that tell more than the straight line taken from them and one correlation."""
+"""Least number of samples of a run: a straight line and one correlation are already estimated from them."""
 CORRELATIONS = np.linspace(0.0, 0.95, 39)
-"""Correlations that are tried, in steps of a quarter of what a hundred samples determine; beyond 0.95 noise cannot be
-told from a drift in so short a run."""
+"""Correlations that are tried, in steps of a quarter of the uncertainty for a hundred samples; above 0.95, noise cannot
+be distinguished from a drift in a short run."""
 
 
 def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags]) -> _Likelihood:
@@ -75,10 +75,11 @@ def noise_of_short_runs(
 ) -> tuple[Noise, ...]:
     """Fit the noise of channels that share one correlation in time, each channel with its own level.
 
-    The method is for runs with too few samples for a spectrum. If the noise of short runs were treated as white, every
-    slow effect would seem significant. All channels come from the same pictures, so that they share one correlation:
-    its posterior mean under a flat prior is used. Before an effect is found, the channel with the smallest correlation
-    determines the common correlation, because effects can only increase a correlation.
+    Restricted likelihood is used for runs with too few samples for a spectrum. If the noise of short runs were treated
+    as white, every slow effect would seem significant. All channels come from the same pictures, so that they share one
+    correlation: the posterior mean of this correlation under a flat prior is used. Before an effect is found, the
+    channel with the smallest correlation determines the common correlation, because effects can only increase a
+    correlation.
 
     Parameters
     ----------

@@ -52,7 +52,8 @@ class RunOffsets:
     def __post_init__(self) -> None:
         """Tabulate, for each channel and each spread, the quantities that do not depend on the residual.
 
-        These are the runs' weights, the part of each run's squared mean that an offset absorbs, and the penalty.
+        The tables contain the weights of the runs, the part of each run's squared mean that an offset absorbs, and the
+        penalty.
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
@@ -80,13 +81,18 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G such that r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads fitted."""
+        """Return G such that r' r - (Z' r)' G (Z' r) is the squared length of r after a fit of the offsets Z."""
         known = self._metrics.get(sigma_mm)
         if known is not None:
             return known
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
-        found = np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
+        normal = self.gram + np.diag(1.0 / np.array(prior) ** 2)
+        # Columns of equal length: unscaled, a residual of a million noises came out with a negative square.
+        length = np.sqrt(np.diag(normal))
+        found = np.asarray(
+            np.linalg.inv(normal / np.outer(length, length)) / np.outer(length, length), dtype=np.float64
+        )
         # Spreads come from a grid, and with one run there is only one: the searches ask for the same again and again.
         found.setflags(write=False)
         self._metrics[sigma_mm] = found
@@ -100,8 +106,8 @@ class RunOffsets:
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
         """Estimate the spreads from a whitened residual by marginal likelihood.
 
-        A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) prevents that, for two runs, every common
-        offset is attributed to scatter. With one run the spread is zero.
+        Without a prior, every common offset of two runs would be attributed to scatter; a half-Cauchy prior with the
+        scale of one edge's noise (Gelman 2006) prevents this. For a single run, the spread of the offsets is zero.
 
         Returns
         -------
@@ -117,8 +123,8 @@ class RunOffsets:
     def spread_and_doubt(self, residual: Array) -> tuple[tuple[float, ...], float, float]:
         """Estimate the spreads of the run offsets as `spread` does, with a penalty for their uncertainty.
 
-        A few runs hardly determine the spread of their offsets; with this penalty, parameters that act like an offset
-        have Student's tails.
+        A few runs hardly determine the spread of their offsets; with a penalty for this uncertainty, parameters that
+        act like an offset have Student's tails.
 
         Returns
         -------
@@ -148,7 +154,7 @@ class RunOffsets:
     def drawn_spread(self, residual: Array, rng: np.random.Generator) -> tuple[float, ...]:
         """Draw the spreads from their posterior given a residual; one per channel, in mm.
 
-        A few runs leave the spread very uncertain.
+        With a few runs only, the spread of the offsets is very uncertain.
         """
         width = np.gradient(SPREADS)
         out = []
@@ -162,7 +168,7 @@ class RunOffsets:
         """Scale of each channel; for all spreads, the penalty and the reduction of chi-square due to offsets."""
         shares = self.design.T @ residual
         if self.drawn:
-            # What the drawing's numbers explain is no scatter between runs.
+            # The part that the drawing's uncertain dimensions explain is not scatter between runs.
             inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
             shares = shares - self.gram[:, -self.drawn :] @ np.linalg.solve(inner, shares[-self.drawn :])
         found = []

@@ -6,8 +6,8 @@ from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
 
 SLOW, SLOW_EXPLAINED = 0.04, 0.02
-"""Frequencies, in cycles per sample, below which unexplained structure may be present, before and after effects are
-found."""
+"""Frequencies, in cycles per sample, below which unexplained structure may be present, before effects are found, and
+after."""
 TAPERED = 1.94
 """Number of neighbouring ordinates that count as one, because Hann's taper correlates them."""
 CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))
@@ -89,7 +89,7 @@ def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float)
 def _shape(angle: Array, share: float, phi: float) -> Array:
     """Noise spectrum of unit variance, of which a share `share` has the correlation `phi` between neighbouring samples.
 
-    The result has shape (m,).
+    The spectrum has shape (m,).
     """
     correlated = (1.0 - phi**2) / (1.0 + phi**2 - 2.0 * phi * np.cos(angle))
     return np.asarray(1.0 - share + share * correlated, dtype=np.float64)
@@ -98,8 +98,8 @@ def _shape(angle: Array, share: float, phi: float) -> Array:
 def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[list[float], float, float, float]:
     """Choose the most probable noise model: white noise, an autoregression, or the sum of both.
 
-    If the sum is fitted to white noise, it can have a correlated part below the frequencies used, and then overstates
-    the slow noise by a factor of three. The three kinds of noise therefore have equal prior probabilities, and the
+    A sum that is fitted to white noise can have a correlated part below the frequencies used, and then overstates the
+    slow noise by a factor of three. The three kinds of noise therefore have equal prior probabilities, and the
     posterior mean of the most probable kind is returned.
 
     Returns

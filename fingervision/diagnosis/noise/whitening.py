@@ -9,7 +9,7 @@ from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.loops import loop
 
 GAINS = 5
-"""Numbers a sample that the filter needs (`whitening.c`)."""
+"""Number of values per sample that the filter needs (`whitening.c`)."""
 
 _gains, _innovations = loop("whitening_gains"), loop("whitening_innovations")
 

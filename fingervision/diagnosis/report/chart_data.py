@@ -13,7 +13,7 @@ from fingervision.domain.effect import Array, Flags
 MOST_ROWS = 3000
 """Most rows in a chart: more than the columns of a screen, and few enough for an HTML page of one megabyte."""
 DASHES: tuple[list[int], ...] = ([6, 4], [], [8, 3, 2, 3], [2, 3])
-"""Dash patterns of the predictions, in their order, so that they are distinguishable without colour."""
+"""Dash patterns of the predictions, in their order, so that they are distinguishable without their colours."""
 
 Chart = dict[str, object]
 

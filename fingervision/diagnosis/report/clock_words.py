@@ -11,19 +11,19 @@ from fingervision.domain.effect import Array
 from fingervision.domain.report import Place
 
 ALIKE = 0.25
-"""Largest relative difference between the offsets that opening and closing ask for: their mean then leaves at most a
-seventh of either, because there is one offset only."""
+"""Largest relative difference between the offsets that opening and closing require. Their mean, the only possible
+offset, then leaves at most a seventh of each difference."""
 STILL = 0.05
 """Share of the largest speed below which the input counts as at rest, as in the search for places."""
 WAYS = {"input, opening": 1.0, "input, closing": -1.0}
-"""Variables of a place that holds in one direction of the input only, with the sign of the input's speed."""
+"""Variables of regions that exist in one direction of the input only, with the sign of the input's speed."""
 
 
 def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ...]:
-    """Say of a gap that differs in opening and in closing where an offset between the clocks explains it.
+    """Add a remark to regions whose difference between opening and closing a clock offset explains.
 
     A clock that is late by t changes the gap by its speed times t, and so by opposite amounts in the two directions.
-    Both must be found, and both within the expanded uncertainty of the offset.
+    The changes in both directions must be found, and must require an offset within its expanded uncertainty.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ..
         return tuple(places)
     gap_mm_s = _gap_speed(data)
     late_s = {i: _late_s(place, data, gap_mm_s) for i, place in enumerate(places)}
-    # The largest of each direction: what is left beside them was found after they had been subtracted.
+    # Take the largest region of each direction; the smaller ones were found after its subtraction.
     first: dict[str, tuple[int, float]] = {}
     for i, by_s in late_s.items():
         if by_s is not None and abs(by_s) <= expanded_s:
@@ -48,8 +48,8 @@ def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ..
     if abs(by_s - too_s) > ALIKE * max(abs(by_s), abs(too_s)):
         return tuple(places)
     words = (
-        f" (clocks {1e3 * abs(by_s + too_s) / 2.0:.2g} ms apart would do the same in both directions; their offset has "
-        f"U = {1e3 * expanded_s:.2g} ms, k = 2)"
+        f" (clocks {1e3 * abs(by_s + too_s) / 2.0:.2g} ms apart would cause the same difference in both directions; "
+        f"the offset of the clocks has U = {1e3 * expanded_s:.2g} ms, k = 2)"
     )
     return tuple(
         replace(place, words=place.words + words) if i in (one, other) else place for i, place in enumerate(places)
@@ -64,7 +64,7 @@ def _gap_speed(data: Observations) -> Array:
 
 
 def _late_s(place: Place, data: Observations, gap_mm_s: Array) -> float | None:
-    """Offset between the clocks (s) that would make a place's difference; None for what is no such place."""
+    """Offset between the clocks (s) that would explain the difference in a region; None for all other regions."""
     if place.channel != "gap" or place.variable not in WAYS:
         return None
     history = data.chain.history

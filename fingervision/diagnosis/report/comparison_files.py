@@ -38,13 +38,13 @@ def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> di
 def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path) -> dict[str, object]:
     """Write HTML page, plots and compare.json into an existing folder, and return the content of compare.json.
 
-    The recording from which the table `measured` was made is searched for beside it.
+    The recording from which the table `measured` was made is searched for in the folder of the table.
     """
     document = comparison_document(found, made)
     (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     curves, residuals = _curves(found), residuals_of(found)
     (out / PICTURE).write_bytes(png_bytes(residuals))
-    write_figures(out, curves, residuals, " and ".join(found))
+    write_figures(out, curves, residuals, " and ".join(found), prefix="compare_")
     (out / PAGE).write_text(_page(found, curves, made, strip_html(measured)), encoding="utf-8")
     return document
 
@@ -66,7 +66,7 @@ def residuals_of(found: Mapping[str, Comparison]) -> Figure:
 
 
 def _left_out(found: Mapping[str, Comparison]) -> tuple[int, ...]:
-    """Rows that no model's figure counts: what one model alone leaves out may be the other's disagreement."""
+    """Rows that are left out for every model: a row left out for one only may be a disagreement of another."""
     return tuple(sorted(set.intersection(*(set(one.left_out) for one in found.values()))))
 
 

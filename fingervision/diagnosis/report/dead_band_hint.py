@@ -11,16 +11,16 @@ from fingervision.domain.effect import Array, History
 from fingervision.domain.report import Verdict
 
 BY_CHANCE = 1e-3
-"""Probability, if the side of rest had nothing to do with the side of approach, below which it does."""
+"""Significance level: probability of the observed sides of rest if they did not depend on the side of approach."""
 SHORT_SHARE = 0.8
-"""Share of holds that must end short of the command: a stage that came to rest on either side has no dead band."""
+"""Share of holds that must end short of the command: a stage that comes to rest on both sides has no dead band."""
 FEWEST_IDLE = 2
-"""Least number of steps without an answer: a single one may be a row that is wrong."""
+"""Least number of steps without a response: a single one may be a wrong row."""
 AT_REST = 3.0
 """Ratio of the distance from the command to the motion within the settled half of a hold, below which the stage is
-still on its way: an exponential approach moves by half of its rest in that time."""
+still on its way: an exponential approach covers half of its remaining distance in that time."""
 SIGMAS = 4.0
-"""Distance, in standard errors of the means of two holds, from which a step was followed."""
+"""Distance, in standard errors of the means of two holds, above which the stage followed a step."""
 
 
 def dead_band_hint(data: Observations, before_mm: Array, verdict: Verdict) -> tuple[str, ...]:
@@ -44,7 +44,7 @@ def dead_band_hint(data: Observations, before_mm: Array, verdict: Verdict) -> tu
 
 
 def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> str | None:
-    """Describe where the stage rests after each step of a command; None if this shows no band.
+    """Describe where the stage rests after each step of a command; None if there is no dead band.
 
     A servo with a dead band stops short of its command, on the side from which it came, or does not answer small steps.
     The mean over all holds is subtracted, because an offset is no band.
@@ -66,7 +66,7 @@ def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> 
     idle = np.abs(steps[~followed])
     words = []
     if idle.size >= FEWEST_IDLE and float(idle.max()) < float(np.min(np.abs(steps[followed]), initial=np.inf)):
-        words.append(f"{idle.size} steps of up to {idle.max():.2g} mm were not answered, all larger ones were")
+        words.append(f"{idle.size} steps of up to {idle.max():.2g} mm had no response, but all larger steps had")
     away = (rests - rests.mean())[followed] * np.sign(steps[followed])
     short = int(np.sum(away < 0.0))
     chance = binomtest(short, away.size, 0.5, alternative="greater").pvalue if away.size else 1.0
@@ -74,12 +74,12 @@ def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> 
     still = AT_REST * float(np.median(np.abs(creeps[followed]))) if away.size else 0.0
     if chance < BY_CHANCE and short >= SHORT_SHARE * away.size and band > still:
         words.append(
-            f"after {short} of {away.size} steps it rested short of the command, on the side from which it came, by "
-            f"{band:.2g} mm (median)"
+            f"after {short} of {away.size} steps the stage stopped short of the command, on the side from which it "
+            f"came, by {band:.2g} mm (median)"
         )
     if not words:
         return None
-    return f"the stage rests away from its commands as a servo with a dead band does: {'; '.join(words)}."
+    return f"the stage comes to rest away from its commands, like a servo with a dead band: {'; '.join(words)}."
 
 
 def _holds(history: History, error_mm: Array, path_mm: Array) -> tuple[Array, Array, Array, Array, Array]:

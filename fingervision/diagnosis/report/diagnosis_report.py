@@ -121,14 +121,12 @@ def _disagreement(answered: Answer) -> Disagreement:
         }
         for (name, a), b in zip(by_channel(data, before).items(), by_channel(data, after).values(), strict=True)
     }
-    noises = [noise.total_mm for noise in found.problem.whitener.noises]
-    noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
     unseen = left_out_rms_mm(data, found.problem, found.best)
     stands = answered.stands
     return Disagreement(
         rms_mm(before, n, edges),
         rms_mm(after, n, edges),
-        noise_rms,
+        stands.noise_mm,
         *unseen,
         channels,
         counted_before_rms_mm=stands.before_mm,
@@ -148,8 +146,8 @@ def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
     if errors is None or not errors[0].has_trend:
         return ()
     return (
-        "repeats of the same place drift or run in (neighbouring visits agree better than distant ones, by "
-        f"{errors[0].trend_sigmas:.1f} standard deviations): that was taken out of the pure error.",
+        "repeated readings at the same position drift or run in (neighbouring visits agree better than distant "
+        f"visits, by {errors[0].trend_sigmas:.1f} standard deviations): this trend was subtracted from the pure error.",
     )
 
 
@@ -178,7 +176,7 @@ def _named(data: Observations, found: Findings, posterior: tuple[Point, ...]) ->
                 if owner == name
             }
         effect = found.problem.effects[name]
-        # What these data cannot show stays at the value at which it does nothing.
+        # Parameters that these data cannot show keep their neutral value.
         still = {p.name: Estimate(p.neutral or 0.0, None, p.unit) for p in effect.parameters if p.name not in known}
         ordered = {p.name: {**known, **still}[p.name] for p in effect.parameters}
         shown = {p.name: p.words for p in (*effect.parameters, *(p for owner, p in listed if owner == name))}

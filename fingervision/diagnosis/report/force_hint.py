@@ -9,8 +9,8 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.model import PhysicalModel
 
 SEEN = 0.002
-"""Detectable difference of force as a share of the largest force: the repeatability of any force sensor, averaged over
-a run."""
+"""Detectable difference of force as a share of the largest force: the repeatability of an ordinary force sensor,
+averaged over a run."""
 
 
 def force_hint(data: Observations, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ LOOKED_AT = 2000
 TURN = 0.02
 """Least return motion of a reversal as a share of the input's range: an encoder's jitter is smaller."""
 WIDTH_PX, JPEG_QUALITY = 480, 80
-"""Width and JPEG quality of a picture in the page: three of them stand side by side on a desk screen."""
+"""Width and JPEG quality of a picture in the page: three pictures fit side by side on a desktop screen."""
 MARK = (64, 255, 96)
 """Colour of a measured edge is bright green, which neither metal nor polymer has."""
 
@@ -57,9 +57,9 @@ def strip_html(table: Path) -> str:
     recording = _recording_of(table)
     if recording is None:
         return (
-            "<p>No frames: they are shown where the measured table is a gaps.csv with its summary.json, and the "
-            "recording lies where summary.json says, in the same folder, the one above, or the one in which the "
-            "command runs.</p>"
+            "<p>No video frames are shown. They need a gaps.csv with its summary.json as the measured table. The "
+            "recording must be at the path that summary.json states, or in the folder of gaps.csv, the folder above, "
+            "or the current folder.</p>"
         )
     turns = _decoded(recording, turning_rows(table))
     shown = "".join(
@@ -112,7 +112,8 @@ def _recording_of(table: Path) -> Path | None:
     if not isinstance(name, str) or not isinstance(sha256, str):
         return None
     beside = [folder / Path(name).name for folder in (table.parent, table.parent.parent, Path())]
-    # Also where the summary says, seen from here or from its folder; only a file with the stated hash is shown.
+    # Also search at the path that the summary states, relative to the present folder or to the folder of the summary;
+    # only a file with the stated hash is used.
     for path in (Path(name), table.parent / name, *beside):
         if path.is_file():
             with path.open("rb") as file:
@@ -136,7 +137,7 @@ def _decoded(recording: Path, turns: tuple[Turn, ...]) -> tuple[Turn, ...]:
             if frame.index >= last:
                 break
     except FingervisionError:
-        # What was measured stands in the table; a recording that cannot be read again costs its pictures only.
+        # The measured values are in the table: if the recording cannot be read again, only its pictures are missing.
         return tuple(found)
     return tuple(found)
 

@@ -74,7 +74,7 @@ def _readings(axes: Axes, x: Array, curves: GapCurves, which: Flags, marker: str
 def _in_order(curves: GapCurves, gap_mm: Array) -> NDArray[np.intp] | None:
     """Rows in order of the input if a prediction retraces itself; None if its opening differs from its closing.
 
-    Dashes that are drawn forth and back over the same line fill each other's spaces.
+    A dashed line that is drawn forth and back over itself looks like a solid line.
     """
     order = np.argsort(curves.input_mm, kind="stable")
     forth, back = order[curves.opens[order]], order[~curves.opens[order]]

@@ -11,7 +11,7 @@ from fingervision.domain.parameter import Estimate
 from fingervision.storage.provenance import Provenance
 
 PAGE = Path(__file__).parent / "page"
-# The live page's chart library, shipped once (uPlot, MIT).
+# The chart library of the live page (uPlot, MIT licence) is used here too.
 CHARTS = Path(__file__).parents[2] / "live" / "page"
 HINT = "Drag to zoom, double-click to see all; with the keyboard: arrows read values, + and - zoom, 0 shows all."
 
@@ -24,7 +24,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def bullets(items: Sequence[str]) -> str:
-    """HTML list of sentences; if there are none, a sentence says so."""
+    """HTML list of sentences; an empty list becomes a sentence that there are none."""
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>" if items else "<p>Nothing.</p>"
 
 
@@ -85,7 +85,7 @@ def page(title: str, heading: str, verdict: str, sections: Sequence[tuple[str, s
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        # A page without a picture of its own asks the server for one.
+        # Without an icon, the browser would request one from a server.
         '<link rel="icon" href="data:,">'
         f"<title>{escape(title)}</title><style>{style}</style></head><body><main>"
         f'<h1>{escape(heading)}</h1><p class="verdict">{escape(verdict)}</p>{body}</main>'

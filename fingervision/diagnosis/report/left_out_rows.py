@@ -36,7 +36,7 @@ def outlier_rows(
     """
     table, uncounted = data.table, frozenset(left_out)
     n, both = table.input_mm.size, data.chain.history.both_edges
-    # Only where times restart does a time not tell the run; elsewhere the names of runs change nothing.
+    # The name of the run is needed only if times restart in each run.
     restarts = table.time_s is not None and not table.shared_clock
     out: list[OutlierRow] = []
     for run, name in zip(table.runs, table.run_names, strict=True):
@@ -51,12 +51,12 @@ def outlier_rows(
 
 
 def outside_words(residual: Array, low: float, high: float) -> str:
-    """Say how many of the rows left out lie outside a picture from `low` to `high`, and how far; else nothing."""
+    """Number of left-out rows that lie outside a picture from `low` to `high`, and how far; empty if none."""
     outside = residual[(residual < low) | (residual > high)]
     if not outside.size:
         return ""
     far = " and ".join(f"{end:+.2g}" for end in sorted({outside.min(), outside.max()}))
-    return f"{outside.size} of {residual.size} rows left out lie outside the picture ({far})"
+    return f"{outside.size} of {residual.size} rows left out lie outside the plot ({far})"
 
 
 def outliers(data: Observations, problem: Problem, rows: Sequence[OutlierRow], after_mm: Array) -> tuple[str, ...]:
@@ -68,8 +68,8 @@ def outliers(data: Observations, problem: Problem, rows: Sequence[OutlierRow], a
         scale = 1.4826 * float(np.median(np.abs(gap)))
         aside = problem.whitener.aside
         out += [
-            f"the row at input {data.table.input_mm[i]:g} mm lies {gap[i]:+.3g} mm off the others "
-            f"({'set aside' if aside[i] else 'kept'})."
+            f"the row at input {data.table.input_mm[i]:g} mm lies {gap[i]:+.3g} mm away from the others "
+            f"({'left out' if aside[i] else 'kept'})."
             for i in np.flatnonzero(np.abs(gap) > ODD_SIGMAS * scale)
         ]
     return tuple(out)
@@ -83,8 +83,11 @@ def _sentence(rows: Sequence[OutlierRow], n: int) -> str:
         for row in rows[:FIRST]
     ]
     more = f" and {len(rows) - FIRST} more (outlier_rows in report.json)" if len(rows) > FIRST else ""
-    words = f"{len(rows)} of {n} samples were set aside as outliers: {', '.join(first)}{more}"
+    words = f"{len(rows)} of {n} samples were left out of the fit as outliers: {', '.join(first)}{more}"
     counted = sum(bool(row["counted"]) for row in rows)
     if counted:
-        words += f"; {counted} of them {'is' if counted == 1 else 'are'} the peak of a wider deviation, and in the RMS"
+        words += (
+            f"; {counted} of them {'is' if counted == 1 else 'are'} the peak of a wider deviation, and included "
+            f"in the RMS"
+        )
     return f"{words}."

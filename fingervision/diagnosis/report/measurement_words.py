@@ -1,4 +1,4 @@
-"""What the summary beside a measured table says of the clocks and of the gap's uncertainty, in sentences."""
+"""Sentences on the clocks and the gap's uncertainty, from the summary of a measured table."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,12 +9,12 @@ from fingervision.storage.summary_json import measurement_beside
 
 
 def measurement_words(table: Path) -> list[str]:
-    """Sentences on clocks and uncertainty of a measured table; none if no summary of a measurement is beside it."""
+    """Sentences on clocks and uncertainty of a measured table; none if its folder has no summary of a measurement."""
     summary = measurement_beside(table)
     try:
         return [*_clock(summary["settings"]), *_uncertainty(summary)] if summary else []
     except (LookupError, TypeError, ValueError, AttributeError):
-        # A summary of another version, or changed by hand, has no such content.
+        # A summary of another version, or one that was edited, may lack these entries.
         return []
 
 
@@ -36,8 +36,10 @@ def _uncertainty(summary: Mapping[str, Any]) -> list[str]:
     gap, budget = summary["gap"], summary["uncertainty"]
     words = f"Standard uncertainty of a gap reading (median): {gap['median_u_random_mm']:.2g} mm random"
     whole = gap["median_u_gap_mm"]
-    words += "; that of the scale is not known" if whole is None else f", {whole:.2g} mm with the calibration"
+    words += (
+        "; the uncertainty of the scale is not known" if whole is None else f", {whole:.2g} mm with the calibration"
+    )
     shared = [f"{part['source']} {part['rms_u_mm']:.2g} mm" for part in budget["parts"] if part["kind"] == "shared"]
-    words += f". Alike in every reading: {'; '.join(shared)}" if shared else ""
+    words += f". Equal in every reading: {'; '.join(shared)}" if shared else ""
     lacks = [str(item) for item in budget["not_included"]]
     return [f"{words}.", *([f"Not included: {'; '.join(lacks)}."] if lacks else [])]

@@ -19,9 +19,10 @@ from fingervision.models.place_answers import PlaceAnswers
 Array = NDArray[np.float64]
 
 STEPS = 15
-"""Positions of the slider over the input: parts of its range, each the mean of its rows."""
+"""Number of positions of the slider over the input: parts of the input's range, each with the mean of its rows."""
 TIME_STEPS, FEWEST_STEPS = 24, 4
-"""Positions over time, shared by all runs, and the fewest of a run: there and back at either end."""
+"""Number of positions of the slider over time in all runs together, and least number in one run: opening and closing at
+both ends."""
 SHOWN = 0.05
 """Largest displayed difference, as a share of the mechanism's size."""
 CHORDS = 9
@@ -88,15 +89,15 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
     data = json.dumps({"frames": frames, "centres": [body.centroid_mm.tolist() for body in bodies],
                        "names": [body.name for body in bodies]})  # fmt: skip
     said = (
-        f"Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, its difference from the prediction "
-        f"magnified {magnified:.3g} times. Colour: how far a body's mean is off in units of its standard uncertainty u "
-        "by the noise, up to 3 grey, up to 6 yellow, beyond red. Rings: hinges, heavy where one is in the answer. "
-        "Bodies that are held are not measured."
+        "Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, with the difference from the prediction "
+        f"magnified {magnified:.3g} times. Colour: mean deviation of a body in units of its standard uncertainty u "
+        "from noise: grey up to 3 u, yellow up to 6 u, red above. Rings: hinges; a hinge that the result names has a "
+        "heavy ring. Fixed bodies are not measured."
     )
     if unseen:
         said += f" Not measured: {', '.join(unseen)}."
     if partly:
-        said += f" Measured in part, the rest as predicted: {', '.join(partly)}."
+        said += f" Measured in part, otherwise drawn as predicted: {', '.join(partly)}."
     return (
         f"<style>{_STYLE}</style>"
         f'<svg id="mechanism" viewBox="{box}" role="img" aria-label="The mechanism as predicted and as measured">'
@@ -157,7 +158,7 @@ def _hinges(evidence: BodyEvidence, answers: PlaceAnswers, size: float) -> str:
 def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
     """Mean difference of a body's measured and predicted pose in every part of the range, shape (parts, 3).
 
-    The second result is the largest significance of these differences.
+    The second returned value is the largest significance of the differences.
     """
     means, sigma = np.zeros((len(parts), 3)), np.zeros(len(parts))
     for k, part in enumerate(PARTS):

@@ -1,4 +1,4 @@
-"""Parameters that may lie beyond the range in which they were sought: a warming slower than the table is long."""
+"""Parameters that may lie beyond their search range, such as the time constant of a warming longer than the table."""
 
 import numpy as np
 
@@ -15,16 +15,16 @@ TAIL = 0.05
 def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Parameter]]:
     """Find time constants and widths for which the data give no upper limit within their search range.
 
-    Beyond the upper end of the range the effect does not change: an exponential at its beginning is a straight line, of
-    which only the slope is known. The posterior within the range would state time constant and amplitude with too small
-    an uncertainty.
+    Beyond the upper end of the search range of a time constant, the effect does not change: an exponential at its
+    beginning is a straight line, of which only the slope is known. The posterior within the range would state time
+    constant and amplitude with too small an uncertainty.
 
     Parameters
     ----------
     best : Explanation
-        The answer, with its covariance.
+        The best explanation, with its covariance.
     problem : Problem
-        Where the ranges come from.
+        Estimation problem with the search ranges.
 
     Returns
     -------
@@ -45,8 +45,8 @@ def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Para
 def limited(value: float, parameter: Parameter, drawn: Array, open_ended: Array) -> Estimate:
     """State a parameter by a one-sided limit, on the side opposite to that on which another parameter is unbounded.
 
-    The posterior ends where the search range ends. Beyond the search range there are only values farther from the
-    limit, so that the quantile within the range is also a limit for the whole posterior.
+    The posterior ends where the search range ends. Beyond the search range, all values of the parameter are farther
+    from the limit, so that the quantile within the range is also a limit for the whole posterior.
 
     Parameters
     ----------

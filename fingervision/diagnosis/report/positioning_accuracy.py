@@ -1,9 +1,10 @@
 """Positioning accuracy and repeatability of an axis from repeated visits of targets, as ISO 230-2:2014 defines them.
 
-Published reports deviate from the standard in three ways, which the tests check with readings of real stages. `forward`
-may mean the approach from above, so that the reversal has the opposite sign. The stated R may be max(R_up, R_down),
-whereas the standard's R is bidirectional and includes the reversal. The stated E may be that of one direction only. All
-of these quantities are computed here: compare R with R_up and R_down, E with E_up and E_down.
+Published reports deviate from the standard in three ways, which the tests check with readings of real stages. In a
+report, `forward` may mean the approach from above, so that the reversal has the opposite sign. The stated repeatability
+R may be max(R_up, R_down), whereas the R of the standard is bidirectional and includes the reversal. The stated
+accuracy E may be the accuracy in one direction only. The functions of this module compute all quantities of the
+standard: compare a published R with R_up and R_down, and a published E with E_up and E_down.
 """
 
 from collections.abc import Callable, Sequence
@@ -141,7 +142,7 @@ def _target(place: float, up: dict[int, float], down: dict[int, float]) -> Targe
         u, freedom = float(paired.std(ddof=1) / np.sqrt(paired.size)), paired.size - 1
     elif above.s_mm is not None and below.s_mm is not None:
         u = float(np.hypot(below.s_mm / np.sqrt(below.n), above.s_mm / np.sqrt(above.n)))
-        # The smaller of the two, on the safe side of Welch and Satterthwaite.
+        # The smaller of the two degrees of freedom is a safe bound of Welch and Satterthwaite's formula.
         freedom = min(below.n, above.n) - 1
     return Target(place, below, above, below.mean_mm - above.mean_mm, u, freedom)
 
@@ -237,5 +238,7 @@ def _notes(targets: Sequence[Target]) -> tuple[str, ...]:
     single = [t.target_mm for t in targets if t.up is None or t.down is None]
     if single:
         places = ", ".join(f"{place:g}" for place in single[:8]) + (" and others" if len(single) > 8 else "")
-        notes.append(f"Approached from one side only, and not in the bidirectional figures: {places} mm.")
+        notes.append(
+            f"Approached from one side only, and therefore not included in the bidirectional values: {places} mm."
+        )
     return tuple(notes)

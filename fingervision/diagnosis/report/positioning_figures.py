@@ -40,7 +40,7 @@ DEFINITIONS: Mapping[str, str] = {
     "A_down": f"accuracy from above: range over the targets of mean deviation +- 2 s_i, {_D}",
     "A": "bidirectional accuracy: range of mean deviation +- 2 s_i, over the targets and both directions",
 }
-"""Symbol and definition of every figure, in the order in which they are told."""
+"""Symbol and definition of every quantity, in the order of the report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Figure:
     """A quantity of the axis: value with standard uncertainty if known, or the reason why there is no value.
 
     With five cycles an uncertainty has four degrees of freedom: a 95 % interval extends by 2.8 times the uncertainty to
-    either side, not 2.
+    either side, instead of twice the uncertainty.
     """
 
     symbol: str

@@ -28,7 +28,7 @@ def positioning_of_data(data: Observations, answer: Settings) -> PositioningRepo
     data : Observations
         Measurement and model.
     answer : Settings
-        Everything that was found: effects with parameters and start states, and the curve of a map.
+        Everything that the search found: effects with parameters and start states, and the curve of a map.
     """
     table, rows = data.table, data.table.input_mm.size
 
@@ -42,7 +42,7 @@ def positioning_of_data(data: Observations, answer: Settings) -> PositioningRepo
         measured[table.path.rows] = True
         path = (table.path.input_mm, measured, table.path.runs, table.path.time_s)
     if table.time_s is None:
-        return NoRepeatedTargets("the table has no time_s, and without times the order of rows means nothing")
+        return NoRepeatedTargets("the table has no time_s, and without times the order of the rows is unknown")
     return positioning_of_table(*path, table.gap_mm, predict_mm, answer)
 
 

@@ -9,8 +9,8 @@ from fingervision.diagnosis.report.positioning_report import PositioningReport, 
 from fingervision.domain.effect import Array, Flags, Values
 
 STAGE_SLOPE = 0.05
-"""Largest difference of the model's slope from one for which the gap counts as the position of an axis. Scales of
-stages are off by parts in a thousand; a gripper amplifies by several times, so that position minus target has no
+"""Largest difference of the model's slope from one for which the gap counts as the position of an axis. Scale errors of
+stages are a few parts in a thousand. A gripper amplifies the input several times, so that position minus target has no
 meaning."""
 LINE = 1e-9
 """Deviation of a model from the straight line, as a share of its range, below which it counts as the line: rounding."""
@@ -32,9 +32,9 @@ def positioning_of_table(
     """Compute the positioning accuracy, if the table has repeated targets.
 
     If the model's gap follows the input one to one, as on a stage, a deviation is measured gap minus recorded input, as
-    in an ISO 230-2 report. The share of the model's prediction is then reported together with those of the effects. For
-    any other model, a deviation is the measured gap minus the simulated gap. A constant added to all deviations (such
-    as a rest gap) changes none of the quantities.
+    in an ISO 230-2 report. For a stage, the share of the model's prediction is reported together with the shares of the
+    effects. For any other model than that of a stage, a deviation is the measured gap minus the simulated gap. A
+    constant added to all deviations (such as a rest gap) changes none of the quantities.
 
     Parameters
     ----------

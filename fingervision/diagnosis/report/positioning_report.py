@@ -41,7 +41,8 @@ class PositioningReport:
     def share_mm(self, effect: str, symbol: str) -> float | None:
         """Quantity as measured minus the quantity without the effect (mm); negative if the effect hides a part of it.
 
-        Most quantities are ranges or maxima, so that the shares need not add up to the quantity; those of B_mean do.
+        Most quantities are ranges or maxima, so that the shares need not add up to the quantity; only the shares of
+        B_mean add up.
         """
         whole, rest = self.measured.figures[symbol].value_mm, self.without[effect].figures[symbol].value_mm
         return None if whole is None or rest is None else whole - rest

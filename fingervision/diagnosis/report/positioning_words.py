@@ -21,11 +21,12 @@ NAMES = {
 }
 REFERENCES = {
     "target": "Deviations are measured gap minus recorded input, less a constant.",
-    "model": "Deviations are measured minus simulated gap: figures of what the model lacks, not of the axis alone.",
+    "model": "Deviations are measured minus simulated gap: the quantities describe what the model lacks, not "
+    "the axis alone.",
 }
 SHARES = (
-    "Shares are the best explanation's: the figure minus the figure with the effect's predicted change taken out. "
-    "Figures are ranges and maxima: shares need not add up."
+    "Shares are those of the best explanation: each share is the figure minus the figure without the effect's "
+    "predicted change. Figures are ranges and maxima, so that shares need not add up."
 )
 SIDES = {"up": "approached from below", "down": "approached from above"}
 
@@ -71,7 +72,7 @@ def positioning_document(report: PositioningReport) -> dict[str, object]:
 def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the table in report.html; lengths in mm, with their full values for programs."""
     effects = list(report.without)
-    after = [] if report.after is None else ["after the answer, mm"]
+    after = [] if report.after is None else ["after correction, mm"]
     head = ["figure", "measured, mm", *after, *(f"share of {effect}, mm" for effect in effects), "definition"]
     rows = []
     for symbol, figure in report.measured.figures.items():
@@ -119,13 +120,14 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
         if share is None or abs(share) <= TOLD * abs(value):
             continue
         if 0.0 < share * value <= (1.0 + TOLD) * value**2:
-            causes.append(f"{_mm(abs(share))} mm of it is {effect}")
+            causes.append(f"{_mm(abs(share))} mm are caused by {effect}")
         else:
-            # It hides a part of the figure, or others hide a part of it: what would stand without it is true always.
+            # The effect hides a part of the quantity, or other effects hide a part of the effect: state the quantity
+            # without the effect, which is always true.
             causes.append(f"without {effect} it would be {_mm(value - share)} mm")
     words += f"; {', '.join(causes)}" if causes else ""
     rest = None if report.after is None else report.after.figures[symbol].value_mm
-    return words + (f"; {_mm(rest)} mm remain." if rest is not None else ".")
+    return words + (f"; {_mm(rest)} mm remain after correction." if rest is not None else ".")
 
 
 def _side_words(figure: Figure, slope_sign: int) -> str:
@@ -137,8 +139,8 @@ def _side_words(figure: Figure, slope_sign: int) -> str:
     if interval is None:
         return words
     if value * slope_sign < 0.0:
-        return f"{words}, as play makes it"
-    return f"{words}; play makes it the other way round: are the directions swapped?"
+        return f"{words}, as play causes them"
+    return f"{words}; play would cause the opposite: are the directions swapped?"
 
 
 def _visits(visits: Visits | None) -> dict[str, float | None] | None:
@@ -147,7 +149,7 @@ def _visits(visits: Visits | None) -> dict[str, float | None] | None:
 
 def _mm(value_mm: float | None) -> str:
     """Write a length in millimetres, to a hundredth of a micrometre as in published reports."""
-    # Adding zero takes the sign from what rounds to zero.
+    # Adding zero removes the sign of a value that rounds to zero.
     return "-" if value_mm is None else f"{round(value_mm, 5) + 0.0:.5f}"
 
 

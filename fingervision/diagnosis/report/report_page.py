@@ -37,7 +37,7 @@ HEADINGS = {
     Verdict.AGREES: "Measurement and model agree",
     Verdict.NAMED: "What the model lacks has a name",
     Verdict.AMBIGUOUS: "More than one explanation fits",
-    Verdict.UNKNOWN: "Something that the catalogue does not hold",
+    Verdict.UNKNOWN: "Something that no effect of the catalogue explains",
 }
 SIMULATION, CORRECTED = "simulation", "corrected model"
 
@@ -96,13 +96,13 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement
         ("How much", _how_much(report)),
         ("What was named", _mechanisms(report)),
         ("Parameters", table(["effect", "parameter", "value", "U (k = 2)"], parameters)),
-        ("What cannot be told apart", _apart(report.alternatives)),
+        ("Explanations that these data cannot distinguish", _apart(report.alternatives)),
         ("The next run", f"<p>{escape(_next_words(report))}</p>"),
         ("Runners-up", _runners_up(report)),
         ("What remains", f"<p>{escape(report.remaining)}</p>"),
         ("Set aside", bullets(list(report.outliers))),
-        ("Smallest size that this data would have shown", _detection_limits(report)),
-        ("Not shown by this data", bullets([f"{e['name']}: {e['reason']}" for e in report.excluded])),
+        ("Smallest size that these data would have shown (detection limit)", _detection_limits(report)),
+        ("Effects that these data cannot show", bullets([f"{e['name']}: {e['reason']}" for e in report.excluded])),
         *([("How the gap was measured", bullets(measurement))] if measurement else []),
         ("Notes", bullets(list(report.notes))),
         *added_sections(diagnosis),
@@ -124,22 +124,23 @@ def _picture(png: bytes, words: str) -> str:
 
 def _how_much(report: DiagnosisReport) -> str:
     d = report.disagreement
+    unseen = ["runs that the fit did not see", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)]
     rows = [
         [_counted(d), *(number(rms_mm) for rms_mm in d.counted_mm)],
         ["all rows", number(d.before_rms_mm), number(d.after_rms_mm)],
-        ["runs that the fit did not see", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)],
+        *([] if d.unseen_before_rms_mm is None else [unseen]),
         ["random noise", number(d.noise_rms_mm), ""],
         ["scatter of repeats (pure error)", number(report.pure_error_mm), ""],
     ]
     share = f'<data value="{report.explained_share!r}">{100.0 * report.explained_share:.1f}</data> %'
     return (
         table([f"disagreement{EDGES if d.of == 'edges' else ' of the gap'}, RMS", "before", "after"], rows)
-        + f"<p>The answer explains {share} of the squared disagreement (first line of the table).</p>"
+        + f"<p>The named effects explain {share} of the squared disagreement (first line of the table).</p>"
     )
 
 
 def _counted(d: Disagreement) -> str:
-    """What the verdict counts, in words."""
+    """Rows and offsets that the verdict counts, in words."""
     offsets = "" if d.unseen_before_rms_mm is None else ", without the runs' own offsets"
     return f"counted: {d.rows - d.rows_left_out} of {d.rows} rows{offsets}"
 
@@ -164,7 +165,7 @@ def _mechanisms(report: DiagnosisReport) -> str:
 def _apart(alternatives: Sequence[Sequence[str]]) -> str:
     """List of the explanations in the ambiguity set."""
     if len(alternatives) < 2:
-        return "<p>Nothing: no other explanation of the catalogue comes near.</p>"
+        return "<p>None: no other explanation of the catalogue fits nearly as well.</p>"
     return bullets([" + ".join(names) for names in alternatives])
 
 
@@ -173,8 +174,8 @@ def _next_words(report: DiagnosisReport) -> str:
         return report.next_run.words
     if report.verdict is Verdict.AMBIGUOUS:
         return (
-            "No run that the test bed can execute separates the remaining explanations; the notes say what else would, "
-            "if anything."
+            "No run that the test bed can execute separates the remaining explanations; the notes list other "
+            "measurements that would, if there are any."
         )
     return "A next run is not needed: a single explanation remains."
 
@@ -188,7 +189,7 @@ def _runners_up(report: DiagnosisReport) -> str:
         ]
         for runner in report.runners_up
     ]
-    return table(["explanation", "chi-square behind", "distance to the answer"], rows)
+    return table(["explanation", "chi-square behind", "distance from the best explanation"], rows)
 
 
 def _detection_limits(report: DiagnosisReport) -> str:

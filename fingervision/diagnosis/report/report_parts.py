@@ -40,7 +40,7 @@ def added_sections(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     for entry in REGISTRY.entries():
         try:
             content = entry.value.html(diagnosis)
-        except Exception as error:  # it takes nothing else with it
+        except Exception as error:  # a failing section must not affect the rest of the report
             said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
             LOG.warning(
                 "fingervision: The report part %s of %s is left out, as it raised %s: %s.",

@@ -13,7 +13,7 @@ BINS = 16
 """Number of parts of each variable's range: regions are found in these parts, then their ends are refined within
 parts."""
 ENDS = 200
-"""Number of ends of a region tried on either side."""
+"""Number of positions that are tried for each end of a region."""
 DRAWS, QUANTILE = 200, 0.99
 """Number of draws of noise, and quantile of their maximum: a region is reported in one table of noise in a hundred."""
 MOST = 8
@@ -73,7 +73,7 @@ def _scan(score: Array) -> tuple[Array, Array, Array]:
 
 
 def _axes(history: History, aside: Flags) -> list[Axis]:
-    """Axes: input (both directions, opening, closing), time and speed, the simplest first."""
+    """Variables: input (both directions, opening, closing), time and speed, the simplest first."""
     n = history.input_mm.size
     variables: list[tuple[str, str, Array, Flags]] = [("input", "mm", history.input_mm, np.ones(n, dtype=bool))]
     if history.time_s is not None:
@@ -156,7 +156,8 @@ def where(
     sd = _standard_deviations(noises)
     rest = {channel: residual_mm[channel].copy() for channel in SHARES if channel in residual_mm}
     null = _scan(rng.standard_normal((DRAWS, len(axes) * len(rest), BINS)))[0]
-    # One threshold for the largest of all channels and variables: a table without a disagreement names none.
+    # One threshold applies to the largest value of all channels and variables, so that a table without a disagreement
+    # has no region.
     limit = float(np.quantile(null.max(axis=1), QUANTILE)) if axes else np.inf
     places: list[Place] = []
     while len(places) < MOST:

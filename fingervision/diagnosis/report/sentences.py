@@ -13,7 +13,7 @@ COVERAGE_FACTOR = 2.0
 """Coverage factor of an expanded uncertainty: about 95 % for a normal distribution (JCGM 100:2008, 6.2)."""
 VISIBLE = 0.1
 """Relative difference of the disagreement as the verdict counts it from that over all rows above which a sentence
-states both: less changes no reader's conclusion."""
+states both values; a smaller difference does not matter to a reader."""
 EDGES = " of each finger's edge"
 FEW_NAMES = 3
 """Number of explanations up to which the sentence of an ambiguous result names them; more are only counted."""
@@ -48,7 +48,7 @@ def answer(
 ) -> str:
     """The whole result in one or two sentences.
 
-    The sizes of several effects stand in lines of their own (`detail_lines`), so that the sentence stays short.
+    The sizes of several effects are stated in separate lines (`detail_lines`), so that the sentence stays short.
     """
     (before_mm, after_mm), without = _said(d)
     of = EDGES if d.of == "edges" else ""
@@ -68,17 +68,17 @@ def answer(
     if verdict is Verdict.AMBIGUOUS:
         names = "; ".join(" + ".join(names) for names in alternatives)
         which = f": {names}" if len(alternatives) <= FEW_NAMES else ""
-        return f"These data cannot tell {len(alternatives)} explanations apart{which}. With the best fit, {fall}."
+        return f"These data cannot distinguish {len(alternatives)} explanations{which}. With the best fit, {fall}."
     part = f" {what} explain{'s' if len(effects) == 1 else ''} a part; {fall}." if effects else ""
     return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
 
 
 def _said(d: Disagreement) -> tuple[tuple[float, float], str]:
-    """RMS before and after that a sentence states, and what they leave out; nothing where the difference is small."""
+    """RMS before and after for a sentence, with a remark on left-out rows; no remark if the difference is small."""
     counted_mm, whole_mm = d.counted_mm, (d.before_rms_mm, d.after_rms_mm)
     differs = any(abs(one - all_mm) > VISIBLE * all_mm for one, all_mm in zip(counted_mm, whole_mm, strict=True))
     if d.rows_left_out:
-        # Runs left out of the fit in turn exist where there are several.
+        # Runs can be left out of the fit in turn only if there are several runs.
         offsets = "" if d.unseen_before_rms_mm is None else " and the runs' own offsets removed"
         return counted_mm, f"with {d.rows_left_out} of {d.rows} rows left out as outliers{offsets}"
     return (counted_mm, "with the runs' own offsets removed") if differs else (whole_mm, "")
@@ -107,7 +107,7 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
             f"disagreement; {stands.noise_mm:.2g} mm of it would be random noise"
         )
     if left_over is not None:
-        words += f"; its largest part is {left_over}, small beside what was explained"
+        words += f"; the largest part of it is {left_over}, small compared with the explained part"
     if max(scatter_mm, default=0.0) > 0.0:
         words += f"; the runs are offset against each other by {scatter_mm[0]:.2g} mm (standard deviation) in the gap"
     return words + "."
@@ -118,15 +118,19 @@ def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
     low, high = data.model.input_range_mm
     moved = data.chain.driven_mm(best.values)
     rows = int(np.sum((moved < low) | (moved > high)))
-    return (f"for {rows} rows the model was extended by a straight line beyond its inputs.",) if rows else ()
+    return (
+        (f"for {rows} rows beyond the inputs of the model, the model was extrapolated by a straight line.",)
+        if rows
+        else ()
+    )
 
 
 def beyond_the_search(best: Explanation, problem: Problem) -> tuple[str, ...]:
     """Sentences on parameters that may lie beyond the range in which they were searched."""
     return tuple(
         f"{effect}: the {parameter.words} may lie beyond {parameter.upper:.4g} {parameter.unit}, the end of its search "
-        "range: it is longer than these data can show, and so the effect's parameters are limited on one side only; "
-        "what it does within the table is known."
+        "range: it is longer than these data can show, so that the effect's parameters are limited on one side only; "
+        "the change that the effect causes within the table is known."
         for effect, parameter in open_parameters(best, problem)
     )
 
@@ -135,5 +139,7 @@ def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
     """Sentence for a table whose noise comes mainly from the error of the recorded input."""
     error = float(np.median(data.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
-        return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)
+        return (
+            f"the error of the recorded input ({error:.2g} mm of gap) is larger than the error of the measured gap.",
+        )
     return ()

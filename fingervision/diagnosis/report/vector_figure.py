@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 FORMATS = ("svg", "pdf")
 PNG_DPI = 110
-"""Resolution of the pictures beside the vector figures: about one pixel of a desk screen each."""
+"""Resolution of the pictures beside the vector figures: about one pixel of a desktop screen per pixel."""
 
 
 def plain_style() -> AbstractContextManager[None]:

@@ -162,7 +162,7 @@ class Bench:
 
     def _do(self, task: Task) -> None:
         if self._stop_asked:
-            self.say("bed", "Stopped before it began.")
+            self.say("bed", "The motion was stopped before it began.")
             return
         self.doing = task.name
         try:

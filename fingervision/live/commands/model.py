@@ -25,7 +25,7 @@ def _input(view: View, request: Request) -> Answer:
     view.features[TYPED] = input_mm
     if input_mm is None:
         view.driven_at = lambda time_s: None
-        return Answer("The input is not known from now on.")
+        return Answer("From now on, the input is not known.")
     view.driven_at = lambda time_s: Driven(input_mm)
     return Answer(f"The input is {input_mm:g} mm from now on.")
 

@@ -73,7 +73,7 @@ def _load(view: View, request: Request) -> Answer:
     if "roi" in found:
         changes["region"] = Region(*(int(side) for side in found["roi"].split(",")))
     view.choose(**changes)
-    return Answer(f"Settings of {path} are in force{'; those of the camera at the next start' * ('camera' in found)}.")
+    return Answer(f"Settings of {path} are used{'; those of the camera at the next start' * ('camera' in found)}.")
 
 
 def section(view: View) -> dict[str, Any]:

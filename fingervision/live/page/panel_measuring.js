@@ -38,7 +38,7 @@ panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
 
 on("drag_region", "click", () => wantBox("drag_region", "Drag over the part of the picture to look at.", (box) => ask({ do: "region", box })));
 on("whole", "click", () => { shown.box = null; ask({ do: "region", box: null }); });
-on("drag_reference", "click", () => wantBox("drag_reference", "Drag over the reference, with some ground around it.", (box) => {
+on("drag_reference", "click", () => wantBox("drag_reference", "Drag over the reference, with some background around it.", (box) => {
   shown.box = box;
   at("hint").textContent = "Give the reference's size and press Calibrate.";
   at("size_mm").focus();

@@ -125,8 +125,8 @@ class Playback:
             return
         if not 0 <= first <= last < self.frame_count:
             raise LimitError(
-                f"The range must lie within frames 0 to {self.frame_count - 1} and begin no later than it ends, "
-                f"but is {first} to {last}."
+                f"The range must lie within frames 0 to {self.frame_count - 1} and must not begin after its end, but "
+                f"is {first} to {last}."
             )
         self.range = (first, last)
 

@@ -17,6 +17,6 @@ def _modules() -> list[ModuleType]:
 
 
 def laws_of(drawn: DrawnAnswer) -> dict[str, PhysicalLaw]:
-    """Compute the laws of a drawing by name of effect; effects that cannot occur in the drawing are omitted."""
+    """Compute the formulas of effects for a drawing, by name of effect; effects that cannot occur in it are omitted."""
     laws = {module.EFFECT: module.law(drawn) for module in _modules()}
     return {name: law for name, law in laws.items() if law is not None}

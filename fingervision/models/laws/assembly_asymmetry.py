@@ -13,16 +13,17 @@ _HALF = Parameter("changed_half", "", -1.0, 1.0, "half whose link differs: 1 rig
                   neutral=None, starts=2)  # fmt: skip
 
 _LEAST = 0.1
-"""Limit of the divisor 1 - 2 changed_half share: one finger then hardly opens, and the share cannot grow further."""
+"""Least value of the divisor 1 - 2 changed_half share. At this value one finger hardly opens, and the share cannot grow
+further."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
     """Change the link lengths of the halves so that the right half has the given share of the opening.
 
     The right finger moves by 1/2 + share and the left finger by 1/2 - share of an opening that is G times the opening
-    of the drawing. If only the right half is changed, the left finger moves as in the drawing: G (1 - 2 share) = 1; if
-    only the left half is changed, G (1 + 2 share) = 1. In general G = 1 / (1 - 2 changed_half share); at changed_half =
-    0 the gap does not change, as for a model given as a table.
+    of the drawing. If only the right half is changed, the left finger moves as in the drawing, so that G (1 - 2 share)
+    = 1; if only the left half is changed, G (1 + 2 share) = 1. In general, the opening is multiplied by G = 1 / (1 - 2
+    changed_half share); at changed_half = 0 the gap does not change, as for a model given as a table.
     """
     curves = drawn.lever
     if curves is None:

@@ -24,8 +24,8 @@ def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
     """Stop the fingers as computed for the body in the drawing, and add the corresponding force at the drive.
 
     The measuring point lies beside the contact point, so that even between rigid faces it continues to move by a
-    fraction of the closing (`remaining_slope`). If the faces are soft, it moves further, and proportionally less force
-    is needed.
+    fraction of the closing (`remaining_slope`). If the faces are soft, the measuring point moves further, and
+    proportionally less force is needed.
     """
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     touch_mm = body.first_touch_mm()

@@ -27,13 +27,13 @@ _AS_DRAWN = 0.05
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Use the drawing's equilibria; the effect's parameters are those of the best-fitting circular arc.
+    """Use the drawing's equilibria; the parameters of the effect describe the best-fitting circular arc.
 
-    Multiplying `reach_mm` by n multiplies the whole curve by n, as for a body n times as large. Changing `cross` by an
-    amount c adds c times the height of the arc. The parameters of the best-fitting arc therefore reproduce the
-    equilibria of the body in the drawing, and an infinite `reach_mm` gives a straight line. For the published gripper
-    the best fit is `reach_mm` = 126 mm and `cross` = 0.12, and the arc alone deviates from the equilibria by less than
-    0.3 µm.
+    Multiplying the radius `reach_mm` by n multiplies the whole curve of opening over input by n, as for a body n times
+    as large. Changing the parameter `cross` by an amount c adds c times the height of the arc. The parameters of the
+    best-fitting arc therefore reproduce the equilibria of the body in the drawing, and an infinite `reach_mm` gives a
+    straight line. For the published gripper the best fit is `reach_mm` = 126 mm and `cross` = 0.12, and the arc alone
+    deviates from the equilibria by less than 0.3 µm.
     """
     try:
         opening_mm, bent_mm, force_ratio = _equilibria(drawn)
@@ -75,7 +75,7 @@ def _arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
 
 
 def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
-    """Openings without and with large rotation, and the ratio of the force with to that without, over the inputs."""
+    """Openings without and with large rotation, and the ratio of the forces (with over without), over the inputs."""
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     paths = []
     for end_mm, count in ((lowest_mm, _BELOW), (highest_mm, _ABOVE)):
@@ -89,6 +89,6 @@ def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
     bent_mm = 2.0 * (CubicSpline(at, right)(inputs) - body.measured_rest_mm)
     stiffness = body.equilibrium(1.0).force_n
     moving = at != 0.0
-    # The ratio is smooth through zero, where neither force can be divided by the other.
+    # The ratio is smooth through zero input, where both forces are zero and cannot be divided.
     ratio = CubicSpline(at[moving], force[moving] / (stiffness * at[moving]))(inputs)
     return opening_mm, np.asarray(bent_mm), np.asarray(ratio)

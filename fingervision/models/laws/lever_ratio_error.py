@@ -1,4 +1,4 @@
-"""Wrong lever length: a change of l2 alters the ratio of gap to input, and the force nearly twice as much."""
+"""Wrong lever length: a change of the arm l2 alters the ratio of gap to input, and the force nearly twice as much."""
 
 from dataclasses import replace
 

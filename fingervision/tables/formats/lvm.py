@@ -118,7 +118,7 @@ def _segment(
         cells = [cell.strip() for cell in lines[at].split(separator)]
         if not any(cells):
             continue
-        if len(cells) < wide - 1:  # the last, the comment, may be left out
+        if len(cells) < wide - 1:  # the last column, the comment, may be missing
             odd += 1
             continue
         rows.append(cells)
@@ -159,7 +159,9 @@ def _columns(
                 steps.append(None)
             continue
         names.append(name)
-        units.append(y_units[channel] if channel < len(y_units) else "")
+        # With an X column for each channel, the header's values stand above these, and every second cell is empty.
+        of_channel = place - 1 if x_columns == "Multi" else channel
+        units.append(y_units[of_channel] if of_channel < len(y_units) else "")
         places.append(place)
         steps.append(None)
         channel += 1

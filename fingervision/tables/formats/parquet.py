@@ -45,7 +45,7 @@ def read(path: Path, given: Entry) -> RawTable:
     passed = [table.schema.field(k).name for k, column in enumerate(columns) if column is None]
     if not kept or not len(kept[0]):
         raise DataError(f"{path} must have a numeric column with at least one row, but has none.")
-    notes = (f"Passed over, being no columns of numbers or texts: {', '.join(passed)}.",) if passed else ()
+    notes = (f"Not read, because they are not columns of numbers or texts: {', '.join(passed)}.",) if passed else ()
     return RawTable(path, "Parquet", kept, notes=notes)
 
 
@@ -73,7 +73,7 @@ def _column(field: Any, values: Any) -> RawColumn | None:
         present = np.asarray(values.is_valid())
         ticks = whole.fill_null(0).to_numpy(zero_copy_only=False)
         first = ticks[present][0] if present.any() else 0
-        # Nanoseconds since 1970 are more than a float holds: the difference is taken in whole numbers.
+        # A float cannot hold nanoseconds since 1970 exactly: the first time is subtracted in whole numbers.
         zero = first if types.is_timestamp(kind) else 0
         seconds = np.where(present, (ticks - zero) / PER_SECOND[kind.unit], 0.0)
         stamped = types.is_timestamp(kind) and present.any()

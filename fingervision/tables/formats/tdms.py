@@ -53,16 +53,16 @@ def read(path: Path, given: Entry) -> RawTable:
             f"The channels of group '{name}' of {path} must have the same number of values, but have: {listed}. Save "
             "the channels of each rate in a group of their own."
         )
-    notes = (f"Passed over, being no channels of numbers: {', '.join(passed)}.",) if passed else ()
+    notes = (f"Not read, because they are not channels of numbers: {', '.join(passed)}.",) if passed else ()
     if warned:
-        notes = (*notes, f"The file is damaged or was cut off ({warned[0]}); what could be read of it was taken.")
+        notes = (*notes, f"The file is damaged or was cut off ({warned[0]}); what could be read was used.")
     return RawTable(path, f"TDMS, group '{name}'", tuple(columns), notes=notes, settings={"part": name})
 
 
 @contextmanager
 def _warnings(into: list[str]) -> Iterator[None]:
     """Collect damage that npTDMS logs, instead of printing it to the terminal."""
-    # It gives each of its modules a logger with a handler of its own.
+    # npTDMS gives each of its modules a separate logger and handler.
     loggers = [log for name, log in logging.root.manager.loggerDict.items() if name.startswith("nptdms.")]
     kept = [(log, log.handlers, log.propagate) for log in loggers if isinstance(log, logging.Logger)]
     handler = logging.Handler(logging.WARNING)

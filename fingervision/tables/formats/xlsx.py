@@ -20,7 +20,7 @@ from fingervision.tables.units import is_unit
 ORDER = 20
 MOST_UNPACKED_BYTES = 600_000_000
 """Largest unpacked size: a full sheet (1 048 576 rows) of six columns has about 250 MB of XML, and a much larger
-archive is no measured table or an archive bomb."""
+archive is not a measured table but perhaps an archive bomb."""
 MOST_SHARED_BYTES = 100_000_000
 """Largest total size of the texts of cells, all of which are kept in memory."""
 HEADER_ROWS = 60
@@ -183,11 +183,11 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
     left_out = [f"{len(headers)} repeated header lines (the first is row {headers[0]})"] if headers else []
     return RawTable(
         path,
-        f"Excel workbook, sheet '{title}'" + (", its macros not looked at" if path.suffix.lower() == ".xlsm" else ""),
+        f"Excel workbook, sheet '{title}'" + (", without its macros" if path.suffix.lower() == ".xlsm" else ""),
         tuple(columns),
         lines,
         tuple(left_out),
-        () if names else ("The sheet names no columns: they are called by their numbers.",),
+        () if names else ("The sheet has no column names: its columns are named by their numbers.",),
         settings={"part": title},
         named=bool(names),
     )

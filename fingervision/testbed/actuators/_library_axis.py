@@ -37,7 +37,7 @@ class LibraryAxis(ABC):
     def __init__(self, name: str, device: str, clock: Clock, limits: StageLimits) -> None:
         self.name, self.limits = name, limits
         self._device, self._clock = device, clock
-        self._line = threading.RLock()  # a question and its answer belong together, also when another thread stops
+        self._line = threading.RLock()  # keeps each question together with its answer if another thread sends a stop
         self._alarm: Alarm | None = None
         self._closed = False
 
@@ -98,11 +98,11 @@ class LibraryAxis(ABC):
         """Begin to move until stopped or until a limit is reached."""
         check_speed(self.limits, abs(speed_mm_s))
         if speed_mm_s != 0.0:
-            # The device's own endless motion knows its own limits alone, not those of the bed's configuration.
+            # The device's own continuous motion would ignore the limits in the test bed's configuration.
             self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
 
     def run_step(self, number: int) -> None:
-        """Refuse, because such a device stores no step data that a test bed could use."""
+        """Refuse: a stage that is driven through a library has no step data that a test bed could use."""
         raise LimitError(f"Step {number} must be stored in the controller, but {self._device} has none: use move.")
 
     def stop(self) -> None:
@@ -111,7 +111,7 @@ class LibraryAxis(ABC):
             self._halt()
 
     def readings(self) -> tuple[Reading, ...]:
-        """The present position only, because the device stores no earlier ones."""
+        """The present position only, because the device does not store earlier positions."""
         with self._line:
             asked_s = self._clock.now_s()
             position_mm = self._asked(self._position_mm)
@@ -137,11 +137,11 @@ class LibraryAxis(ABC):
                 return act()
         except FingervisionError:
             raise
-        except Exception as error:  # serial lines, VISA and every library have classes of their own
+        except Exception as error:  # serial ports, VISA and each library raise exceptions of their own classes
             raise self._silent(error) from error
 
     def _silent(self, error: Exception) -> DeviceError:
-        return DeviceError(f"{self.name} must answer, but did not ({in_a_line(error)}): check its cable.")
+        return DeviceError(f"{self.name} must answer a request, but did not ({in_a_line(error)}): check its cable.")
 
 
 def in_a_line(error: Exception) -> str:

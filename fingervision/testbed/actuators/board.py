@@ -27,7 +27,7 @@ from fingervision.testbed.reading import Reading
 
 SIMULATED = False
 KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
-# A motion may take so much longer than its profile before it counts as stuck.
+# A motion counts as stuck if it takes longer than PATIENCE times the duration of its profile, plus PATIENCE_S.
 PATIENCE, PATIENCE_S = 1.5, 1.0
 READ_EVERY_S = 0.005
 CLOSES_WITHIN_S = 1.0
@@ -66,7 +66,7 @@ class BoardActuator:
     board : Board
         The board, after its set-up.
     data : StepData
-        Step data stored in the controller: the same as was loaded into it by its maker's tool.
+        Step data stored in the controller: the same data as were loaded into the controller by its maker's tool.
     limits : StageLimits
         Limits of the stage.
     codes : Codes
@@ -105,13 +105,13 @@ class BoardActuator:
         if wire.Levels.ALARM in self._board.levels:
             return Alarm("alarm", "the motor controller's alarm line is active: clear the alarm there, then home")
         if self._board.dropped is not None and self._board.dropped_code != "h":
-            return Alarm("dropped", f"{self._board.dropped}; its drive line was dropped: home it")
+            return Alarm("dropped", f"{self._board.dropped}, and the drive line was switched off: home the stage")
         if self._motions.failure is not None:
             return Alarm("failed", self._motions.failure)
         return None
 
     def home(self) -> None:
-        """Return to the reference, by its own code or an absolute step to 0; an earlier stop is then reset."""
+        """Return to the reference, by the controller's homing code or an absolute step to 0; reset an earlier stop."""
         self._stand()
         if wire.Levels.ALARM in self._board.levels:
             raise DeviceError(
@@ -127,8 +127,8 @@ class BoardActuator:
                 self._motions.begin([self._run_of(number, self._at_mm())])
                 return
         raise DeviceError(
-            "Homing needs home_code in the actuator's configuration, or an absolute step to 0 mm, but there is "
-            "neither: add one of them."
+            "Homing needs home_code in the actuator's configuration, or an absolute step to 0 mm, but has neither of "
+            "them: add one."
         )
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
@@ -158,7 +158,7 @@ class BoardActuator:
         """Begin one of the step data blocks."""
         if number not in self._data.steps:
             there = ", ".join(str(each) for each in self._data.steps)
-            raise LimitError(f"The step must be one that is stored in the controller ({there}), but is {number}.")
+            raise LimitError(f"The step must be stored in the controller (stored steps: {there}), but is {number}.")
         self._ready()
         self._check_known(number)
         self._begin_steps((number,))
@@ -184,10 +184,10 @@ class BoardActuator:
         self._motions.wait(CLOSES_WITHIN_S)
         self._board.close()
 
-    # What may begin.
+    # Checks before a motion.
 
     def _stand(self) -> None:
-        # First of all, so that a stop that comes while the motion is prepared is not forgotten.
+        # This call comes first, so that a stop that arrives during the preparation of the motion is kept.
         self._motions.forget_stop()
         if self.busy:
             raise StateError("The actuator must be at rest before a new motion, but is still moving: stop it first.")
@@ -207,7 +207,7 @@ class BoardActuator:
                 "or the last stop: home the stage first (--home-first)."
             )
 
-    # How it is done.
+    # Execution of a motion.
 
     def _at_mm(self) -> float:
         return self._motions.path.at_mm(self._clock.now_s())
@@ -224,7 +224,7 @@ class BoardActuator:
 
     def _run_of(self, number: int, at_mm: float) -> Run:
         motion = planned(number, self._data.steps[number], at_mm, self.limits)
-        # From a position that is not known it may take as long as homing.
+        # From an unknown position, the motion may take as long as homing.
         at_most_s = PATIENCE * motion.motion.seconds + PATIENCE_S + (0.0 if self._motions.known else self._waits.home_s)
         return Run(self._codes.first + number - 1, at_most_s, motion)
 

@@ -82,7 +82,7 @@ class Esp300Stage(LibraryAxis):
         if errors:
             words = "; ".join(str(getattr(one, "message", one)).lower() for one in errors)
             self._alarm = Alarm(str(getattr(errors[0], "error", "")), words)
-            raise DeviceError(f"{self.name} must take the command, but refused it ({words}): nothing was moved.")
+            raise DeviceError(f"{self.name} must accept the command, but refused it ({words}): nothing was moved.")
         self._alarm = None
 
 
@@ -92,14 +92,16 @@ def build(section: Section, context: BuildContext) -> Esp300Stage:
         from pymeasure.instruments.newport import ESP300
         from pymeasure.instruments.newport.esp300 import Axis
     except ImportError as error:
-        section.refuse("kind", f"needs pymeasure, which is not here ({error}): pip install 'fingervision[pymeasure]'.")
+        section.refuse(
+            "kind", f"needs pymeasure, which is not installed ({error}): pip install 'fingervision[pymeasure]'."
+        )
     limits, port, number = stated_limits(section), section.word("port"), section.whole("axis", 1, low=1, high=3)
     try:
         with warnings.catch_warnings():
-            # pymeasure asks its own maintainers whether this controller knows SCPI; nothing of that is used here.
+            # pymeasure warns that it is not known whether this controller supports SCPI; SCPI is not used here.
             warnings.simplefilter("ignore", FutureWarning)
             controller = ESP300(port)
-    except Exception as error:  # every VISA library has classes of its own
+    except Exception as error:  # each VISA library raises exceptions of its own classes
         words = f"must be that of an ESP300, but {port} could not be opened ({in_a_line(error)})."
         section.refuse("port", words)
     return Esp300Stage(controller, Axis(number, controller), context.clock, limits)

@@ -16,12 +16,14 @@ KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "accuracy_mm")
 SIMULATED = False
 # DIN 863-1 allows a micrometer screw of 25 mm an error of 4 um.
 ACCURACY_MM = 0.004
-# Nobody turns a screw faster; how fast it is turned is the hand's own matter.
+# Upper bound for the speed of a screw that is turned by hand; the actual speed is not controlled.
 SPEED_MM_S = 10.0
-# A typed value so far from the one asked for is a slip of the finger, and is asked for again.
+# A typed value that differs by more than this from the requested position counts as a typing error and is requested
+# again.
 FAR_MM = 1.0
 ASK_AT_MOST = 3
-# Between two readings others interpolate; nobody knows how the screw was turned, only that it stands when one is typed.
+# Positions between two readings are interpolated elsewhere. It is only known that the screw is at rest when a reading
+# is typed; the old position is therefore repeated this long before a new reading.
 AN_INSTANT_S = 1e-4
 
 
@@ -51,7 +53,10 @@ class HandScrew:
 
     def home(self) -> None:
         """Ask the user to set the screw to its zero."""
-        self._ask_for("Turn the screw to where the gripper rests, set its reading to zero, and type that reading", 0.0)
+        self._ask_for(
+            "Turn the screw to the position at which the gripper rests, set its reading to zero, and type that reading",
+            0.0,
+        )
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse motions beyond the limits of the screw."""
@@ -76,7 +81,7 @@ class HandScrew:
         """Do nothing: the screw does not move by itself."""
 
     def readings(self) -> tuple[Reading, ...]:
-        """Typed positions, each preceded by the earlier one until the time of the change, and the present position."""
+        """Typed positions, each preceded by the previous position just before the change, and the present position."""
         turned, self._turned = self._turned, []
         now_s = self._clock.now_s()
         earlier = [reading for reading in turned if reading.device_s < now_s]
@@ -102,14 +107,18 @@ class HandScrew:
                     f"but is {typed_mm:g}.\n"
                 )
             elif abs(typed_mm - wanted_mm) > FAR_MM:
-                self._terminal.say(f"The reading must lie near {wanted_mm:.3f} mm, but is {typed_mm:g}.\n")
+                self._terminal.say(
+                    f"The reading must be within {FAR_MM:g} mm of {wanted_mm:.3f} mm, but is {typed_mm:g} mm.\n"
+                )
             else:
                 now_s = self._clock.now_s()
                 for at_s, mm in ((now_s - AN_INSTANT_S, self._at_mm), (now_s, typed_mm)):
                     self._turned.append(Reading(at_s, at_s, at_s, mm))
                 self._at_mm = typed_mm
                 return
-        raise StateError(f"The reading must be typed in mm, but was not, {ASK_AT_MOST} times: the run ends here.")
+        raise StateError(
+            f"The reading must be typed in mm, but {ASK_AT_MOST} inputs were not valid: the run ends here."
+        )
 
 
 def _number(words: str, otherwise: float) -> float | None:

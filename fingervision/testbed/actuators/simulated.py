@@ -19,16 +19,19 @@ from fingervision.testbed.simulation.stage import SimulatedStage
 
 KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "force_n", "encoder_step_mm", "accuracy_mm", "play_mm")
 SIMULATED = True
-# Section 3 of the paper: stroke 10 mm, 400 mm/s, encoder 30 um, accuracy +-90 um, 5.5 N. The gripper rests at 0.
+# Hricko & Havlik (2015), section 3: stroke 10 mm, 400 mm/s, encoder 30 um, accuracy +-90 um, 5.5 N. The gripper is at
+# rest at position 0.
 LOWER_MM, UPPER_MM = -2.0, 8.0
 SPEED_MM_S, FORCE_N, ENCODER_STEP_MM, ACCURACY_MM = 400.0, 5.5, 0.03, 0.09
-# The board reads the encoder so often by itself; an answer takes between the two times (serial at 115200 baud, median
-# 1.2 ms measured with an ATmega328P).
+# Rate at which the board reads the encoder by itself; shortest answer time, and mean of the additional time (serial
+# port at 115200 baud; a median of 1.2 ms was measured with an ATmega328P).
 RATE_HZ = 200.0
 ANSWER_S, SLOW_ANSWER_S = 0.001, 0.0005
-# Edges of the encoder and of the BUSY line are stamped by interrupts: micros() of an ATmega328P counts in 4 us.
+# Interrupts time-stamp the edges of the encoder and of the BUSY line: micros() of an ATmega328P counts in steps of 4
+# us.
 EDGE_WITHIN_S = 2e-6
-# Between two points of this grid a border is passed once; halved so often, it is known to half a microsecond.
+# Grid on which step transitions of the encoder are searched, and number of bisections: each transition is then known to
+# half a microsecond.
 EDGE_GRID_S, BISECTIONS = 0.0005, 10
 HOMING_MM_S = 1.0
 Array = NDArray[np.float64]
@@ -199,7 +202,8 @@ def build(section: Section, context: BuildContext) -> SimulatedActuator:
     """Build the actuator from its section of the configuration."""
     limits = _limits(section)
     rng = np.random.default_rng([context.seed, 1])
-    # A controller knows the bed's limits as its own: not even its inaccuracy takes the stage beyond them.
+    # The controller is assumed to have the test bed's limits as its own, so that positioning errors do not lead beyond
+    # these limits.
     ends_mm = max(limits.lower_mm, context.limits.lower_mm), min(limits.upper_mm, context.limits.upper_mm)
     stage = SimulatedStage(*ends_mm, limits.accuracy_mm, rng)
     context.motion = Motion(

@@ -52,7 +52,7 @@ class ZaberStage(LibraryAxis):
         name = f"Zaber device {axis.device.device_address}, axis {axis.axis_number}"
         super().__init__(name, "a Zaber stage", clock, limits)
         self._connection, self._axis, self._microstep_mm = connection, axis, microstep_mm
-        # The device keeps its highest speed when it is switched off: it gets back the one that it had.
+        # The device stores its highest speed permanently: the previous value is restored at the end.
         self._speed_before = self._asked(lambda: axis.settings.get("maxspeed"))
 
     def _moving(self) -> bool:
@@ -87,7 +87,9 @@ class ZaberStage(LibraryAxis):
         except CommandFailedException as error:
             words = str(getattr(error.details, "response_data", error))
             self._alarm = Alarm(words, f"the device answered {words}")
-            raise DeviceError(f"{self.name} must take the command, but refused it ({words}): home it first.") from error
+            raise DeviceError(
+                f"{self.name} must accept the command, but refused it ({words}): home the stage first."
+            ) from error
         except Exception as error:
             raise self._silent(error) from error
         self._alarm = None
@@ -98,7 +100,9 @@ def build(section: Section, context: BuildContext) -> ZaberStage:
     try:
         from zaber_motion.ascii import Connection
     except ImportError as error:
-        section.refuse("kind", f"needs zaber-motion, which is not here ({error}): pip install 'fingervision[zaber]'.")
+        section.refuse(
+            "kind", f"needs zaber-motion, which is not installed ({error}): pip install 'fingervision[zaber]'."
+        )
     limits, port = stated_limits(section), section.word("port")
     device, axis = section.whole("device", 1, low=1, high=99), section.whole("axis", 1, low=1, high=9)
     microstep_mm = section.number("microstep_mm", above=0.0)

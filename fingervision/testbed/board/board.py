@@ -15,14 +15,14 @@ from fingervision.testbed.board.port import opened_port
 from fingervision.testbed.clocks.board_clock import FEWEST, JoinedClock
 from fingervision.testbed.clocks.clock import Clock
 
-# A board that is reset by the opening of its port starts its sketch within two seconds.
+# Opening the port may reset the board, which then starts its sketch within two seconds.
 STARTS_WITHIN_S = 1.0
 JOINED_WITHIN_S = 20 * FEWEST * ASK_EVERY_S
-# Samples that nobody fetches: the newest ten minutes at 200 Hz.
+# Number of unread samples that are kept: the newest ten minutes at 200 Hz.
 MOST_SAMPLES = 120_000
 DROPPED = {
-    "w": "the board had heard nothing from this program for {silence_ms} ms (is the computer overloaded?)",
-    "l": "the motion took longer than it may",
+    "w": "the board received no message from this program for {silence_ms} ms (is the computer overloaded?)",
+    "l": "the motion took longer than its time limit",
     "a": "the motor controller raised its alarm",
     "h": "this program stopped it",
 }
@@ -95,7 +95,7 @@ class Board:
     def driven_board_s(self) -> float | None:
         """Time of the drive line's last rising edge on the board's clock (s).
 
-        The result is None if the drive line had no rising edge since the last `run`.
+        The time is None if the drive line had no rising edge since the last `run`.
         """
         return self._driven_board_s
 
@@ -167,7 +167,7 @@ class Board:
         try:
             self._link.command("U")
         except FingervisionError:
-            return  # it is gone; its own watchdog has dropped the lines
+            return  # the board is disconnected; its watchdog has switched off the lines
         finally:
             self._link.close()
 
@@ -199,12 +199,14 @@ class Board:
     def _explain(self, reason: str) -> NoReturn:
         sentences = {
             "alarm": "The motor controller must have no alarm, but its alarm line is active: clear it there.",
-            "busy": "The motor controller must stand before it moves again, but its busy line is active.",
-            "stopped": f"The board must be cleared before it moves again, because {self.dropped or 'it was stopped'}: "
-            "home it.",
+            "busy": "The motor must be at rest before a new motion, but the motor controller's busy line is active.",
+            "stopped": f"The board must be cleared before a new motion, because {self.dropped or 'it was stopped'}: "
+            "home the stage.",
         }
         raise DeviceError(
-            sentences.get(reason, f"{self.name} refused a command ({reason}): set it up anew by beginning again.")
+            sentences.get(
+                reason, f"{self.name} refused a command ({reason}): start the program again to set up the board."
+            )
         )
 
 
@@ -214,8 +216,8 @@ def opened(settings: BoardSettings, clock: Clock) -> Board:
     Raises
     ------
     DeviceError
-        There is no such port, another program has it, nothing answers, it has another firmware, or it is wired
-        otherwise than its sketch can drive.
+        There is no such port, another program has it, nothing answers, it has another firmware, or its sketch cannot
+        drive the stated wiring.
     """
     link = BoardLink(opened_port(settings.port), clock)
     try:

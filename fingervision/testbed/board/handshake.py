@@ -20,7 +20,7 @@ WAIT_S = 0.01
 def _no_collection() -> Iterator[None]:
     """Suspend Python's cyclic garbage collection, which may stop all threads for 0.1 s.
 
-    The board would interpret such a pause of the computer as a lost connection, and stop the motor.
+    The board would interpret a pause of the computer as a lost connection, and stop the motor.
     """
     was_on = gc.isenabled()
     gc.disable()
@@ -67,7 +67,7 @@ class Handshake:
         Raises
         ------
         DeviceError
-            A step of the handshake did not come; the drive line is down then.
+            A phase of the handshake did not occur; the drive line is then off.
         """
         with _no_collection():
             return self._run(code, at_most_s, on_driven)
@@ -78,7 +78,7 @@ class Handshake:
         driven = self._came(wire.Levels.DRIVE, within_s, "the board has not raised its drive line")
         if not driven:
             return False
-        # Without the message of that change, which may come damaged, the state told it just now.
+        # If the message of this change was damaged, the change was found in the reported state: take the present time.
         at_s, now_s = self.board.driven_board_s, self.clock.now_s()
         on_driven(now_s if at_s is None else min(self.board.clock.host_at(at_s), now_s))
         done = (
@@ -89,7 +89,9 @@ class Handshake:
             return False
         self.board.release()
         if Role.IN_POSITION in self.board.settings.lines:
-            return self._came(wire.Levels.IN_POSITION, LINE_WITHIN_S, "the motor controller has not come into position")
+            return self._came(
+                wire.Levels.IN_POSITION, LINE_WITHIN_S, "the motor controller has not signalled that it is in position"
+            )
         return True
 
     def _came(self, level: wire.Levels, within_s: float, otherwise: str) -> bool:

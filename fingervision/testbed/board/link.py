@@ -2,7 +2,7 @@
 
 A thread of the link reads messages from the board all the time. The thread also requests the state every few
 milliseconds: this shows the board that the computer works, shows the link that the board works, and synchronises the
-two clocks.
+clocks of board and computer.
 """
 
 import random
@@ -19,19 +19,20 @@ from fingervision.testbed.clocks.board_clock import ClockJoin, JoinedClock
 from fingervision.testbed.clocks.clock import Clock
 
 ASK_EVERY_S = 0.02
-# A stop is asked for until it is confirmed, but not faster than the wire carries question and answer (3.5 ms): the
-# answers to a flood of them let no force sample through for a tenth of a second.
+# Interval at which a stop is repeated until it is confirmed. It must be longer than a question and its answer take (3.5
+# ms); otherwise the answers would block force samples for a tenth of a second.
 STOP_EVERY_S = 0.005
-# An answer takes 3 ms on the wire, and up to 16 ms more in the buffers of a USB adapter.
+# An answer takes 3 ms on the line, and up to 16 ms more in the buffers of a USB adapter.
 ANSWER_WITHIN_S, TRIES = 0.1, 5
-# The motor does not wait for this: the board has dropped the drive line long before.
+# The motor is at rest much earlier, because the board switches off the drive line by itself.
 LOST_AFTER_S = 1.0
 REFIT_EVERY_S = 0.25
-# No byte is faster than its ten bits; the board's 115200 baud are 2.1 % fast (ATmega328P, table of baud rates).
+# Shortest duration of a byte of ten bits; the 115200 baud of an ATmega328P are 2.1 % too fast (data sheet, table of
+# baud rates).
 BYTE_S = 10.0 / BAUD / 1.03
 LONGEST_LINE = 80
 US_PER_S = 1_000_000
-# Commands and questions have numbers of their own, so that a question in between never hides a repeated command.
+# Commands and questions are numbered separately, so that a question between them never hides a repeated command.
 NUMBERS = 128
 
 
@@ -125,7 +126,7 @@ class BoardLink:
         DeviceError
             The connection is lost.
         BoardRefusalError
-            The board did not do it.
+            The board refused to execute the command.
         """
         with self._one_command:
             self._command = (self._command + 1) % NUMBERS
@@ -147,7 +148,7 @@ class BoardLink:
     def stop(self) -> None:
         """Let the link's thread send a stop to the board, repeatedly until the board confirms the stop.
 
-        This call only sets a flag, so that a signal handler may use it at any time.
+        `stop` only sets a flag, so that a signal handler may call it at any time.
         """
         self._stopping = True
 
@@ -178,7 +179,9 @@ class BoardLink:
         self.check()
 
     def _pulled(self, error: Exception) -> str:
-        return f"The board on {self._port.name} was lost ({error}): is its cable in? Plug it in and begin again."
+        return (
+            f"The board on {self._port.name} was lost ({error}): check that its cable is plugged in, and start again."
+        )
 
     def _fail(self, sentence: str) -> None:
         with self._news:
@@ -191,7 +194,11 @@ class BoardLink:
         while not self._closed and self._failure is None:
             try:
                 rest += self._port.read(max(1, self._port.in_waiting))
-            except (OSError, serial.SerialException, TypeError) as error:  # TypeError: closed by another thread
+            except (
+                OSError,
+                serial.SerialException,
+                TypeError,
+            ) as error:  # TypeError: another thread has closed the port
                 self._fail(self._pulled(error))
                 return
             got_s = self._clock.now_s()
@@ -221,8 +228,8 @@ class BoardLink:
         if isinstance(message, wire.Answer) and self._session is not None:
             if message.session != self._session:
                 self._fail(
-                    f"The board on {self._port.name} was reset in the middle, by its button, its supply or another "
-                    "program; all its lines are off: begin again."
+                    f"The board on {self._port.name} was reset during the run, by its button, its power supply or "
+                    "another program; all its lines are off: start again."
                 )
                 return
             if message.cause != wire.GOING:
@@ -240,8 +247,8 @@ class BoardLink:
     def _stay_awake(self, now_s: float) -> None:
         if now_s - self._last_heard_s > LOST_AFTER_S:
             self._fail(
-                f"The board on {self._port.name} was lost: it has said nothing for {LOST_AFTER_S:g} s. Look at its "
-                "cable and its supply, and begin again."
+                f"The board on {self._port.name} was lost: it has sent no message for {LOST_AFTER_S:g} s. Check its "
+                "cable and its power supply, and start again."
             )
             return
         if now_s - self._last_asked_s >= (STOP_EVERY_S if self._stopping else ASK_EVERY_S):

@@ -43,7 +43,7 @@ class Motions:
 
     def __init__(self, board: Board, waits: Waits, clock: Clock, start_mm: float) -> None:
         self.path = CommandedPath(start_mm)
-        # After a start or a stop only an absolute step or homing tells where the stage is.
+        # After a start or a stop, the position is known only after an absolute step or homing.
         self.known = False
         self.failure: str | None = None
         self._board, self._waits, self._clock = board, waits, clock

@@ -11,9 +11,9 @@ from fingervision.domain.errors import DeviceError
 
 BAUD = 115200
 PROGRAM = "fingervision"
-# What pyserial says of a port that nothing is known of.
+# Description that pyserial gives for an unknown port.
 UNKNOWN = "n/a"
-# The link reads in a thread of its own; it looks up this often to send what keeps the board awake.
+# Longest wait for input in the link's thread, which must send messages regularly to keep the board awake.
 READ_TIMEOUT_S = 0.005
 WRITE_TIMEOUT_S = 1.0
 
@@ -32,13 +32,13 @@ def holders_of(name: str) -> tuple[int, ...]:
         try:
             if process != os.getpid() and any(file.readlink() == port for file in folder.iterdir()):
                 holders.append(process)
-        except OSError:  # it has ended, or belongs to somebody else
+        except OSError:  # the process has ended, or belongs to another user
             continue
     return tuple(sorted(holders))
 
 
 def fingervision_at(name: str) -> int | None:
-    """Number of another fingervision process that has a port open, and may be asked to end; None if there is none."""
+    """Number of another fingervision process that has a port open and can be asked to end; None if none has."""
     for process in holders_of(name):
         try:
             words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
@@ -66,11 +66,11 @@ def opened_port(name: str) -> serial.Serial:
 
 
 def _why_closed(name: str, error: serial.SerialException) -> str:
-    # Another program's lock comes as EAGAIN, Windows' "access denied" without a number.
+    # A lock of another program is reported as EAGAIN; Windows reports "access denied" without a number.
     if error.errno in (errno.EAGAIN, errno.EBUSY) or "Could not exclusively lock" in str(error):
         holders = ", ".join(f"process {process}" for process in holders_of(name))
         who = f"another program ({holders})" if holders else "another program"
-        return f"The port {name} must be free, but {who} has it open: close that one first."
+        return f"The port {name} must be free, but {who} has it open: close that program first."
     if error.errno in (errno.EACCES, errno.EPERM):
         return (
             f"The port {name} must be open to this user, but access was denied: join the group that owns it (on Debian "

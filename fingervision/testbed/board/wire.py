@@ -10,7 +10,7 @@ from enum import IntFlag
 
 PROTOCOL = 1
 NAME = "fingervision-board"
-# Cause of a board that has not dropped its drive line.
+# Cause reported by a board that has not switched off its drive line.
 GOING = "-"
 
 
@@ -142,7 +142,7 @@ _READERS: dict[str, Callable[..., Message]] = {
 
 
 class Unwrapped:
-    """Counts beyond the range of a wrapping counter: each value is taken as the one nearest to the previous value.
+    """Counts beyond the range of a wrapping counter: each total is the one nearest to the last total.
 
     Parameters
     ----------

@@ -23,16 +23,18 @@ from fingervision.testbed.simulation.optics import Optics, hidden_in
 KEYS = ("width_px", "height_px", "rate_hz", "px_per_mm", "blur_px", "noise_grey", "latency_s", "jitter_s", "fingers_mm",
         "tip_radius_mm", "off_centre_mm")  # fmt: skip
 SIMULATED = True
-# Section 3 of the paper: 640 columns, 34 px/mm, 25 frames a second. The rows about the tips alone are read out.
+# Hricko & Havlik (2015), section 3: 640 columns, 34 px/mm, 25 frames per second. Only the rows around the tips are read
+# out.
 WIDTH_PX, HEIGHT_PX, RATE_HZ, PX_PER_MM = 640, 160, 25.0, 34.0
 BLUR_PX, NOISE_GREY = 0.9, 2.0
-# From exposure to arrival: read-out and transfer, never less, often a little more.
+# Smallest latency from exposure to arrival (read-out and transfer), mean of the additional latency, and uncertainty.
 LATENCY_S, JITTER_S, U_LATENCY_S = 0.008, 0.0003, 0.0005
-# The paper measures 0.3 mm below the tips, "with minimized error caused by roundedness of fingers": there the edges are
-# straight. Where they were round, a lens would act on the gap through the height of the tips as well, and be found 10 %
-# stronger than the catalogue's, which knows no height (a radius of 0.9 mm, measured).
+# Hricko & Havlik (2015) measure 0.3 mm below the tips, "with minimized error caused by roundedness of fingers": the
+# edges are straight there. With round edges, lens distortion would also change the gap through the height of the tips.
+# It would be estimated 10 % too large (computed for a radius of 0.9 mm), because the effect in the catalogue does not
+# depend on height.
 FINGERS_MM, TIP_RADIUS_MM = 1.6, 0.2
-# Where the operator shifts the picture to.
+# Distance by which the operator shifts the picture.
 SHIFT_MM = 0.5
 
 
@@ -157,7 +159,7 @@ class SimulatedCamera:
         scale = self._optics.px_per_mm
         seen = self._gripper.at(at_s)
         middle_mm = float(seen.midline_mm[0]) * (-1.0 if placed.turned else 1.0) + off_mm + placed.shift_mm
-        # The measuring height lies in the picture's middle, where a lens does nothing along the fingers.
+        # The measuring height lies in the middle of the picture, where a lens causes no displacement along the fingers.
         below_px, middle_px = below_mm * scale, (self.description.height_px - 1) / 2
         return two_fingers(
             float(seen.gap_mm[0]) * scale,

@@ -15,11 +15,12 @@ from fingervision.testbed.camera import Latency
 
 KEYS = ("source", "rate_hz", "width_px", "height_px", "patience_s", "latency_s", "u_latency_s")
 SIMULATED = False
-# A camera that gives nothing for so long is stale, and the motor stops.
+# The motor is stopped if the camera sends no frame for this time.
 PATIENCE_S = 1.0
-# What a webcam takes at least is not known unless it was measured: a frame's time, give or take all of it.
+# The smallest latency of a webcam is unknown unless it was measured: assume one frame time, with a standard uncertainty
+# of the same size.
 LATENCY_S, U_LATENCY_S = 0.04, 0.04
-# Frames that may wait; older ones are gone, for the bed wants to know what is now.
+# Largest number of waiting frames; older frames are dropped, because the test bed needs the present state.
 FRAMES_WAITING = 8
 
 
@@ -65,11 +66,10 @@ class SourceCamera:
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._ended, self._patience_s)
             if not self._waiting:
-                why = self._ended or f"it gave no frame for {self._patience_s:g} s"
+                why = self._ended or f"it sent no frame for {self._patience_s:g} s"
                 raise DeviceError(
-                    f"The camera {self.description.name} must give frames while the test bed works, but "
-                    f"{why}: the motor "
-                    "was stopped; check its cable."
+                    f"The camera {self.description.name} must send frames while the test bed works, but {why}: the "
+                    "motor was stopped; check the camera's cable."
                 )
             received = self._waiting.popleft()
         index, self._index = self._index, self._index + 1
@@ -89,7 +89,7 @@ class SourceCamera:
                     self._waiting.append(received)
                     self._changed.notify()
         except FingervisionError as error:
-            ended = f"it was cut off ({error})"
+            ended = f"it was disconnected ({error})"
         with self._changed:
             self._ended = ended
             self._changed.notify()

@@ -1,9 +1,9 @@
 """Synchronisation of the board's clock with the host's: offset and rate, with their uncertainty.
 
 The board records the time at which it receives a command; that time lies between the sending of the command and the
-arrival of the response (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many such
-exchanges narrow the interval: the clock rate is fitted to the midpoints, and the offset is the midpoint of the
-intersection of the intervals.
+arrival of the response (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many exchanges
+of commands and responses narrow the interval: the clock rate is fitted to the midpoints, and the offset is the midpoint
+of the intersection of the intervals.
 """
 
 from collections import deque
@@ -12,14 +12,16 @@ from math import hypot, sqrt
 
 import numpy as np
 
-# Exchanges older than this say little about the rate of now: a resonator drifts with its warmth.
+# Exchanges older than this are not used, because the rate of a resonator drifts with its temperature.
 WINDOW_S = 20.0
 FEWEST = 5
-# The tightest quarter of all bounds is left out: that only widens what is left, and one bad exchange cannot spoil it.
+# Share of the bounds, the tightest ones, that is left out. This only widens the remaining interval, and protects it
+# against a single wrong exchange.
 LEFT_OUT = 0.25
-# An instrument that lives by the host's own clock answers at once: its exchanges have no width.
+# An instrument without its own clock uses the host's clock: its exchanges have no width.
 AT_ONCE_S = 1e-9
-# Ceramic resonators on Arduinos: 0.5 % as delivered and 0.3 % over the temperature (Murata, CSTNE16M0V53).
+# Limit of the rate of an unknown clock: ceramic resonators on Arduinos have 0.5 % initial tolerance and 0.3 % over
+# temperature (Murata, CSTNE16M0V53).
 UNKNOWN_RATE = 0.008
 
 
@@ -79,7 +81,7 @@ class ClockJoin:
             return None
         board_s, earliest_s, latest_s = np.array(self._exchanges).T
         middle_s, half_s = 0.5 * (earliest_s + latest_s), 0.5 * (latest_s - earliest_s)
-        # An exchange that was held up says little; the narrowest weigh most.
+        # Delayed exchanges carry little information: the narrowest exchanges have the largest weights.
         weights = 1.0 / (half_s + np.median(half_s) + AT_ONCE_S) ** 2
         weights /= weights.sum()
         at_s = float(weights @ board_s)
@@ -87,11 +89,12 @@ class ClockJoin:
         lever_s2 = float(weights @ since_s**2)
         rate, u_rate = 1.0, UNKNOWN_RATE
         if lever_s2 > 0.0:
-            # As if each middle erred evenly within its half width, apart from the others.
+            # The midpoints are assumed to have independent errors, uniform within their half widths.
             fitted_u = sqrt(float(weights**2 @ (since_s**2 * half_s**2)) / 3.0) / lever_s2
             if fitted_u < UNKNOWN_RATE:
                 rate, u_rate = float(weights @ (since_s * (middle_s - middle_s.mean()))) / lever_s2, fitted_u
         lowest_s = float(np.quantile(earliest_s - rate * since_s, 1.0 - LEFT_OUT))
         highest_s = float(np.quantile(latest_s - rate * since_s, LEFT_OUT))
-        # A rate that has changed lets no straight line through all; the bounds then cross, and are apart by the bend.
+        # If the rate has changed, no straight line satisfies all bounds. The bounds then cross, and their distance is
+        # the deviation from a line.
         return JoinedClock(at_s, 0.5 * (lowest_s + highest_s), rate, 0.5 * abs(highest_s - lowest_s), u_rate)

@@ -13,13 +13,13 @@ import numpy as np
 
 from fingervision.testbed.camera import Latency
 
-# The earliest of so many seconds counts.
+# Duration of a bin: only the earliest arrival in each bin is used.
 BIN_S = 1.0
-# Two quartz clocks part by so much in a second, as a standard deviation (30 parts in a million either, data sheets).
+# Standard deviation of the relative rate of two quartz clocks (data sheets: 30 parts per million each).
 LIKELY_RATE = 3e-5
-# The offset is that of the earliest frame of so many seconds; the rate is taken from all of them.
+# Number of newest bins that give the offset, and of all bins, which give the rate.
 NEWEST_BINS, MOST_BINS = 10, 600
-# Until the arrivals themselves tell how they scatter.
+# Assumed scatter, until the arrivals themselves show their scatter.
 FIRST_SCATTER_S = 1e-3
 
 
@@ -58,7 +58,7 @@ class ArrivalClock:
 
     def __init__(self, latency: Latency) -> None:
         self._latency = latency
-        # Of each bin: its beginning; stamp and delay of its earliest arrival.
+        # For each bin: its start, and the time stamp and delay of its earliest arrival.
         self._bins: list[tuple[float, float, float]] = []
 
     def add(self, camera_s: float, arrived_s: float) -> None:
@@ -74,9 +74,9 @@ class ArrivalClock:
         _, at_s, delay_s = np.array(self._bins).T
         about_s = float(at_s[-1])
         since_s = at_s - at_s.mean()
-        # Scatter of the earliest arrivals from bin to bin; neighbours differ by next to nothing else.
+        # Scatter of the earliest arrivals from bin to bin: neighbouring bins hardly differ for any other reason.
         scatter_s = float(np.std(np.diff(delay_s))) / sqrt(2.0) if delay_s.size > 2 else FIRST_SCATTER_S
-        # A ridge: where the arrivals tell less of the rate than the data sheets, it stays small.
+        # Ridge regression: the rate stays small where the arrivals determine it less well than the data sheets.
         rate = float(since_s @ delay_s) / float(since_s @ since_s + (scatter_s / LIKELY_RATE) ** 2 + 1e-12)
         level_s = (delay_s - rate * (at_s - about_s))[-NEWEST_BINS:]
         return CameraClock(about_s, about_s + float(level_s.min()), 1.0 + rate, hypot(self._latency.u_s, scatter_s))

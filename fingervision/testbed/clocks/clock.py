@@ -3,7 +3,7 @@
 from time import monotonic, sleep
 from typing import Protocol
 
-# A paced clock may be so much late for a moment, and catches up.
+# A paced clock makes up for a delay up to this duration.
 MOST_HURRY_S = 0.05
 
 
@@ -36,7 +36,8 @@ class HostClock:
 class VirtualClock:
     """Clock of a completely simulated test bed: its time advances only while some part waits.
 
-    With a pace, virtual time advances at most at this pace; time lost by a pause or a busy computer is not made up for.
+    With a pace, virtual time advances at most at this pace, and does not make up for long delays (a pause, a busy
+    computer).
 
     Parameters
     ----------

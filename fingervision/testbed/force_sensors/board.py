@@ -17,7 +17,7 @@ KEYS = (KEY, "volts", "newtons", "reference_v")
 SIMULATED = False
 CONVERTER_STEPS = 1024
 REFERENCE_V = 5.0
-# A sample is on its way for at most the time of a few lines on the wire, and of a USB adapter's buffer.
+# Longest delay of a sample: a few lines on the serial port, and the buffer of a USB adapter.
 ON_ITS_WAY_S = 0.1
 WAIT_S = 0.005
 
@@ -65,7 +65,10 @@ class BoardForceSensor:
             self._board.wait(WAIT_S)
             samples = self._board.samples()
         if not samples:
-            raise DeviceError(f"{self._board.name} must send force samples, but has sent none for a while.")
+            raise DeviceError(
+                f"{self._board.name} must send force samples, but has sent none for some time: check the connection of "
+                "the board."
+            )
         clock = self._board.clock
         return tuple(
             Reading(sample.board_s, *clock.bounds_at(sample.board_s), self.force_n(sample.level)) for sample in samples

@@ -12,7 +12,7 @@ from fingervision.testbed.simulation.gripper import SimulatedGripper
 
 KEYS = ("full_scale_n", "noise_n", "rate_hz", "bits")
 SIMULATED = True
-# A load cell for the paper's 5.5 N behind the 10-bit converter of an ATmega328P, either way.
+# A load cell for the published 5.5 N in either direction, read by the 10-bit converter of an ATmega328P.
 FULL_SCALE_N, NOISE_N, RATE_HZ, BITS = 10.0, 0.01, 200.0, 10
 ANSWER_S = 0.001
 

@@ -12,7 +12,7 @@ from fingervision.domain.errors import DeviceError, FingervisionError, LimitErro
 from fingervision.testbed.bed import Bed
 
 LOOK_EVERY_S = 0.02
-# A jog of blocks is stopped so long before the bed's limit.
+# A jog made of stored steps is stopped this long before it would reach the test bed's limit.
 WARNING_S = 0.1
 
 
@@ -76,7 +76,7 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
     Raises
     ------
     DeviceError, LimitError, StateError
-        The target or the speed is beyond a limit (nothing was moved), or the motion was broken off.
+        The target or the speed is beyond a limit (nothing was moved), or the motion was interrupted.
     """
     limits = bed.limits
     if not isfinite(to_mm):
@@ -95,7 +95,7 @@ def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None
     """Move at a signed speed until stopped, for a time, or to a limit; return the position afterwards (mm)."""
     _check_speed(bed, abs(speed_mm_s))
     end_mm = bed.limits.upper_mm if speed_mm_s > 0.0 else bed.limits.lower_mm
-    # A block that has begun goes to its end unless it is stopped in time.
+    # A stored step that has begun runs to its end unless it is stopped in time.
     last_mm = end_mm - (WARNING_S * speed_mm_s if bed.actuator.has_steps else 0.0)
 
     def enough(at_mm: float) -> bool:

@@ -16,21 +16,21 @@ from fingervision.testbed.motion.step_checks import PlannedMotion, planned_seque
 
 
 def step_limits(bed_name: str) -> StageLimits:
-    """Limits of a test bed's stage, without opening it; the published values if its file states no others."""
+    """Limits of a test bed's stage, without opening it; if its file states no limits, the published values."""
     if bed_name == SIMULATED:
         return PUBLISHED
     return stage_limits(read_configuration(bed_name).table("actuator"))
 
 
 def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> None:
-    """Move to the reference, then run a sequence of step data, after all of it was checked against the limits.
+    """Move to the reference, then run a sequence of step data, after the whole sequence was checked against the limits.
 
     If the actuator stores no step data, it moves to the target of each step at the step's peak speed.
 
     Raises
     ------
     FingervisionError
-        The bed cannot do it, or its motor controller keeps other steps than these.
+        The test bed cannot execute the sequence, or its motor controller stores different steps.
     """
     if bed_name != SIMULATED:
         _check_kept(data, bed_name)
@@ -40,7 +40,7 @@ def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> No
         say(f"homed: {manual_control.home(bed):.3f} mm")
         for motion in motions:
             at_mm = _run(bed, motion)
-            say(f"step {motion.number}: {motion.from_mm:.3f} to {motion.to_mm:.3f} mm, stands at {at_mm:.3f} mm")
+            say(f"step {motion.number}: {motion.from_mm:.3f} to {motion.to_mm:.3f} mm, at rest at {at_mm:.3f} mm")
     finally:
         bed.close()
 

@@ -15,7 +15,7 @@ from fingervision.testbed.motion.step_checks import PlannedMotion
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 6.0), 130
 LINE_COLOUR, LIMIT_COLOUR, PUSHING_COLOUR = "#11507a", "#c0392b", "#e8c170"
 POINTS_PER_MOTION = 200
-# Between motions the stage stands; so that each can be seen, a share of the whole.
+# Pause that is drawn between two motions, as a share of the whole time, so that each motion can be seen.
 STANDING_SHARE = 0.02
 TITLE_PAD_POINTS = 30.0
 
@@ -37,7 +37,7 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
     upper.set_title(name, pad=TITLE_PAD_POINTS)
     upper.set_ylabel("position (mm)")
     lower.set_ylabel("speed (mm/s)")
-    lower.set_xlabel("time (s), with a short stand after each motion; shaded: pushing, dashed: what the stage can do")
+    lower.set_xlabel("time (s), with a short pause after each motion; shaded: pushing; dashed: limits of the stage")
     for level_mm in (limits.lower_mm, limits.upper_mm):
         upper.axhline(level_mm, color=LIMIT_COLOUR, linewidth=0.8, linestyle="--")
     fastest_mm_s = max((each.motion.speed_mm_s for each in motions), default=0.0)

@@ -23,10 +23,10 @@ def stop_bed(name: str) -> str:
     Raises
     ------
     DataError, DeviceError, InputFileError, UsageError
-        The bed cannot be opened, or the other process does not let go of it.
+        The test bed cannot be opened, or the other process does not release it.
     """
     if name == SIMULATED:
-        return "The simulated bed stands: its motor moves only while a command runs."
+        return "The simulated test bed is at rest: its motor moves only while a command runs."
     top = read_configuration(name)
     section = top.table("actuator")
     find_holder = getattr(kind_of("actuator", section), "holder", None)
@@ -42,10 +42,10 @@ def stop_bed(name: str) -> str:
                     "not: switch off the motor's power supply."
                 )
             sleep(LOOK_EVERY_S)
-        words = f"Process {process}, which drove the test bed, was ended. "
+        words = f"Process {process}, which operated the test bed, was ended. "
     bed = open_bed(name)
     try:
         bed.actuator.stop()
     finally:
         bed.close()
-    return f"{words}The motor stands, and all its lines are off."
+    return f"{words}The motor is at rest, and all lines of its controller are off."

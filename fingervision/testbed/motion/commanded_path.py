@@ -15,7 +15,7 @@ class _Piece:
     begin_s: float
     from_mm: float
     motion: MotionProfile
-    # Broken off then, if it was.
+    # End of the motion; earlier than planned if the motion was interrupted.
     until_s: float
 
 

@@ -1,10 +1,11 @@
 """Interpolation of a stage's position between the steps of its encoder, from the times of step transitions.
 
 An encoder resolves the position to one step; at a step transition the stage is exactly at the border of two steps.
-Between two such borders the stage is assumed to move at constant speed; its stopping position follows from its speed
-until the controller reports the end of the motion. Without interpolation, an encoder step of 30 µm causes a standard
-uncertainty of 9 µm (30 / sqrt 12), which is 67 µm of gap, and play would keep that error during a whole stop. With
-transitions time-stamped to 4 µs, the uncertainty is a few nanometres; with 200 readings per second at 0.5 mm/s, 1 µm.
+Between the borders of two steps the stage is assumed to move at constant speed; its stopping position follows from its
+speed until the controller reports the end of the motion. Without interpolation, an encoder step of 30 µm causes a
+standard uncertainty of 9 µm (30 / sqrt 12), which is 67 µm of gap; with play, the error remains the same during a whole
+stop. With transitions time-stamped to 4 µs, the uncertainty is a few nanometres; with 200 readings per second at 0.5
+mm/s, it is 1 µm.
 """
 
 from bisect import bisect_right
@@ -13,14 +14,16 @@ from dataclasses import dataclass
 
 from fingervision.testbed.reading import Reading
 
-# Borders that the speed of a motion is taken from.
+# Number of step transitions from which the speed of a motion is computed.
 BORDERS_FOR_SPEED = 6
-# A stage that is slower than its step in so much time is taken to go on as before: with the half second that rows wait
-# for company, less than a second is lost where the program is killed.
+# Longest wait for the next step transition; for a slower stage, the position is extrapolated at the last speed. Rows
+# wait another half second before they are written together, so that less than a second is lost if the program is
+# killed.
 WAIT_FOR_BORDER_S = 0.4
-# Steps between two readings up to which exactly one border was passed; readings are whole steps.
+# Largest change between two readings, in encoder steps, that means exactly one step transition; readings are whole
+# steps.
 MOST_FOR_ONE_BORDER = 1.5
-# Knots that are kept: a frame looks back over this wait, and no further.
+# Number of known positions that are kept: the position at a frame is requested at most `WAIT_FOR_BORDER_S` later.
 MOST_KNOTS = 4000
 
 
@@ -45,10 +48,10 @@ class StageTrack:
         self._step_mm = step_mm
         self._knots: deque[Knot] = deque(maxlen=MOST_KNOTS)
         self._times: deque[float] = deque(maxlen=MOST_KNOTS)
-        # Borders passed in the motion under way.
+        # Step transitions during the present motion.
         self._borders: deque[Knot] = deque(maxlen=BORDERS_FOR_SPEED)
         self._last: Reading | None = None
-        # Whether it stopped after a way too short for its speed to be known: anywhere in its cell.
+        # Whether the stage stopped before its speed was known: its position within the encoder step is then unknown.
         self._lost = False
 
     def add(self, reading: Reading) -> None:
@@ -71,8 +74,8 @@ class StageTrack:
                 self._note(Knot(between_s, self._knots[-1].position_mm))
         several = abs(reading.value - last.value) > MOST_FOR_ONE_BORDER * self._step_mm
         if several and not (last.moving and reading.moving):
-            # The stage speeds up or slows down between these readings, and borders were passed at unknown times: it is
-            # where each reading says, not half-way between them.
+            # The stage accelerates or decelerates between these readings, and step transitions occurred at unknown
+            # times: use the readings themselves, not the middle between two readings.
             if not starts:
                 self._note(Knot(last.device_s, last.value))
             self._note(Knot(reading.device_s, reading.value))
@@ -95,7 +98,7 @@ class StageTrack:
         device_s : float
             Time, not later than the newest reading.
         at_once : bool
-            Whether to use what is known now, instead of waiting for further readings.
+            Whether to use the present readings only, instead of waiting for further readings.
 
         Returns
         -------
@@ -111,7 +114,7 @@ class StageTrack:
                 return None
             return self._onwards_mm(device_s, self._last.value)
         if len(self._knots) == 1:
-            # Before the first reading: nothing else is known.
+            # Before any motion, only the first reading is known.
             return self._knots[0].position_mm
         after = max(bisect_right(self._times, device_s), 1)
         a, b = self._knots[after - 1], self._knots[after]

@@ -1,10 +1,10 @@
 """Trapezoidal speed profile of one motion: acceleration, constant speed, deceleration.
 
-The formulas are those of uniformly accelerated motion. With equal acceleration and deceleration, a triangular speed
-profile of distance s and time T has the peak speed v = 2 s / T and the acceleration a = 4 s / T^2; a trapezoidal
-profile of top speed v takes T = s / v + v / a. The profile that a real controller uses for a block specified by its
-cycle time is not published. The profile assumed here has the least acceleration, and so the least force, that does not
-exceed the top speed.
+The formulas of the profile are those of uniformly accelerated motion. With equal acceleration and deceleration, a
+triangular speed profile of distance s and time T has the peak speed v = 2 s / T and the acceleration a = 4 s / T^2; a
+trapezoidal profile of top speed v takes T = s / v + v / a. The profile that a real controller uses for a block
+specified by its cycle time is not published. Among the profiles that do not exceed the top speed, the assumed profile
+has the least acceleration, and so the least force.
 """
 
 from dataclasses import dataclass

@@ -12,7 +12,7 @@ def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
     Raises
     ------
     LimitError
-        The sentence says the limit and what was asked for.
+        The message states the limit and the requested value.
     """
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
         raise LimitError(
@@ -30,7 +30,7 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
     Raises
     ------
     LimitError
-        The sentence says the limit and what was asked for.
+        The message states the limit and the requested value.
     """
     if not 0.0 <= speed_mm_s <= limits.speed_mm_s:
         raise LimitError(

@@ -7,7 +7,7 @@ from fingervision.domain.step_data import CycleTime, Step, StepData
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.motion.motion_profile import MotionProfile, profile, shortest_s
 
-# A target may pass a limit by the rounding of decimal fractions, not by more.
+# Tolerance of a limit for the rounding of decimal fractions.
 ROUNDING = 1e-9
 MM_PER_M = 1000.0
 
@@ -55,8 +55,8 @@ def planned(number: int, step: Step, from_mm: float, limits: StageLimits) -> Pla
     Raises
     ------
     LimitError
-        The motion leaves the stroke, is faster than the stage, or needs more force; the sentence says which and by how
-        much, and for a time that is too short the shortest.
+        The motion leaves the stroke, is faster than the stage, or needs more force; the message names the limit and the
+        excess and, if the positioning time is too short, the shortest possible time.
     """
     to_mm = step.end_mm(from_mm)
     lower_mm, upper_mm = limits.lower_mm - ROUNDING, limits.upper_mm + ROUNDING
@@ -122,7 +122,7 @@ def planned_sequence(data: StepData, limits: StageLimits, from_mm: float | None 
     Raises
     ------
     LimitError
-        A motion cannot be done.
+        A motion cannot be executed.
     """
     motions: list[PlannedMotion] = []
     at_mm = data.start_mm if from_mm is None else from_mm

@@ -10,7 +10,8 @@ from fingervision.domain.errors import LimitError
 from fingervision.domain.step_data import Coordinates, CycleTime, Operation, Step
 from fingervision.testbed.motion.motion_profile import profile
 
-# Targets are typed with three decimals, and sums of steps round; the stage itself stands within 0.09 mm.
+# Tolerance for targets with three decimals and for the rounding of sums of steps; the accuracy of the stage itself is
+# 0.09 mm.
 SAME_MM = 1e-3
 SAME_SPEED = 0.01
 MOST_BLOCKS = 200
@@ -28,8 +29,9 @@ def route(
 ) -> tuple[int, ...]:
     """Numbers of the blocks that lead to a position without exceeding the requested speed.
 
-    A single absolute block is preferred to a repeated relative block, and the latter to an absolute block followed by
-    relative ones; among several possibilities the fastest is chosen, then that with the fewest blocks.
+    A single absolute block is preferred to a repeated relative block, and a repeated relative block to an absolute
+    block followed by relative blocks. Among several possibilities, the fastest is chosen, and among equally fast ones
+    that with the fewest blocks.
 
     Parameters
     ----------
@@ -47,7 +49,7 @@ def route(
     Raises
     ------
     LimitError
-        No blocks lead there, or only faster ones.
+        No blocks lead to the position, or only blocks that are faster than requested.
     """
     if at_mm is not None and abs(to_mm - at_mm) <= SAME_MM:
         return ()
@@ -116,7 +118,7 @@ def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float
     if not fine:
         sign = "positive" if speed_mm_s > 0.0 else "negative"
         raise LimitError(
-            f"A jog at {speed_mm_s:g} mm/s must have a relative step with a {sign} target that is no faster, but the "
-            "controller has none: store one in it."
+            f"A jog at {speed_mm_s:g} mm/s must have a stored relative step with a {sign} target and at most this "
+            "speed, but the controller has none: store such a step."
         )
     return max(fine, key=lambda number: speeds[number])

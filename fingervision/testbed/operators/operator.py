@@ -4,7 +4,7 @@ from typing import Protocol
 
 
 class Operator(Protocol):
-    """Protocol of the operator: a person at a real test bed; at a simulated one the steps are performed at once."""
+    """Protocol of the operator: a person at a real test bed; a simulated test bed performs the steps at once."""
 
     def turn_part(self) -> None:
         """Turn the part by 180 degrees in the picture."""

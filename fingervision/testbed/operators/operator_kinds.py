@@ -18,11 +18,11 @@ class AtTheBed:
 
     def shift_picture(self) -> None:
         """Ask the person on the terminal to shift the picture, and wait for the confirmation."""
-        self._ask("Shift the camera, so that the fingers stand elsewhere in the picture.")
+        self._ask("Shift the camera, so that the fingers appear at another place in the picture.")
 
     def put_in_slot(self, size_mm: float) -> None:
         """Ask the person on the terminal to insert the reference slot, and wait for the confirmation."""
-        self._ask(f"Put the reference slot of {size_mm:g} mm in the fingers' plane before the camera.")
+        self._ask(f"Put the reference slot of {size_mm:g} mm in the plane of the fingers, in front of the camera.")
 
     def take_out_slot(self) -> None:
         """Ask the person on the terminal to remove the reference slot, and wait for the confirmation."""

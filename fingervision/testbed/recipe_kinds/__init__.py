@@ -43,5 +43,5 @@ def frames_of(section: Section) -> Frames:
     if value == CONTINUOUS:
         return None
     if isinstance(value, str):
-        section.refuse("frames", f'must be "{CONTINUOUS}" or a number for each point, but is {value!r}.')
+        section.refuse("frames", f'must be "{CONTINUOUS}" or a number of frames for each point, but is {value!r}.')
     return section.whole("frames", low=1, high=MOST_FRAMES)

@@ -7,7 +7,7 @@ from fingervision.testbed.recipe_kinds import Asked, frames_of
 from fingervision.testbed.run.motion_segments import Go, Stand
 
 KEYS = ("at_mm", "seconds", "frames")
-# A hold states no speed: slow enough for a webcam to follow the way there.
+# Speed of the motion to the position, because a hold states no speed: slow enough for a webcam.
 APPROACH_MM_S = 0.5
 
 

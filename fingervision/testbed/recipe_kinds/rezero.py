@@ -10,5 +10,5 @@ KEYS = ()
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one action; it begins a new run."""
+    """Yield one action, which begins a new run."""
     yield Rezero(), "kind"

@@ -7,7 +7,7 @@ from fingervision.testbed.recipe_kinds import CONTINUOUS, Asked, frames_of
 from fingervision.testbed.run.motion_segments import Go, Swing
 
 KEYS = ("mean_mm", "amplitude_mm", "frequency_hz", "cycles", "frames")
-# The stage goes to the mean as fast as it swings through it, but no slower than this.
+# The stage moves to the mean position at the highest speed of the sine, but at least at this speed.
 SLOWEST_APPROACH_MM_S = 0.05
 
 
@@ -17,7 +17,7 @@ def acts(section: Section, at_mm: float) -> Iterator[Asked]:
     frequency_hz = section.number("frequency_hz", above=0.0, high=10.0)
     cycles = section.number("cycles", 1.0, above=0.0)
     if frames_of(section) is not None:
-        section.refuse("frames", f'must be "{CONTINUOUS}" for a sine, which has no points to stand at.')
+        section.refuse("frames", f'must be "{CONTINUOUS}" for a sine, which has no points of rest.')
     swing = Swing(mean_mm, amplitude_mm, frequency_hz, cycles)
     if at_mm != mean_mm:
         yield Go(mean_mm, max(fastest_mm_s(swing), SLOWEST_APPROACH_MM_S)), "mean_mm"
@@ -25,5 +25,5 @@ def acts(section: Section, at_mm: float) -> Iterator[Asked]:
 
 
 def fastest_mm_s(swing: Swing) -> float:
-    """Highest speed, at the mean position: 2 pi f A (mm/s)."""
+    """Highest speed, at the mean position: 2 pi times frequency times amplitude (mm/s)."""
     return 6.283185307179586 * swing.frequency_hz * swing.amplitude_mm

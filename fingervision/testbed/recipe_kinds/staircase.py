@@ -19,6 +19,7 @@ def acts(section: Section, at_mm: float) -> Iterator[Asked]:
     for k in range(steps + 1):
         level_mm = from_mm + (to_mm - from_mm) * k / steps
         if k > 0 or at_mm != from_mm:
-            # With a number of frames, those on the level count; the way there is not recorded.
+            # If a number of frames is stated, these frames are recorded on the level; the motion to the level is not
+            # recorded.
             yield Go(level_mm, speed, None if frames is None else 0), "to_mm" if k == steps else "from_mm"
         yield Stand(dwell_s, frames), "dwell_s"

@@ -58,7 +58,7 @@ class Controls:
         """
         self._stop_motor = stop_motor
         if threading.current_thread() is not threading.main_thread():
-            # Signals are the main thread's alone; whoever runs a recipe elsewhere stops it by these controls.
+            # Only the main thread receives signals; a recipe that runs in another thread is stopped by these controls.
             try:
                 yield
             finally:

@@ -97,9 +97,9 @@ class Leg:
             case Go(to_mm, speed, _):
                 return f"to {to_mm:g} mm at {speed:g} mm/s"
             case Stand(seconds, _):
-                return f"stand for {seconds:g} s"
+                return f"rest for {seconds:g} s"
             case Swing(mean_mm, amplitude_mm, frequency_hz, _):
-                return f"swing about {mean_mm:g} mm by {amplitude_mm:g} mm at {frequency_hz:g} Hz"
+                return f"oscillate about {mean_mm:g} mm with an amplitude of {amplitude_mm:g} mm at {frequency_hz:g} Hz"
             case Close(speed, force_n):
                 return f"close at {speed:g} mm/s below {force_n:g} N"
             case Slot(size_mm, _):

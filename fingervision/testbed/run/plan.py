@@ -13,12 +13,12 @@ from fingervision.testbed.recipe_kinds import kind_of
 from fingervision.testbed.recipe_kinds.sine import fastest_mm_s
 from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Slot, Stand, Swing
 
-# Rounding of positions in a recipe and in a limit is no trespass.
+# Tolerance of the limits for the rounding of positions.
 SLACK_MM = 1e-9
-# What one frame at a point costs beside its own time: settling.
+# Time for settling before the frames at a point.
 SETTLE_S = 0.3
 REZERO_S = 2.0
-# What takes longer than a month is a slip: no run of a bench does.
+# A run that takes longer than a month is assumed to be a mistake in the recipe.
 LONGEST_S = 30.0 * 86400.0
 
 
@@ -70,7 +70,7 @@ def plan(
     Raises
     ------
     DataError
-        A step is beyond a limit, or makes no sense: which line, and by how much.
+        A step is beyond a limit, or not valid; the message names the line and the excess.
     """
     if recipe.below_force_n > limits.force_n:
         top = Section(recipe.steps[0].path, recipe.text, "", {})
@@ -103,14 +103,14 @@ def timed_segments(
     at_mm : float
         Position of the stage before the step.
     limits : SoftLimits
-        Limits at which closing until contact ends at the latest.
+        Soft limits; closing until contact ends there at the latest.
     rate_hz : float
         Frame rate of the camera.
 
     Raises
     ------
     DataError
-        The step makes no sense by itself.
+        The settings of the step are not valid.
     """
     for act, key in kind_of(section).acts(section, at_mm):
         leg = Leg(act, number, section, key)
@@ -130,7 +130,7 @@ def _lasts(leg: Leg, at_mm: float, limits: SoftLimits, rate_hz: float) -> tuple[
         case Swing(mean_mm, _, frequency_hz, cycles):
             return cycles / frequency_hz, mean_mm
         case Close(speed, _):
-            # Where it meets something is not known: whatever follows begins with its own way.
+            # The position of contact is unknown, so that every following step begins with a motion of its own.
             return abs(at_mm - limits.lower_mm) / speed, limits.lower_mm - SLACK_MM
         case Rezero():
             return REZERO_S, 0.0

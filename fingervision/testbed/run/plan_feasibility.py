@@ -27,7 +27,8 @@ def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: floa
                     raise LimitError(
                         f"kind in {leg.section.at('kind')} cannot be executed: a sine consists of many short moves to "
                         "intermediate positions, but this actuator can only move to the target positions of its step "
-                        "data. Use a triangle or a staircase between two of these positions. Nothing was moved."
+                        "data. Use a triangle or a staircase between two target positions of the step data. Nothing "
+                        "was moved."
                     )
                 to_mm, speed_mm_s = mean + amplitude, tau * frequency_hz * abs(amplitude)
             case Close(speed):

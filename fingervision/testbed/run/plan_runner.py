@@ -15,11 +15,12 @@ from fingervision.testbed.run.plan import Plan
 from fingervision.testbed.run.run_record import Counts
 from fingervision.testbed.run.safety_monitor import Watch
 
-# The clocks are joined by so many frames before anything moves; in the last of them the fingers are looked for.
+# Number of frames that synchronise the clocks before anything moves; the last frames must show the fingers.
 FIRST_FRAMES = 75
 # A recorded run begins at rest.
 REST_FRAMES = 5
-# A stage that takes less than this share of the time foreseen does not keep its speed: ramps only make it longer.
+# A stage that takes less than this share of the expected time is faster than commanded, because ramps only make a
+# motion longer.
 LEAST_SHARE = 0.5
 
 Progress = Callable[[float, float], None]
@@ -40,7 +41,7 @@ class Runner:
     watch : Watch
         Monitor through which the test bed is operated.
     on_progress : callable
-        Called with the seconds done, and the seconds expected in all.
+        Called with the elapsed part of the expected duration and the whole expected duration (s).
     """
 
     plan: Plan
@@ -61,19 +62,20 @@ class Runner:
         Raises
         ------
         StoppedError
-            The user ended it.
+            The user ended the run.
         DeviceError, LimitError, StateError
-            A limit was met, an instrument failed, or no fingers are in view; the motor stands then.
+            A limit was reached, an instrument failed, or no fingers are in view; the motor is then at rest.
         """
         watch, actuator, replays = self.watch, self.watch.bed.actuator, self.watch.bed.replays
         try:
-            # A simulation's motor moves only while this thread lets time pass.
+            # The motor of a simulation moves only while this thread lets time pass.
             with watch.controls.listening((lambda: None) if replays else actuator.stop):
                 self._execute()
         except BaseException:
             actuator.stop()
             if not replays:
-                # Where the stage was last is as well known as it ever will be; a bed that replays sees it again.
+                # No later readings will improve the last positions: write their rows now. A test bed that replays
+                # records these frames again.
                 with suppress(FingervisionError):
                     watch.record.write(at_once=True)
             raise
@@ -93,7 +95,8 @@ class Runner:
     def _execute(self) -> None:
         watch, record = self.watch, self.watch.record
         if not watch.bed.replays:
-            # A real stage is sent to its reference first: where it stands nobody knows. Not without fingers in view.
+            # The position of a real stage is unknown at the start: home the stage first, but only with the fingers in
+            # view.
             watch.find_fingers()
             watch.say(f"homed: {manual_control.home(watch.bed):.3f} mm")
         for _ in range(FIRST_FRAMES - 1):
@@ -102,7 +105,7 @@ class Runner:
         first = self._first_leg()
         total_s, done_s = sum(self.plan.seconds), sum(self.plan.seconds[:first])
         foreseen_s = moved_s = 0.0
-        record.event("began", f"{len(self.plan.legs)} legs.")
+        record.event("began", f"The plan has {len(self.plan.legs)} motion segments.")
         self._rest(first)
         for number, (leg, seconds) in enumerate(zip(self.plan.legs, self.plan.seconds, strict=True)):
             if number < first:
@@ -120,14 +123,16 @@ class Runner:
         record.write(at_once=True)
         if moved_s < LEAST_SHARE * foreseen_s:
             self._warn_of_speed(moved_s, foreseen_s)
-        record.event("clocks", "The instruments' clocks beside the bed's.", **watch.sight.clocks())
-        record.event("ended", f"{record.counts.recorded} frames.")
+        record.event(
+            "clocks", "The instruments' clocks were compared with the test bed's clock.", **watch.sight.clocks()
+        )
+        record.event("ended", f"{record.counts.recorded} frames were recorded.")
 
     def _warn_of_speed(self, moved_s: float, foreseen_s: float) -> None:
         words = (
-            f"warning: the recorded motions took {moved_s:.3g} s, but take {foreseen_s:.3g} s at the speeds of the "
-            "recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract tests; "
-            "`fingervision bed check` prints their command line."
+            f"warning: the recorded motions took {moved_s:.3g} s, but should take {foreseen_s:.3g} s at the speeds of "
+            "the recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract "
+            "tests; `fingervision bed check` prints their command line."
         )
         self.watch.say(words)
         self.watch.record.event("too_fast", words)

@@ -109,7 +109,7 @@ def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
         try:
             segments = tuple(timed_segments(number, section, at_mm, bed.limits, bed.rate_hz))
         except FingervisionError:
-            # The step makes no sense by itself: there is no motion to describe.
+            # The settings of the step are not valid, so that there is no motion to describe.
             segments = ()
         steps.append(_described(number, section, segments, at_mm, bed, refusal))
         at_mm = steps[-1].to_mm
@@ -127,7 +127,7 @@ def _described(
     for segment in segments:
         if isinstance(swing := segment.leg.act, Swing):
             reached += [swing.mean_mm - swing.amplitude_mm, swing.mean_mm + swing.amplitude_mm]
-    # Beyond the limits the gripper's model says nothing that will ever be true.
+    # Beyond the limits, predictions of the gripper's model are meaningless, because the test bed does not go there.
     within = bed.limits.lower_mm - SLACK_MM <= min(reached) and max(reached) <= bed.limits.upper_mm + SLACK_MM
     gap_mm, force_n = _foretold(min(reached), max(reached), bed) if within and refusal is None else (None, None)
     return CheckedStep(

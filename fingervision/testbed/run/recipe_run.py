@@ -65,7 +65,7 @@ def run_recipe(
     hidden : Hidden
         Effects injected into the test bed.
     before : sequence of SampleRow
-        Rows of an earlier run on this test bed that is continued: its numbering and its clock go on.
+        Rows of an earlier run on this test bed, whose numbering and clock this run continues.
     controls : Controls, optional
         Controls for pause and stop.
     on_progress, say, on_plan, on_row : callable
@@ -75,14 +75,15 @@ def run_recipe(
     Raises
     ------
     FingervisionError
-        In a sentence; the motor stands, and the folder is valid.
+        The run failed; the motor is at rest, and the folder remains valid.
     """
     if not bed.replays:
-        # The first frame may hold all threads up for longer than a board lets its motor go on without a word.
+        # Compile the measuring functions now: at the first frame, compilation could block all threads for longer than
+        # the board runs its motor without a message.
         rehearse()
     sight = Sight(bed)
     sight.position.read()
-    # A real stage is sent to its reference before the first leg.
+    # A real stage is homed before the first motion segment.
     at_mm = sight.position.newest if bed.replays else 0.0
     planned = plan(recipe, bed.limits, bed.model, at_mm, sight.rate_hz, sight.width_mm)
     check_moves(planned, bed.actuator, bed.limits, at_mm)

@@ -34,7 +34,7 @@ def measured_slot(frames: Sequence[Frame], size_mm: float, scale: Scale) -> dict
     Raises
     ------
     DeviceError
-        No slot is seen.
+        No slot is visible.
     """
     pictures = [KnownSize(f"frame {frame.index}", "slot", size_mm, 0.0, to_grey(frame.pixels)) for frame in frames]
     try:
@@ -49,7 +49,8 @@ def measured_slot(frames: Sequence[Frame], size_mm: float, scale: Scale) -> dict
     u_px = np.array([width.u_width_px for width in widths])
     found = scale.distances(points, u_px, np.array([width.light for width in widths]))
     mean_mm = float(np.mean(found.value_mm))
-    # Frames share what the rows' own scatter tells; their own scatter among each other averages out.
+    # The uncertainty of the mean follows from the scatter of the frames, or from the scatter of the rows within a
+    # frame, whichever is larger.
     scatter_mm = float(np.std(found.value_mm, ddof=1)) / sqrt(len(widths)) if len(widths) > 1 else 0.0
     u_mm = max(scatter_mm, float(np.mean(found.u_random_mm)) / sqrt(len(widths)))
     return {"measured_mm": mean_mm, "u_random_mm": u_mm, "ratio": mean_mm / size_mm}

@@ -41,7 +41,7 @@ def contents(path: Path) -> list[str]:
 
 def refuse_others(path: Path, held: str) -> NoReturn:
     """Refuse a folder that contains other files, among which the run's files would be hard to find."""
-    raise OutputError(f"--out must be a new or empty folder, but {path} holds {held}: name another.")
+    raise OutputError(f"--out must be a new or empty folder, but {path} contains {held}: name another folder.")
 
 
 def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
@@ -52,7 +52,7 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
     Raises
     ------
     DataError, OutputError
-        The folder holds something else, a finished run, or one of another recipe or bed.
+        The folder contains other files, a finished run, or a run of another recipe or test bed.
     """
     held = contents(path)
     if not held:
@@ -61,9 +61,11 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
         refuse_others(path, held[0])
     about = _about(path)
     if about.get("complete"):
-        raise OutputError(f"The run in {path} is finished already: name another folder with --out, or remove that one.")
+        raise OutputError(
+            f"The run in {path} is finished already: name another folder with --out, or remove this folder."
+        )
     if not read_samples(path / SAMPLES):
-        # Nothing was recorded: there is nothing to go on with, and nothing to lose.
+        # No frame was recorded: the run starts again, and no data are lost.
         (path / EVENTS).unlink(missing_ok=True)
         return None
     if about.get("recipe") != recipe.text:

@@ -32,7 +32,7 @@ from fingervision.testbed.run.run_metadata import (
 )
 from fingervision.testbed.simulation.injected_effects import Hidden
 
-# FFV1 of a picture with noise takes up to this many bytes a pixel.
+# Largest size of a picture with noise in FFV1, in bytes per pixel.
 BYTES_PER_PX = 0.8
 
 
@@ -50,12 +50,12 @@ class BedRunFolder:
     hidden : Hidden
         Injected effects, whose hash is stored: a simulation with other effects counts as another test bed.
     before : sequence of SampleRow
-        Rows of an earlier run that this one continues; both together are written to joined.csv.
+        Rows of an earlier run that this run continues; the rows of both runs are written to joined.csv.
 
     Raises
     ------
     FingervisionError
-        The folder holds something else, a finished run or another recipe's, is in use, or cannot be written.
+        The folder contains other files, a finished run or a run of another recipe, is in use, or cannot be written.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class BedRunFolder:
         if self.before:
             write_rows(self.path / JOINED, [*self.before, *read_samples(self.path / SAMPLES)])
         self._about |= {**found, "joined": JOINED if self.before else None}
-        # A recipe that only asks the operator, for a reference slot say, records no frame.
+        # A recipe with requests to the operator only, such as for a reference slot, records no frame.
         names = [name for name in (VIDEO, SAMPLES) if (self.path / name).exists()]
         self._about["sha256"] = {name: self._files.sha256(name) for name in names}
         self._files.write_about(self._about, complete=True)
@@ -154,12 +154,14 @@ def rows_before(path: Path) -> list[SampleRow]:
     Raises
     ------
     DataError
-        The folder holds no finished run.
+        The folder contains no finished run.
     """
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
     rows = read_samples(table)
     if not rows:
-        raise DataError(f"--after must be the folder of an earlier run on the test bed, but {path} holds none.")
+        raise DataError(
+            f"--after must be the folder of an earlier run on the test bed, but {path} contains no finished run."
+        )
     return rows
 
 

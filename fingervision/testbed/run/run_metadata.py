@@ -22,7 +22,8 @@ from fingervision.testbed.simulation.injected_effects import Hidden
 
 SAMPLES, SIMULATION, RECIPE, JOINED = "samples.csv", "simulation.csv", "recipe.toml", "joined.csv"
 KIND = "bed run"
-# Rows of simulation.csv, and how far it reaches beyond the bed's limits: an encoder's step says more than there is.
+# Number of rows of simulation.csv, and its margin beyond the test bed's limits: readings in encoder steps may lie
+# beyond them.
 SIMULATED_ROWS, BEYOND_LIMITS_MM = 201, 0.06
 
 
@@ -36,7 +37,7 @@ def write_expected(path: Path, model: Model, limits: SoftLimits) -> None:
     """Write the gap that the model predicts within the test bed's limits."""
     low_mm, high_mm = limits.lower_mm - BEYOND_LIMITS_MM, limits.upper_mm + BEYOND_LIMITS_MM
     inputs = np.linspace(low_mm, high_mm, SIMULATED_ROWS)
-    # Without its force: what the fingers press on is no property of the gripper.
+    # The force is left out, because it depends on the object between the fingers, not only on the gripper.
     write_simulation(path, inputs, replace(model.respond(inputs), force_n=None))
 
 

@@ -11,9 +11,10 @@ from fingervision.storage.samples_csv import MM_PLACES, SampleRow
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.synchronised_acquisition import Look
 
-# A run that follows another begins at least so much after it; one that goes on, so much after what it goes on with.
+# Smallest times between the last row of an earlier run and the start of a run that follows it, or that continues it
+# after an interruption.
 PAUSE_S, GAP_S = 5.0, 1.0
-# Word in the name of a run whose part lies turned by 180 degrees.
+# Word in the label of a run in which the part is turned by 180 degrees.
 TURNED = "turned"
 
 PlaceAt = Callable[[float, bool], float | None]
@@ -33,12 +34,12 @@ class Counts:
 
 
 class RunRecord:
-    """Numbers runs and frames, and writes each of them once.
+    """Numbers runs and frames, and writes each frame once.
 
     Parameters
     ----------
     folder : BedRunFolder
-        Folder to which they are written.
+        Folder to which the frames are written.
     place_at : callable
         Position of the stage as a function of time.
     on_row : callable, optional
@@ -50,7 +51,8 @@ class RunRecord:
         self._place_at, self._on_row = place_at, on_row
         self._run, self.turned, self._rezeroed = 1, False, False
         self._rows = self._with_gap = self._lost = self._events = 0
-        # Zero of the run's time on the camera's clock, once there is a frame, and the run's time there.
+        # Camera time at which the time in the folder is zero (None before the first frame), and the folder's time at
+        # the start of this run.
         self._zero_s: float | None = None
         self._base_s = 0.0
         self._waiting: deque[tuple[SampleRow, float, Frame]] = deque()
@@ -60,7 +62,7 @@ class RunRecord:
         """Number of frames so far by status."""
         return Counts(self._rows, self._with_gap, self._lost)
 
-    # How it begins.
+    # Start of a run.
 
     def follow_replayed(self, last: SampleRow) -> None:
         """Continue after the last row of an earlier run, on a test bed whose camera clock continues from there."""
@@ -88,7 +90,7 @@ class RunRecord:
 
     @property
     def label(self) -> str:
-        """Label of the run: its number, and what a diagnosis must know about it."""
+        """Label of the run: its number, and words for the diagnosis (re-zeroed, turned)."""
         words = [str(self._run), *([TURNED] if self.turned else []), *([REZEROED] if self._rezeroed else [])]
         return " ".join(words)
 

@@ -14,9 +14,9 @@ from fingervision.testbed.run.motion_segments import Close, Leg
 from fingervision.testbed.run.run_record import RunRecord
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 
-# The fingers must be seen in one of so many frames.
+# Number of frames of which at least one must show the fingers.
 FRAMES_TO_FIND_FINGERS = 3
-# While a simulation that goes as fast as it can is paused, it looks so often whether it shall go on.
+# Interval at which a paused simulation without a pace checks whether the run was continued.
 LOOK_EVERY_S = 0.05
 
 Say = Callable[[str], None]
@@ -90,7 +90,7 @@ class Watch:
         Raises
         ------
         DeviceError, LimitError, StoppedError
-            As `look`, or the gap is beyond its limit.
+            As in `look`, or the gap is beyond its limit.
         """
         look = self.look()
         if record and (there := self.record.there_already()) is not None:
@@ -118,8 +118,8 @@ class Watch:
             if measured.status is Status.OK:
                 return
         raise DeviceError(
-            f"The camera must show both fingers before anything moves, but does not: {words} "
-            "Bring both into the picture (camera, light, focus), and run the recipe again."
+            f"The camera must show both fingers before anything moves, but does not: {words} Bring both fingers into "
+            "the picture (camera, light, focus), and run the recipe again."
         )
 
     def _end_if_stopped(self) -> None:
@@ -160,7 +160,7 @@ class Watch:
                         self.see(record=record)
                     return
                 broken_off |= self.wait_while_paused(record=record)
-            # A simulation's time stands while it is paused: nothing was broken off.
+            # The time of a simulation stops during a pause, so that its motion was not interrupted.
             if self.bed.replays or not (broken_off or self.controls.halted):
                 return
 
@@ -168,7 +168,7 @@ class Watch:
         """Wait while the run is paused; return whether there was a pause."""
         if not self.controls.paused:
             return False
-        self.say("Paused: p and Enter go on, q and Enter end the run.")
+        self.say("The run is paused: type p and Enter to continue it, or q and Enter to end it.")
         began_s = self.bed.clock.now_s()
         if self.bed.replays:
             while self.controls.waits:

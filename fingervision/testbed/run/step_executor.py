@@ -12,13 +12,14 @@ from fingervision.testbed.run.reference_slot import measured_slot
 from fingervision.testbed.run.safety_monitor import Watch
 from fingervision.testbed.run.synchronised_acquisition import Look
 
-# The picture is still when so many frames in a row differ by less than so many times their own uncertainty.
+# A picture counts as at rest if the gaps of STILL_FRAMES successive frames differ by less than STILL_SIGMAS times their
+# uncertainty.
 STILL_FRAMES, STILL_SIGMAS = 4, 4.0
-# A picture that is not still by then is measured as it is, and said so.
+# A picture that is not at rest after this time is measured nevertheless, with a note in the events.
 STILL_WITHIN_S = 5.0
-# A new reference is only as good as the rest before it.
+# Rest after homing, because a moving stage would give a wrong reference.
 REST_AFTER_HOMING_S = 1.0
-# A sine is driven in pieces of so many frames.
+# Number of frames per piece of the motion that approximates a sine.
 SWING_FRAMES = 3
 SLOT_FRAMES = 10
 
@@ -27,7 +28,8 @@ def go(watch: Watch, act: Go) -> None:
     """Move to a position."""
     watch.follow(partial(watch.bed.actuator.move, act.to_mm, act.speed_mm_s), record=act.frames is None)
     if act.frames is None:
-        # A corner is seen: what has a memory remembers it, and no sample beside it tells where it was.
+        # Record a frame at each reversal: effects with memory depend on its position, which samples beside it do not
+        # show.
         watch.see(record=True)
     _point(watch, act.frames)
 
@@ -70,7 +72,7 @@ def close(watch: Watch, act: Close) -> None:
 
     bed = watch.bed
     watch.follow(partial(bed.actuator.move, bed.limits.lower_mm, act.speed_mm_s), record=True, until=met)
-    why = felt[0] if felt else "no contact was found down to the test bed's limit of position"
+    why = felt[0] if felt else "no contact was found before the position reached the test bed's limit"
     watch.record.event("closed", f"Closing ended: {why}.", input_mm=watch.sight.position.newest)
 
 
@@ -121,7 +123,7 @@ def _settle(watch: Watch) -> None:
         last = [*last[-STILL_FRAMES + 1 :], row]
         if len(last) == STILL_FRAMES and _still(last):
             return
-    words = f"The picture was not still after {STILL_WITHIN_S:g} s, and is measured as it is."
+    words = f"The picture was not at rest after {STILL_WITHIN_S:g} s, and is measured nevertheless."
     watch.record.event("not_still", words)
 
 

@@ -20,7 +20,7 @@ from fingervision.testbed.motion.encoder_interpolation import StageTrack
 from fingervision.testbed.reading import Reading
 from fingervision.vision.pipeline import Settings, measure_frame
 
-# Readings that are kept: a frame looks back over its own latency, which is far less at 200 readings a second.
+# Number of readings that are kept: at 200 readings per second they cover far more than the latency of a frame.
 READINGS_KEPT = 2000
 
 

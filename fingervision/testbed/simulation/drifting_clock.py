@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Quartz on microcontroller boards and in webcams: tens of parts in a million (data sheets of HC-49 crystals, 30 ppm).
+# Relative rate error of quartz crystals on microcontroller boards and in webcams (data sheets of HC-49 crystals: 30
+# ppm).
 LARGEST_RATE_ERROR = 3e-5
 BEGAN_WITHIN_S = 1000.0
 

@@ -18,13 +18,13 @@ from fingervision.testbed.simulation.optics import in_the_picture
 
 Array = NDArray[np.float64]
 
-# The stage's motion is followed in so many steps a frame, so that what creeps and rings does so in between.
+# Time steps per frame in which the stage's motion is followed, so that creep and vibration are computed between frames.
 STEPS_A_FRAME = 10
-# Until a camera says when it looks.
+# Frame period until a camera sets its exposure times.
 USUAL_PERIOD_S = 0.04
-# So much further than asked is computed at once while the stage stands.
+# Time beyond the requested time that is computed in advance while the stage is at rest.
 AHEAD_S = 2.0
-# What the fingers press on while they are kept from closing, felt at the drive.
+# Stiffness of the contact between the fingers, as seen at the drive.
 CONTACT_N_PER_MM = 3.0
 
 
@@ -96,7 +96,7 @@ class SimulatedGripper:
     def at(self, time_s: float) -> Response:
         """Positions of the measuring points, and the force, at one time of the test bed; arrays of one element.
 
-        Before the first motion, these are the positions at rest.
+        Before the first motion, the positions are those at rest.
         """
         began_s = self._motion.began_s()
         version = (self._motion.version(), len(self._motion.homed_s()), began_s)
@@ -168,11 +168,11 @@ class SimulatedGripper:
         return replace(response, force_n=response.force_n - CONTACT_N_PER_MM * pressed_mm)
 
     def _act(self, effect: DriveEffect, u: Array, history: History) -> Array:
-        # A slip between two frames would land elsewhere than the catalogue's, which is defined on samples, and the
-        # places would drift apart along a run: another effect, not another form of this one.
+        # The catalogue defines some effects on samples. If such an effect (stick-slip, for example) acted between two
+        # frames, its jumps would occur at other positions, and the deviation would grow along a run.
         if not effect.at_frames:
             return effect.act(u, history, self._drive[effect.name])
-        # Runs begin on whole frames for what is looked at with them.
+        # For effects that act on frames, runs begin at a frame.
         borders = [-(-run.start // STEPS_A_FRAME) for run in history.runs] + [-(-u.size // STEPS_A_FRAME)]
         runs = tuple(slice(a, b) for a, b in pairwise(borders) if b > a)
         frames = u[::STEPS_A_FRAME]

@@ -8,7 +8,7 @@ from fingervision.effects import catalogue
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """Effects that act in the simulated parts; the measurement and the diagnosis are not told of them.
+    """Effects that act in the simulated parts; measurement and diagnosis do not receive them.
 
     Parameters
     ----------

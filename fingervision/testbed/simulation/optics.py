@@ -7,7 +7,8 @@ from fingervision.effects import catalogue
 from fingervision.rendering import Camera, RadialLens, Tilt
 from fingervision.testbed.simulation.injected_effects import Hidden
 
-# The keystone alone, as the catalogue has it: so near a plane that the tilt which gives it does not shorten it.
+# Sine of the tilt for a keystone effect as in the catalogue: the camera is then so near that the required tilt hardly
+# shortens the plane.
 TILT_SINE = 0.01
 
 
@@ -40,7 +41,7 @@ def _lens(optics: Optics, k_per_mm2: float) -> Optics:
 
 
 def _tilt(optics: Optics, k_per_mm: float) -> Optics:
-    """Convert x / (1 + k x) in mm to a plane tilted about the vertical axis: k = sin(tilt) / distance."""
+    """Convert the keystone distortion x / (1 + k x) in mm to a tilted plane: k = sin(tilt) / distance."""
     sine = TILT_SINE if k_per_mm > 0.0 else -TILT_SINE
     tilt = Tilt(about_y_deg=degrees(asin(sine)), distance_px=sine / k_per_mm * optics.px_per_mm)
     return replace(optics, camera=replace(optics.camera, tilt=tilt))
@@ -50,9 +51,9 @@ def in_the_picture(name: str) -> bool:
     """Whether a camera effect is applied to the rendered picture itself.
 
     All other camera effects are applied by moving the scene in front of the camera, which is equivalent for drifts and
-    scale errors. An edge bias in the picture would change the gap of round tips by less than that of two straight edges
-    (because the tip moves down as well), which is not `edge_bias` as defined in the catalogue; therefore this effect is
-    also applied by moving the fingers.
+    scale errors. An edge bias in the picture would change the gap of round tips by less than the gap of straight edges,
+    because the tips move down as well. The effect `edge_bias` of the catalogue does not depend on the tips, and is
+    therefore also applied by moving the fingers.
     """
     return catalogue()[name].in_picture is not None
 

@@ -11,9 +11,11 @@ from fingervision.effects import catalogue
 from fingervision.storage.toml_section import Section, read_document
 from fingervision.testbed.simulation.injected_effects import Hidden
 
-# An effect that is named without a size gets so much of what its bounds allow, and so many times its typical size.
+# Size of an effect that is named without a size: this share of the range between its bounds, or this multiple of its
+# typical size.
 SHARE_OF_BOUNDS, TIMES_TYPICAL = 0.2, 3.0
-# Bounds that depend on the data are taken for a run over the paper's inputs: 25 samples a second of 0.05 mm/s.
+# Bounds that depend on the data are computed for a run over the inputs of the published sample: 25 samples per second
+# at 0.05 mm/s.
 USUAL_INPUTS_MM, USUAL_STEP_MM = (-0.45, 1.45), 0.002
 
 
@@ -28,7 +30,7 @@ def hidden_from(words: tuple[str, ...]) -> Hidden:
     UsageError
         An effect or parameter is not in the catalogue, or a value is no number.
     DataError, InputFileError
-        A file cannot be read or makes no sense.
+        A file cannot be read or is not valid.
     """
     effects: dict[str, dict[str, float]] = {}
     for word in words:
@@ -55,7 +57,7 @@ def usual_values(effect: Effect) -> dict[str, float]:
     searched = effect.search(history)
     values = {}
     for p in effect.parameters if isinstance(searched, str) else searched:
-        if p.run is not None:  # where an effect starts is its run's own affair
+        if p.run is not None:  # parameters of single runs keep their defaults
             continue
         if p.typical is not None:
             values[p.name] = min(TIMES_TYPICAL * p.typical, p.upper)

@@ -92,7 +92,7 @@ class Followed:
         readings = self._actuator.readings()
         newest = readings[-1]
         for reading in readings:
-            # Streamed values lie before the newest by what the board's own clock says.
+            # The age of streamed values relative to the newest value follows from the board's own clock.
             at_s = 0.5 * (newest.asked_s + newest.got_s) - (newest.device_s - reading.device_s)
             if not self._time_s or at_s > self._time_s[-1]:
                 self._time_s.append(at_s)

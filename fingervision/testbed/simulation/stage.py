@@ -9,9 +9,10 @@ Array = NDArray[np.float64]
 Piece = tuple[float, float, float, float, float]
 """A piece of the motion: start time, position and speed at the start, acceleration, duration."""
 
-# With 16 m/s2 the paper's stage covers its 10 mm within 50 ms as a triangle of 400 mm/s (v = 2 s / T, a = 4 s / T2).
+# With 16 m/s2, the published stage moves by its 10 mm within 50 ms, with a triangular speed profile up to 400 mm/s (v =
+# 2 s / T, a = 4 s / T^2).
 ACCELERATION_MM_S2 = 16000.0
-# Lead errors of a stage repeat with its position: waves of these periods, in these shares of the accuracy.
+# Lead errors of a stage depend on its position: sinusoids with these periods, and these shares of the accuracy.
 LEAD_PERIODS_MM, LEAD_SHARES = (7.3, 2.9, 1.1), (0.55, 0.3, 0.15)
 
 
@@ -33,7 +34,8 @@ class SimulatedStage:
         self.lower_mm, self.upper_mm = lower_mm, upper_mm
         self._accuracy_mm = accuracy_mm
         self._phases = rng.uniform(0.0, 2.0 * np.pi, len(LEAD_PERIODS_MM))
-        # Replaced as a whole: another thread may stop the stage while this one looks where it is.
+        # This tuple is always replaced as a whole, because another thread may stop the stage while this thread reads
+        # the position.
         self._pieces: tuple[Piece, ...] = ((-np.inf, 0.0, 0.0, 0.0, 0.0),)
         self.homed_s: list[float] = []
         self.version = 0
@@ -56,7 +58,7 @@ class SimulatedStage:
             for period_mm, share, phase in zip(LEAD_PERIODS_MM, LEAD_SHARES, self._phases, strict=True)
         )
         at_zero = sum(share * np.sin(phase) for share, phase in zip(LEAD_SHARES, self._phases, strict=True))
-        # The reference itself is where it is: position 0 has no error.
+        # The reference defines position 0, which therefore has no error.
         landed_mm = target_mm + 0.5 * self._accuracy_mm * float(waves - at_zero)
         return min(max(landed_mm, self.lower_mm), self.upper_mm)
 

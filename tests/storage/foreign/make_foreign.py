@@ -12,7 +12,8 @@ from decimal import Decimal
 from pathlib import Path
 
 HERE = Path(__file__).parent
-MM = {"mm": Decimal(1), "um": Decimal("0.001"), "m": Decimal(1000), "in": Decimal("25.4"), "mil": Decimal("0.0254")}
+MM = {"mm": Decimal(1), "um": Decimal("0.001"), "m": Decimal(1000), "in": Decimal("25.4"), "mil": Decimal("0.0254"),
+      "pm": Decimal("1e-9")}  # fmt: skip
 S = {"s": Decimal(1), "ms": Decimal("0.001"), "min": Decimal(60)}
 N = {"N": Decimal(1), "mN": Decimal("0.001")}
 ROWS = 24
@@ -97,7 +98,7 @@ def cases() -> list[Case]:
         plain("semicolon_comments", "time [s];position [mm];gap [mm]", ";", ("s", "mm", "mm"), before="# bench 3\n# operator: kh; stage: 2\n\n"),
         plain("no_separator_but_tabs_and_blanks", "time_s   input_um \tgap_um", " \t ", ("s", "um", "um"), (3, 1, 1)),
     ]  # fmt: skip
-    made += simulations() + drives() + dates() + rows_left_out() + questions() + iso230() + instruments()
+    made += simulations() + drives() + dates() + rows_left_out() + questions() + iso230() + instruments() + habits()
     return made
 
 
@@ -138,6 +139,83 @@ def instruments() -> list[Case]:
     ]  # fmt: skip
 
 
+def habits() -> list[Case]:
+    """Habits of further programs and languages: labels, clocks, and units where other tables have none."""
+    unit = ("s", "mm", "mm")
+    number = iter(range(1, ROWS + 1))
+    stamps = [f"05/23/2024 10:11:{12 + k // 10}:{100 * (k % 10):03d}" for k in range(ROWS)]
+    logger = plain("keysight_daq", "Scan,Time,101 <Position> (MM),Alarm 101,102 <Gap> (MM),Alarm 102", ",", unit)
+    head, *body = logger.text.splitlines()
+    rows = [
+        f"{next(number)},{stamp},{row.split(',')[1]},0,{row.split(',')[2]},0"
+        for stamp, row in zip(stamps, body, strict=True)
+    ]
+    logger.text = "\n".join(["Instrument Name:,34972A", "Total Channels:,2", head, *rows]) + "\n"
+    scope = plain("twincat_scope", "", "\t", unit, asks="units.time", states=("units.time=s",))
+    pairs = [row.split("\t") for row in scope.text.splitlines()]
+    scope.text = (
+        "Name\tYT Scope\nFile\tC:\\scope.csv\n\nName\tActPos\tName\tGap\nData-Type\tREAL64\tData-Type\tREAL64\n"
+    )
+    scope.text += "SampleTime[ms]\t100\tSampleTime[ms]\t100\nUnit\tmm\tUnit\tmm\nOffset\t0\tOffset\t0\n\n"
+    scope.text += "".join(f"{t}\t{x}\t{t}\t{g}\n" for t, x, g in pairs)
+    turned = plain("exchanged_rows", "time [s],position [mm],gap [mm]", ",", unit, rows=40)
+    turned.text = "".join(
+        ",".join(cells) + "\n" for cells in zip(*(row.split(",") for row in turned.text.splitlines()), strict=True)
+    )
+    days = plain(
+        "spreadsheet_days",
+        "Date/Time,Position (mm),Gap (mm)",
+        ",",
+        ("s", "mm", "mm"),
+        asks="units.time",
+        states=("units.time=d",),
+    )
+    rows = days.text.splitlines()
+    # 0.1 s are 1/864000 of a day: thirteen digits hold it to a nanosecond.
+    days.text = (
+        "\n".join(
+            [
+                rows[0],
+                *(
+                    f"{Decimal('45415.42') + Decimal(k) / 864000:.13f},{row.split(',', 1)[1]}"
+                    for k, row in enumerate(rows[1:])
+                ),
+            ]
+        )
+        + "\n"
+    )
+    igor = "IGOR\nWAVES/D\ttime_s\tposition\tgap\nBEGIN\n"
+    waves = plain("igor_text", "", "\t", unit, before=igor)
+    waves.text += 'END\nX SetScale/P x 0,1,"", time_s; SetScale d 0,0,"mm", position,gap\n'
+    segment = "Channels\t2\nSamples\t24\t\t24\nY_Unit_Label\tmm\t\tmm\nX_Dimension\tTime\t\tTime\nX0\t0.0\t\t0.0\nDelta_X\t0.1\t\t0.1\n"
+    lvm = plain("labview_multi_x", "", "\t", unit)
+    pairs = [row.split("\t") for row in lvm.text.splitlines()]
+    lvm.text = (
+        "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tMulti\n***End_of_Header***\t\n\t\n"
+        + segment
+    )
+    lvm.text += "***End_of_Header***\t\t\nX_Value\tPosition\tX_Value\tGap\tComment\n" + "".join(
+        f"{t}\t{x}\t{t}\t{g}\t\n" for t, x, g in pairs
+    )
+    return [
+        logger, scope, turned, days, waves, lvm,
+        plain("chinese", "时间 [s],位置 [mm],间隙 [mm]", ",", unit, encoding="gb18030"),
+        plain("japanese", "時間[s],変位[㎜],ギャップ[㎜]", ",", unit, encoding="cp932"),
+        plain("korean", "시간(s),변위(mm),간격(mm)", ",", unit, encoding="utf-8-sig"),
+        plain("russian", "Время, \u0441;Положение, мм;Зазор, мм", ";", unit, mark=",", encoding="cp1251"),
+        plain("polish", "Czas [s];Położenie [mm];Szczelina [mm]", ";", unit, mark=",", encoding="cp1250"),
+        plain("matlab_durations", "Time,position_mm,gap_mm", ",", unit, edit=lambda c: c if len(c.split(".")[1]) > 3 else f"{c} sec"),
+        plain("quoted_decimal_commas", '"Zeit [s]","Weg [mm]","Abstand [mm]"', ",", unit, mark=",", edit=lambda c: f'"{c}"'),
+        plain("zwick", '"Prüfzeit";"Traversenweg";"Abstand"\n"s";"mm";"mm"', ";", unit, mark=",", encoding="cp1252"),
+        plain("vibrometer", "Time\tVib Displacement\tGap\n[ s ]\t[ m ]\t[ mm ]", "\t", ("s", "m", "mm"), (9, 9, 6), before="Source File Name:\tscan.pvd\nPoints: 24\n"),
+        plain("picometres", "Timestamp [s],Position Ch0 [pm],Gap [mm]", ",", ("s", "pm", "mm"), (3, 0, 4)),
+        plain("modelica", '"time","stage.s","gripper.gap"', ",", unit, asks="columns.input",
+              states=("columns.input=stage.s", "units.time=s", "units.input=mm", "units.gap=mm")),
+        plain("command_and_feedback", "Time (sec),X Position Command (mm),X Position Feedback (mm)", ",", unit, kind="drive",
+              roles=("time_s", "", "input_mm"), asks="columns.input", states=("columns.input=X Position Feedback (mm)",)),
+    ]  # fmt: skip
+
+
 def simulations() -> list[Case]:
     """Tables of programs that calculate."""
     _, inputs, gaps = motion(12)
@@ -162,7 +240,7 @@ def simulations() -> list[Case]:
         Case("prescribed_verschiebung", "Vorgegebene Verschiebung [m];Spalt [mm]\n" + rows(x_m, g_mm, between=";"), "simulation", {"input_mm": in_mm, "gap_mm": g_true}),
         Case("position_and_disp", "disp (mm),stage position (mm),gap (mm)\n" + rows(x_mm, x_mm, g_mm), "simulation", truth,
              asks="columns.input", states=("columns.input=stage position (mm)",)),
-        Case("measured_u_is_no_input", "time_s,gap_mm,u (mm)\n" + rows([f"{0.1 * k:.1f}" for k in range(len(g_mm))], g_mm, ["0.0012"] * len(g_mm)), "measured", {}, refused="no column is called as the input is"),
+        Case("measured_u_is_no_input", "time_s,gap_mm,u (mm)\n" + rows([f"{0.1 * k:.1f}" for k in range(len(g_mm))], g_mm, ["0.0012"] * len(g_mm)), "measured", {}, refused="no column has a usual name for the input"),
         Case("ansys_workbench", "Displacement Stage [mm]\tGap [mm]\n" + rows(x_mm, g_mm, between="\t"), "simulation", truth),
         Case("simulink_sides", "input_mm;left (mm);right (mm)\n" + rows(x_mm, [f"-{h}" for h in half], half, between=";"), "simulation", truth),
         Case("several_models", "input_mm,simmechanics_mm,comsol_mm\n" + rows(x_mm, [f"{float(g) * 1.1:.5f}" for g in g_mm], g_mm), "simulation", truth,
@@ -363,8 +441,8 @@ def questions() -> list[Case]:
     open_mark.text = "\n".join([rows[0], *(rows[k + 1] for k in keep)]) + "\n"
     open_mark.columns = {name: [values[k] for k in keep] for name, values in open_mark.columns.items()}
     constant = "time [s],position [mm]\n" + "".join(f"{k / 10},1.25\n" for k in range(ROWS))
-    chinese = plain("chinese", "时间 [s],位置 [mm],间隙 [mm]", ",", ("s", "mm", "mm"), asks="columns.input",
-                    states=("columns.time=时间 [s]", "columns.input=位置 [mm]", "columns.gap=间隙 [mm]"), encoding="gb18030")  # fmt: skip
+    georgian = plain("georgian", "დრო [s],მდებარეობა [mm],ღრეჩო [mm]", ",", ("s", "mm", "mm"), asks="columns.input",
+                     states=("columns.time=დრო [s]", "columns.input=მდებარეობა [mm]", "columns.gap=ღრეჩო [mm]"))  # fmt: skip
     nameless = plain("no_header", "", "\t", ("s", "mm", "mm"), asks="columns.input",
                      states=("columns.time=1", "columns.input=2", "columns.gap=3", "units.time=s", "units.input=mm", "units.gap=mm"))  # fmt: skip
     volts = plain(
@@ -378,7 +456,7 @@ def questions() -> list[Case]:
     )
     commas = "Zeit [s],Weg [mm]\n" + "".join(f"{k // 10},{k % 10}0,{k // 7},{k % 7}5\n" for k in range(ROWS))
     return [
-        slow, metres, microns, open_mark, chinese, nameless, volts,
+        slow, metres, microns, open_mark, georgian, nameless, volts,
         Case("constant_input", constant, "drive", {"time_s": [str(Decimal(k) / 10) for k in range(ROWS)], "input_mm": ["1.25"] * ROWS},
              asks="accept", states=("accept=constant_input",)),
         Case("commas_for_everything", commas, "drive", refused="semicolons"),
