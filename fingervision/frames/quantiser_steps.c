@@ -1,6 +1,7 @@
-/* Step of every block of a picture: FFmpeg's AVVideoEncParams with its blocks (x, y, width, height, difference of the
-   parameter), where the blocks begin, bytes of a block, number of blocks, the picture's parameter, steps by parameter; steps
-   (rows, columns). What no block covers gets the largest step. */
+/* Quantiser step of every block of a picture. Arguments: FFmpeg's AVVideoEncParams, which contains entries for blocks (x,
+   y, width, height, difference of the parameter); position of the first entry; bytes per entry; number of entries;
+   parameter of the picture; step for every parameter; result, steps (rows, columns). Areas without an entry have the
+   largest step. */
 LOOP(quantiser_steps_fill, "BiiiiSs", "") {
     const float *table = (const float *)in[5].data;
     float *step = (float *)in[6].data, largest = 0.0f;

@@ -33,12 +33,14 @@ VP9_LOSSLESS, VP9_FIRST, VP9_GROWTH, VP9_GAIN, VP9_COUNT = 4.0, 8, 1.01975, 8.0,
 # is smaller, and a filter reduces the remaining errors. Measured with `python -m tests.benchmarks.compressed_video
 # --only mpeg4-1-upright vp9-1-upright`.
 MPEG_LEAVES, VP9_LEAVES = 2.0, 0.5
-# Parameters of 8 to 14 bits in any codec lie within these limits; a damaged stream may state values beyond them.
+# Limits of the quantisation parameter in any codec with 8 to 14 bits; a damaged stream may have values beyond the
+# limits.
 LEAST_PARAMETER, MOST_PARAMETER = -128, 511
-# Five numbers of four bytes (libavutil/video_enc_params.h, AVVideoBlockParams).
+# Size of a block's entry: five numbers of four bytes (libavutil/video_enc_params.h, AVVideoBlockParams).
 BLOCK_BYTES = 20
-# A block that is not coded again keeps the error of the last picture that coded it, and what later pictures add. They
-# also mend some of it: an earlier step counts by so much less with every picture.
+# Factor by which the step of an earlier picture decreases with every later picture. A block that is not coded again
+# keeps the error of the picture in which it was last coded, but filters and predictions in later pictures reduce the
+# error.
 FADES = 0.97
 
 _fill = loop("quantiser_steps_fill")
@@ -92,12 +94,12 @@ def _steps(kind: int, bits: int) -> NDArray[np.float32]:
 
 @dataclass(slots=True, eq=False)
 class StepTrail:
-    """Quantiser steps that the pictures of a stream were coded with, where they show what earlier ones have coded.
+    """Quantiser steps of a stream's pictures, including the steps of earlier pictures from which blocks are copied.
 
-    A block that is copied from another picture (skipped) states no step of its own, but that of the block before it
-    (H.264's QP_Y,PRED, ITU-T H.264 (2021), 7.4.5), often that of flat ground, which is up to four times finer. What it
-    shows was coded in earlier pictures. The step of every block is therefore the largest since the last picture that
-    was coded by itself, fading slowly.
+    A block that is copied from an earlier picture (skipped) has no step of its own, but inherits the step of the
+    preceding block (QP_Y,PRED in ITU-T H.264 (2021), 7.4.5). The preceding block is often flat background with a step
+    up to four times finer. The content of a skipped block was coded in an earlier picture. The step of every block is
+    therefore the largest step since the last key frame, reduced by a factor (`FADES`) for every later picture.
     """
 
     last: NDArray[np.float32] | None = None

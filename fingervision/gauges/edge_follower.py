@@ -25,7 +25,8 @@ from fingervision.gauges.straight_edge import (
 from fingervision.vision.edge_search import Profile, StepCandidate, candidates, profile
 
 Floats = NDArray[np.float64]
-# Steps nearer to each other than this are one edge, twice: a profile of strips of a pixel knows a step to half of that.
+# Distance (pixels) below which two steps of a profile are the same edge; a profile of strips of one pixel determines
+# the position of a step to half a pixel.
 SAME_PX = 2.0
 
 
@@ -118,7 +119,7 @@ class EdgeFollower:
         return alike[0], steps
 
     def _times_clear_of(self, steps: list[StepCandidate], own: StepCandidate) -> float:
-        """How many times the reach a search may grow without reaching an edge like the own one."""
+        """Multiple of `reach_px` up to which the search may be widened without including a similar edge."""
         apart = [
             abs(step.position_px - own.position_px)
             for step in steps

@@ -31,8 +31,8 @@ def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
     """Interpolate the drive linearly between the two samples that bracket an instant.
 
     Nothing is extrapolated: before the first sample, after the last sample, and between two runs the function returns
-    no input. It returns none either where the log jumps from one place of rest to another, because the place in between
-    is not known.
+    no input. The function returns no input within a jump of the log between two rest positions either, because the
+    position during the jump is unknown.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
     Returns
     -------
     DriveState or None
-        None if no run brackets the instant, or if the log jumps there.
+        None if the instant is not within a run, or is within a jump of the log.
     """
     after = int(np.searchsorted(drive.time_s, time_s, side="left"))
     if after == drive.time_s.size:

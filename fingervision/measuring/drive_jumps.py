@@ -1,4 +1,4 @@
-"""Intervals of a stage's log in which it jumps from one place of rest to another, so that its place is not known."""
+"""Intervals of a log in which the stage jumps between two rest positions, so that its position is unknown."""
 
 from functools import lru_cache
 
@@ -9,20 +9,22 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.stage_record.encoder import input_sigma
 
 STANDS = 0.1
-"""Change in a neighbouring interval, relative to that of a jump, below which the stage stands there."""
+"""Change of the log in a neighbouring interval, relative to the jump, below which the stage is at rest there."""
 AT_REST = 2
-"""Intervals of rest on either side of a jump, at least: a table of a motion's corners has one between two ramps, and
-the ramps of such a table are meant."""
+"""Least number of intervals at rest on either side of a jump. A table that lists only the corners of a motion has a
+single interval at rest between two ramps, and its ramps are real motions, not jumps.
+"""
 ENCODER_STEPS = 1.5
-"""Encoder steps above which a change is a move: a slow stage changes by single steps, and stands in between only as far
-as the encoder can tell."""
+"""Number of encoder steps above which a change may be a jump: the reading of a slowly moving stage changes by single
+steps, and seems to be at rest in between.
+"""
 
 
 @lru_cache(maxsize=4)
 def jumps(drive: DriveHistory) -> NDArray[np.bool_]:
-    """Whether the stage jumps between a row and the next, with rest before and after; shape (n - 1,).
+    """Whether the stage jumps between one row and the next, and rests before and after the jump; shape (n - 1,).
 
-    The log does not say when within the interval the stage moved, and how fast.
+    The log does not show when within the interval, and how fast, the stage moved.
 
     Parameters
     ----------

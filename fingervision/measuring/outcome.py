@@ -41,8 +41,8 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
             description,
             notes=(
                 *description.notes,
-                f"{unknown} frames lie between two rows at which the drive's log jumps; where the stage was then is "
-                "not known, and their input is empty.",
+                f"{unknown} frames lie within jumps of the drive's log, so that the position of the stage is unknown; "
+                "the input of these frames is empty.",
             ),
         )
     given_s = task.drive_offset_s if task.drive is not None else None

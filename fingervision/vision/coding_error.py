@@ -27,19 +27,21 @@ from fingervision.vision.profile_lines import INNER, IS_ROW
 
 Floats = NDArray[np.float64]
 
-# Standard uncertainty of one edge's place in units of step over contrast. Measured on drawn recordings, upright and
-# leaning, 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
+# Standard uncertainty of an edge's position, in units of the ratio of step to contrast. Measured in rendered recordings
+# with upright and tilted fingers and 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
 DISPLACED = 0.4
-# So much of an outline (pixels) says where a finger's edge is: the rows that are fitted (`profile_lines.INNER`).
+# Length of outline (pixels) that determines the position of a finger's edge: the fitted rows (`profile_lines.INNER`).
 ALONG_PX = 72.0
-# The blocks this far across an outline (standard deviations of the blur, and pixels more) carry the edge.
+# Distance from an outline within which blocks affect the edge: a multiple of the blur's standard deviation, plus
+# pixels.
 ACROSS_SIGMAS, ACROSS_PX = 3.0, 2.0
-# Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
-# coded by itself is displaced by less than one that is copied from its neighbours (the classes of HEVC, AV1 and MJPEG
-# in `compressed_video`).
+# Standard uncertainty of an edge's position for codecs whose quantiser step is unknown, in units of the common
+# displacement of a flank's rows. Edges in a picture that is coded without other pictures are displaced less than edges
+# in a picture that is predicted from others (the classes of HEVC, AV1 and MJPEG in `compressed_video`).
 SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 2.0}
-# The same for a picture that claims to be as the sensor saw it (saved again, enlarged, interpolated from colours): its
-# rows are looked at as well, and what they share is in every frame alike, as far as anybody knows.
+# Standard uncertainty of an edge's position, in the same units, for pictures without a codec, which may have been saved
+# again, enlarged or interpolated from colours before; the common displacement of the rows may then be equal in all
+# frames.
 EVEN_SHIFTS = 2.0
 # Full scale for which quantiser steps are stated: 8 bits.
 EIGHT_BITS = 255.0

@@ -155,7 +155,7 @@ def measure_gap(
     are_cut = all(cuts_px)
     if not chains and (not all(holds) or any(aside) or are_cut):
         chains = _polygonal(points, below_tip_px, noise_shared)
-    if are_cut:  # by whatever else than a fillet: the edge lies between the shape and the points that it left aside
+    if are_cut:  # the corners are not fillets, so that the edge lies between the fitted shape and the rejected points
         aside = [beyond + 2.0 / 3.0 * cut_px**2 for beyond, cut_px in zip(aside, cuts_px, strict=True)]
     if chains and all(holds):  # what knows its points better
         variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]

@@ -31,24 +31,28 @@ Doubles = NDArray[np.float64]
 # resolves, and the centres of these bands.
 LOW_BAND, HIGH_BAND = (0.18, 0.32), (0.36, 0.5)
 LOW, HIGH = 0.25, 0.43
-# The power near the Nyquist frequency holds aliased power too; the share that is not settles in so many steps to 1 %.
+# Number of iterations in which the share of the power near the Nyquist frequency that is not aliased is determined to 1
+# %.
 UNFOLDINGS = 8
-# Pixels square over which the power of fine texture is averaged to tell where it lies: what smoothing and gradients
-# spread a line over.
+# Side (pixels) of the square over which the power of fine texture is averaged to locate the texture; smoothing and
+# derivatives spread a line over this width.
 NEARBY_PX = 5
 # Condition number above which the gradients do not determine the motion: half the digits of a double are lost.
 SINGULAR = 1e8
-# Least share of the noise in the residuals by which it is told from aliased texture.
+# Least difference between the effects of noise and of aliased texture on the residuals, as a share of the effect of
+# noise, with which the two are separated.
 LEAST_TOLD = 0.2
-# Relative standard uncertainty of the pull: its means over surfaces without optics were 0.6 to 1.6 of the prediction.
+# Relative standard uncertainty of the pull: for surfaces without optical blur, the mean pull was 0.6 to 1.6 times the
+# prediction.
 U_PULL = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aliasing:
-    """What texture that is too fine for the pixels does to the registration of a patch.
+    """Effects of texture that is too fine for the pixels on the registration of a patch.
 
-    Rows, or elements, are those of texture too fine for the columns, and for the rows of pixels.
+    The first row (or element) of each array is for texture too fine for the columns of pixels, the second for texture
+    too fine for the rows of pixels.
 
     Parameters
     ----------
@@ -59,7 +63,8 @@ class Aliasing:
     residual : ndarray of float, shape (2,)
         Mean square of the smoothed aliased texture per pixel.
     power : ndarray of float, shape (2,)
-        Power per pixel near the Nyquist frequency, from which all these are extrapolated; noise is a part of it.
+        Power per pixel near the Nyquist frequency, including noise; the other attributes are extrapolated from this
+        power.
     """
 
     variance: Doubles
@@ -87,7 +92,7 @@ def patch_aliasing(part: Floats, margin_px: int, jacobian: Doubles, smoothing: D
     if not np.linalg.cond(gram / np.sqrt(np.outer(gram.diagonal(), gram.diagonal()) + 1e-30)) < SINGULAR:
         return Aliasing(np.zeros((2, 3)), np.zeros(2), np.zeros(2), np.ones(2))
     inverse = np.linalg.inv(gram)
-    # What a level more in a pixel changes of x, y and angle.
+    # Changes of x, y and angle if the level of one pixel increases by one.
     influence = (inverse @ jacobian).reshape(3, *inner.shape)
     response = np.multiply.outer(*(_response(smoothing, n) for n in inner.shape))
     weight = np.abs(np.fft.fft2(influence)) ** 2 * response
@@ -99,7 +104,8 @@ def patch_aliasing(part: Floats, margin_px: int, jacobian: Doubles, smoothing: D
         slope = 2.0 * np.pi * np.abs(np.fft.fftfreq(inner.shape[axis]))
         along = slope[None, :] if axis == 1 else slope[:, None]
         pull_px[row] = float((along * least * response).sum()) * inverse[row, row]
-        # Fine texture in a few places has no other places to average over: where it lies, the gradients lie too.
+        # If fine texture covers only a few places of the patch, its errors do not average out, because the gradients
+        # lie in the same places.
         beside = 0.5 * (np.roll(part, 1, axis) + np.roll(part, -1, axis))
         fine = cv2.blur((part - beside).astype(np.float64) ** 2, (NEARBY_PX, NEARBY_PX))
         fine = fine[margin_px:-margin_px, margin_px:-margin_px]
@@ -107,7 +113,8 @@ def patch_aliasing(part: Floats, margin_px: int, jacobian: Doubles, smoothing: D
         gathered /= max(float(fine.mean()), 1e-30)
         variance[row] = (weight * folded).sum(axis=(1, 2)) / inner.size * np.maximum(gathered, 1.0)
     ratio = inverse[0, 0] / inverse[1, 1]
-    # What is folded is as large as the stronger gradients, and displaces the patch more along the weaker ones.
+    # Aliased texture is as strong as the stronger gradients, and displaces the patch more in the direction of the
+    # weaker gradients.
     x, y = variance[:, 0].copy(), variance[:, 1].copy()
     variance[:, 0], variance[:, 1] = np.maximum(x, y * ratio), np.maximum(y, x / ratio)
     return Aliasing(variance, pull_px, residual, powers)
@@ -115,16 +122,16 @@ def patch_aliasing(part: Floats, margin_px: int, jacobian: Doubles, smoothing: D
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AliasingError:
-    """Errors of k registered patches by aliased texture.
+    """Errors of k registered patches due to aliased texture.
 
     Parameters
     ----------
     pull_px : ndarray of float, shape (k, 2)
-        Pull of x and y towards whole pixels at the displacement found, to be added to it.
+        Correction to be added to the displacements x and y, which are pulled towards whole pixels.
     variance : ndarray of float, shape (k, 3)
         Variances of x, y and rotation at this displacement.
     worst_px : ndarray of float, shape (k,)
-        Standard deviation of x or y, whichever is larger, at the displacement where it is largest.
+        Larger standard deviation of x and y, at the sub-pixel phase with the largest value.
     """
 
     pull_px: Doubles
@@ -139,24 +146,24 @@ def aliasing_at(
     residual: Doubles,
     by_noise: Doubles,
 ) -> AliasingError:
-    """Errors of k registered patches by aliased texture, at their displacements.
+    """Errors of k registered patches due to aliased texture, at the patches' displacements.
 
-    The power of aliased texture counts `4 sin^2(pi d) = 2 (1 - cos(2 pi d))` times, averaged over a rotated patch. What
-    the residuals show to be noise is no texture: their mean square is the sum of that of noise and that of aliased
-    texture, and the power that was seen near the Nyquist frequency is the sum of both too.
+    The power of aliased texture contributes with the factor `4 sin^2(pi d) = 2 (1 - cos(2 pi d))` at the displacement
+    d, averaged over a rotated patch. The power near the Nyquist frequency is the sum of noise and texture, and so is
+    the mean square of the residuals. The noise is found from these two sums, and only the remaining power is texture.
 
     Parameters
     ----------
     aliasing : sequence of Aliasing
         Predictions for a factor 1.
     place : (ndarray, ndarray, ndarray) of float, shape (k,)
-        Displacement along x and y but for whole pixels, in pixels, and rotation in radians.
+        Fractional part of the displacement along x and y, in pixels, and rotation in radians.
     half_size : (int, int)
         Pixels on either side of the patch's middle across and down.
     residual : ndarray of float, shape (k,)
         Mean square of the smoothed residuals.
     by_noise : ndarray of float, shape (k,)
-        The same for noise of unit variance in every pixel of both pictures.
+        Mean square of the smoothed residuals for noise of unit variance in every pixel of both pictures.
     """
     variance, pull_px = np.stack([of.variance for of in aliasing]), np.stack([of.pull_px for of in aliasing])
     folded, power = np.stack([of.residual for of in aliasing]), np.stack([of.power for of in aliasing])
@@ -172,7 +179,7 @@ def aliasing_at(
     noise = np.clip(noise, 0.0, residual / by_noise)
     share = np.clip(1.0 - noise[:, None] / power, 0.0, 1.0)
     pull = share * pull_px
-    # The phase that was found is pulled too.
+    # The measured displacement, from which the phase is calculated, is itself pulled towards whole pixels.
     toward = np.sin(phase + 2.0 * np.pi * pull * np.sin(phase)) * pull * even
     spread = ((share * factor)[:, :, None] * variance).sum(axis=1)
     spread[:, :2] += (U_PULL * toward) ** 2
@@ -183,9 +190,10 @@ def aliasing_at(
 def _folded_power(light: Doubles, axis: int, margin_px: int) -> tuple[Doubles, Doubles, float]:
     """Power spectra of the texture that is aliased along an axis, by its apparent frequency, of the patch's shape.
 
-    The first is the least that optics leave, for a correction; the second is that of edges and lines. Returned last is
-    the mean power near the Nyquist frequency from which both are made. The patch is seen with what lies beside it along
-    the axis, so that the window leaves all of the patch as it is: a line at its border counts.
+    The first spectrum assumes the blur of optics, which leaves the least aliased power, and serves for a correction.
+    The second spectrum assumes edges and lines. The third result is the mean power near the Nyquist frequency, from
+    which both spectra are extrapolated. The window extends beyond the patch along the axis, so that the whole patch has
+    full weight, including lines at its border.
     """
     of = np.moveaxis(light, axis, 1)
     n = of.shape[1] - 2 * margin_px
@@ -208,10 +216,11 @@ def _folded_power(light: Doubles, axis: int, margin_px: int) -> tuple[Doubles, D
 
 
 def _beyond(frequency: Doubles, low: float, high: float, order: int) -> Doubles:
-    """Power at frequencies beyond 0.5, as a share of the power `high` seen at `HIGH` (a part of it is aliased itself).
+    """Power at frequencies beyond 0.5, as a share of the power `high` at the frequency `HIGH`, which is partly aliased.
 
-    A pixel's own area passes sinc^2; what the power falls by beyond that between `LOW` and `HIGH` goes on beyond as
-    `exp(-fall f^order)`: order 2 is the blur of optics, the steepest; edges and lines fall more slowly.
+    The area of a pixel multiplies the power by sinc^2. The remaining decrease from `LOW` to `HIGH` is extrapolated as
+    `exp(-fall f^order)`: order 2 is the blur of optics, with the steepest decrease; for edges and lines, the order is
+    1.
     """
     by_pixel = 2.0 * np.log(np.sinc(LOW) / np.sinc(HIGH))
     own = 1.0

@@ -39,9 +39,9 @@ def noise_covariance(
     Parameters
     ----------
     hessian, score : ndarray of float, shape (k, 3, 3)
-        Of the references.
+        Hessian and score of the references.
     residual, by_noise : ndarray of float, shape (k,)
-        Mean square of the smoothed residuals, and the same for noise of unit variance (`residual_power`).
+        Mean square of the smoothed residuals, and its value for noise of unit variance (`residual_power`).
     gain : ndarray of float, shape (k,)
         Contrast of the reference relative to that of the picture.
     half_size : (int, int)

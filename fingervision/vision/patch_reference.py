@@ -55,7 +55,7 @@ class PatchReference:
     score : ndarray, shape (3, 3)
         That of the jacobian smoothed once more: covariance of what smoothed noise of unit variance projects on it.
     aliasing : Aliasing
-        What texture that is too fine for the pixels does to the registration.
+        Effects of texture that is too fine for the pixels on the registration.
     template : ndarray, shape (height, width)
         Light without smoothing, for the coarse search.
     """

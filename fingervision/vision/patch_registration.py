@@ -51,8 +51,8 @@ class Registered:
     settled : ndarray of bool, shape (k,)
         Whether the registration converged inside the given part.
     aliasing_px : ndarray of float, shape (k,)
-        Standard deviation of x or y by texture that is too fine for the pixels, at the sub-pixel phase where it is
-        largest.
+        Larger standard deviation of x and y due to texture that is too fine for the pixels, at the worst sub-pixel
+        phase.
     """
 
     x_px: Doubles

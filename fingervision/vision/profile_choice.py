@@ -271,7 +271,8 @@ def _is_symmetric(flanks: list[Flank], steps: list[ProfileFit]) -> bool:
         contrast = float(np.ptp(profile.light))
         by_noise = weight * float(profile.count.mean()) * contrast**2 * step.blur
         left += BIN_PX * max(step.squares - profile.t.size, 0.0) / by_noise / len(flanks)
-    # The fits of a free shape take ten times as long: only where no more is left than a disc of defocus leaves.
+    # Fits with a free shape take ten times as long, and are only made if the residuals are no larger than those of a
+    # fitted disc of defocus.
     if left >= DISC_LEAVES:
         return False
     bins = sum(profile.t.size for profile, _, _ in flanks)

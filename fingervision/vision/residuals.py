@@ -32,8 +32,8 @@ SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # Share of rejected points near the measuring point above which they are not dust but the finger's shape; weight below
 # which a point counts as rejected.
 MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
-# Dust that hides so many points of a corner seldom does so at both fingers: a cut corner does, because it lies on both
-# sides of the fillet that fits it best.
+# Least number of rejected points near the corners of both fingers that indicates cut corners. Dust seldom hides so many
+# points at both fingers, whereas a straight cut lies on both sides of the fillet that fits best.
 FEWEST_OF_CORNER = 3
 # Where most of the points within so many pixels above or below the measuring point are rejected, or half of them on
 # both sides, they may be the finger's own edge (a corner that is cut off, a bend) and not dust.
@@ -108,7 +108,7 @@ def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, heigh
 
 
 def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float) -> float:
-    """Largest residual (px) of several rejected points between the tip and the inner edge, where a cut is no fillet.
+    """Largest residual (px) of the rejected points between tip and inner edge, for a corner that is not a fillet.
 
     The result is 0 if too few points of the corner were rejected.
 
@@ -127,10 +127,10 @@ def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint
 
 
 def top_aside_variance(points: OutlinePoints, end: FingerEnd) -> float:
-    """Variance of the tip's height due to points of the top, between the corners, most of which the fit rejected.
+    """Variance of the tip's height if the fit rejected most points of the top between the corners.
 
-    The top may lie anywhere between the fitted one and the farthest of these points, as in `set_aside_variance`; the
-    result is 0 where fewer than half of the points are rejected, and where the corners leave no straight top.
+    The true top may lie anywhere between the fitted top and the farthest rejected point, as in `set_aside_variance`.
+    The result is 0 if fewer than half of the points are rejected, or if there is no straight top between the corners.
     """
     inner = end.parameters[INNER_C] - end.parameters[INNER_R]
     outer = end.parameters[OUTER_C] + end.parameters[OUTER_R]

@@ -64,7 +64,7 @@ def with_corner_doubt(
         corners = _corners(p, end, shared_px)
         tried = [] if corners is None else [_cut(corners, leg, below_tip_px) for leg in LEGS]
         cuts = [each for each in tried if each is not None]
-        if corners is None or not cuts:  # no corner that could be cut
+        if corners is None or not cuts:  # the finger has no corner that may be a chamfer
             return found
         excess = _excess(corners, cuts)
         least = float(excess.min())
@@ -88,7 +88,7 @@ def with_corner_doubt(
 
 
 class _Near(NamedTuple):
-    """Points near the vertex of a corner, which tell its shape.
+    """Points near the vertex of a corner, from which its shape is determined.
 
     Parameters
     ----------
@@ -97,9 +97,9 @@ class _Near(NamedTuple):
     beyond_sides : ndarray of float, shape (n,)
         Distance of each point outwards from the nearest of the flanks and the top.
     fillet_squares : ndarray of float, shape (n,)
-        Squared residuals about the fillet, in units of the uncertainty, limited to a stray point's.
+        Squared residuals from the fillet, in units of the variance, limited to reduce the effect of outliers.
     alike : float
-        Number of these points that share an error.
+        Number of neighbouring points that share an error and count as one.
     """
 
     x: Floats
@@ -120,7 +120,7 @@ class _Corners(NamedTuple):
     radii, slopes : (float, float)
         Radius of each fillet, and slope of each flank.
     near : list of _Near
-        Points near each vertex, if there are any.
+        Points near each vertex that has any.
     outer, top, inner : Side
         The sides.
     top_slope : float
@@ -138,7 +138,7 @@ class _Corners(NamedTuple):
 
 
 class _Cut(NamedTuple):
-    """A finger with cut corners: the two cuts, its tip and its inner edge."""
+    """A finger with chamfers: its two chamfers, tip and inner edge."""
 
     outer: Side
     inner: Side
@@ -147,7 +147,7 @@ class _Cut(NamedTuple):
 
 
 def _corners(points: OutlinePoints, end: FingerEnd, shared_px: float) -> _Corners | None:
-    """Everything about a finger's corners that no cut changes; None if they are too small to be cut."""
+    """Properties of a finger's corners that all chamfers share; None if the inner corner is too small for a chamfer."""
     p, (x0, y0) = end.parameters.tolist(), end.origin.tolist()
     if p[INNER_R] < SMALLEST_PX:
         return None
@@ -177,7 +177,7 @@ def _corners(points: OutlinePoints, end: FingerEnd, shared_px: float) -> _Corner
 
 
 def _cut(corners: _Corners, leg: float, below_tip_px: float) -> _Cut | None:
-    """The finger with legs of so many radii cut off its corners; None if there is no such finger."""
+    """The finger with chamfers, whose legs are a multiple of the fillets' radii; None if the finger is too narrow."""
     vertices, top_slope = corners.vertices, corners.top_slope
     along_top, length = hypot(1.0, top_slope), vertices[1][0] - vertices[0][0]
     legs = [leg * max(radius, SMALLEST_PX) for radius in corners.radii]
@@ -197,7 +197,7 @@ def _cut(corners: _Corners, leg: float, below_tip_px: float) -> _Cut | None:
 
 
 def _excess(corners: _Corners, cuts: list[_Cut]) -> Floats:
-    """Chi-square of the points near the corners about every cut, minus that about the fillets; shape (cuts,)."""
+    """Chi-square of the points near the corners for every chamfer, minus that for fillets; shape (cuts,)."""
     excess = np.zeros(len(cuts))
     for near in corners.near:
         away = near.beyond_sides
@@ -209,7 +209,7 @@ def _excess(corners: _Corners, cuts: list[_Cut]) -> Floats:
 
 
 def _beyond(sides: Sequence[Side], x: Floats, y: Floats) -> Floats:
-    """Distance of points outwards from sides, shape (sides, n)."""
+    """Outward distance of points from each side, shape (sides, n)."""
     places = np.array([(side.x, side.y, sin(side.angle), cos(side.angle)) for side in sides])
     side_x, side_y, sine, cosine = places.T[:, :, None]
     return np.asarray((x - side_x) * sine - (y - side_y) * cosine)

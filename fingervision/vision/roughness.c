@@ -1,6 +1,6 @@
 /* after linear_solve */
-/* Cholesky's factor in place of the lower half of a matrix (n, n); 0 where it is not positive. Column by column, so that the
-   sums of a whole row go on side by side. */
+/* Replace the lower half of a matrix (n, n) by its Cholesky factor; return 0 if the matrix is not positive definite. The
+   factor is computed column by column, so that the sums of a row are computed in parallel. */
 static int factor(double *a, int64_t n) {
     double *column = floats(n);
     int is_positive = 1;
@@ -20,7 +20,7 @@ static int factor(double *a, int64_t n) {
     return is_positive;
 }
 
-/* Solve l x = b in place: Cholesky's factor l (n, n), b (n, wide), which becomes x. */
+/* Solve l x = b by forward substitution: Cholesky factor l (n, n), and b (n, wide), which is replaced by x. */
 static inline void forward(const double *l, int64_t n, double *b, int64_t wide) {
     for (int64_t k = 0; k < n; k++) {
         const double *known = b + k * wide;
@@ -121,8 +121,8 @@ LOOP(roughness_errors, "FFFFFf", "") {
     }
 }
 
-/* Whiten errors with a known covariance, none of whose combinations is surer than a limit: covariance (n, n), which becomes
-   Cholesky's factor, limit of the variance; whether all combinations are as unsure as that. */
+/* Cholesky factor for whitening errors whose combinations have at least a given variance. Arguments: covariance (n, n),
+   which is replaced by its Cholesky factor; least variance. Result: whether all combinations have this variance. */
 LOOP(roughness_factor, "fd", "b") {
     int64_t n = in[0].shape[0];
     double *less = floats(n * n);
@@ -132,5 +132,5 @@ LOOP(roughness_factor, "fd", "b") {
     free(less);
 }
 
-/* White errors in place of correlated ones: Cholesky's factor (n, n), columns (n, wide). */
+/* Whiten correlated errors in place: Cholesky factor (n, n), columns (n, wide). */
 LOOP(roughness_whiten, "Ff", "") { forward(FLOATS(0), in[0].shape[0], FLOATS(1), in[1].shape[1]); }

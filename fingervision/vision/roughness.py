@@ -175,10 +175,11 @@ def best_linear(
 
 
 def _whitening(errors: Floats, least_variance: float) -> Callable[[Floats], Floats]:
-    """Transformation to white errors of unit variance, for errors with a covariance in units of the points' own.
+    """Transformation to white errors of unit variance, from the errors' covariance in units of the points' variances.
 
-    No combination of points is surer than their own noise, which is `least_variance`; rounding of the tabulated
-    covariance may say so. Cholesky's factor suffices where it does not, and costs a tenth of the eigenvalues.
+    No combination of points can have a smaller variance than the points' noise (`least_variance`), but rounding errors
+    of the tabulated covariance may cause smaller values. Cholesky's decomposition takes a tenth of the time of
+    eigenvalues, and is used if all variances are larger.
     """
     factor = errors.copy()
     if _factor(factor, least_variance):
@@ -197,7 +198,7 @@ def _whitening(errors: Floats, least_variance: float) -> Callable[[Floats], Floa
 
 @lru_cache(maxsize=1)
 def _blas() -> ThreadpoolController:
-    """Control of the linear algebra's threads; further threads would wait busily, with four times the work of one."""
+    """Controller of the threads for linear algebra; several threads take four times the processor time."""
     return ThreadpoolController()
 
 

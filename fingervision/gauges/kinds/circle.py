@@ -157,7 +157,7 @@ class FollowedCircle:
         return None
 
     def _times_alone(self, picture: Picture) -> float:
-        """How many times the reach a search may grow without reaching another disc like this."""
+        """Multiple of `reach_px` up to which the search may be widened without including a similar disc."""
         for times in range(2, MOST_TIMES + 1):
             self._times = float(times)
             is_alone = self._start(picture)[0] is not GaugeStatus.AMBIGUOUS

@@ -32,11 +32,11 @@ NEAR = 0.35
 # Smallest zero-normalised cross-correlation of a mark with its template from the first frame (the same limit as for
 # patches).
 LEAST_CORRELATION = 0.7
-# After a quarter turn it correlates (or anticorrelates) with itself as in the first frame: what covers a part of it
-# displaces the middle, by 0.3 px for a tenth of a dot's diameter, where the correlation falls by 0.02. It may fall by
-# this share, and the share that noise takes may double.
+# Largest decrease, since the first frame, of a mark's correlation with itself after a quarter turn, and factor by which
+# the decrease due to noise may grow. An object that covers a tenth of a dot's diameter displaces the centre by 0.3 px
+# and reduces the correlation by 0.02.
 MOST_SHAPE_LOSS, MOST_NOISE_LOSS = 0.01, 2.0
-# A middle that is less sure than this (pixels) is none.
+# Largest standard uncertainty of an accepted centre (pixels).
 LEAST_SURE_PX = 0.5
 
 
@@ -120,7 +120,7 @@ class FollowedMarker:
                 return refused
             self._first = found
         if self._first is not None and _is_cut(found, self._first):
-            return GaugeStatus.NOT_FOUND, "it has lost its shape: something may cover a part of it"
+            return GaugeStatus.NOT_FOUND, "the mark has changed its shape: an object may cover a part of the mark"
         return place, found.covariance
 
     def _near(self, picture: Picture) -> list[tuple[float, float]] | tuple[GaugeStatus, str]:
@@ -194,7 +194,7 @@ class FollowedMarker:
                 continue
             if not template.best_match(levels.astype(np.float32)).is_alone:
                 if times == 1:
-                    return GaugeStatus.AMBIGUOUS, "another mark like it lies within 1.5 reach_px"
+                    return GaugeStatus.AMBIGUOUS, "a similar mark lies within 1.5 times reach_px"
                 self._most_times = float(times - 1)
                 break
         self._template = template

@@ -26,17 +26,20 @@ SMALLEST_PX, LARGEST_PX = 9.0, 501.0
 # value. A coarse texture needs a higher correlation than chance would give; if chance gives more than the second value,
 # the patch is too small for its texture.
 LEAST_CORRELATION, MOST_BY_CHANCE = 0.7, 0.9
-# Nothing alike may be within so many times the reach (as for edges).
+# No similar texture may lie within this multiple of reach_px (the same limit as for edges), and largest multiple of
+# reach_px within which a lost patch is searched.
 GUARD, MOST_TIMES = 1.5, 4
-# The template is turned with the patch once it lags by this (radians, at a rim of 15 px a pixel and a half).
+# Rotation of the patch relative to its template (radians) above which the template is rotated too; at a distance of 15
+# px from the centre, this rotation is a displacement of 1.5 px.
 TURN_AT = 0.1
 # Largest standard uncertainty of an accepted position (pixels).
 LEAST_SURE_PX = 0.3
-# Texture too fine for the pixels may displace a patch by this (standard deviation in pixels, at its worst phase). With
-# more, lines jump from one column of pixels to the next: intervals covered 96 to 99 % up to here, and 90 % beyond
-# (`python -m tests.benchmarks.gauges --only drawings photographs`, without optics).
+# Largest standard deviation of the displacement (pixels, at the worst sub-pixel phase) by which texture too fine for
+# the pixels may falsify a patch's position. Above this limit, thin lines jump from one column of pixels to the next:
+# the intervals contained 96 to 99 % of the true values below the limit, and 90 % above (`python -m
+# tests.benchmarks.gauges --only drawings photographs`, without optics).
 MOST_ALIASED_PX = 0.04
-# Contrast below a grey level a pixel is rounding.
+# Least contrast per pixel (grey levels); less contrast is rounding.
 LEAST_SPREAD = 1.0
 
 Floats = NDArray[np.float32]
@@ -164,7 +167,7 @@ class FollowedPatch:
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
 
     def _times_alone(self, picture: Picture, template: Template, column: int, row: int) -> float:
-        """How many times the reach a search may grow without reaching something like the patch."""
+        """Multiple of `reach_px` up to which the search may be widened without including a similar texture."""
         a, b = self.half
         for times in range(2, MOST_TIMES + 1):
             reach = ceil(GUARD * self._spec.reach_px * times) + BEYOND_PX
@@ -231,9 +234,13 @@ class FollowedPatch:
             return self._failed(GaugeStatus.NOT_FOUND, "the patch would have moved farther than reach_px permits")
         if not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._failed(GaugeStatus.LOW_CONTRAST)
-        # Where it does not move it is refused too: unresolved lines stay in their pixels until they jump.
+        # A patch at rest is refused as well, because unresolved lines seem to be at rest until they jump to the next
+        # pixel.
         if aliasing_px > MOST_ALIASED_PX:
-            return self._failed(GaugeStatus.LOW_CONTRAST, "its texture is finer than the pixels: defocus a little")
+            return self._failed(
+                GaugeStatus.LOW_CONTRAST,
+                "the texture of the patch is finer than the pixels: defocus the camera slightly",
+            )
         self._at, self._times = place, 1.0
         # The stated point may differ from the patch's centre, which is the centre of a pixel.
         (from_x, from_y) = self._spec.middle_px

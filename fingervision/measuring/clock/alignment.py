@@ -76,7 +76,7 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     jumps = _jumps(every_frame, motion, whole)
     refused = only_set_points(jumps)
     if refused is None and many_left_out(every_frame, motion, whole) is not None:
-        # Where a gap creeps, the frames of every move are beyond the noise of the model without creep.
+        # If the gap creeps, a model without creep rejects the frames of every move as outliers.
         creeping = replace(every_frame, creeps=True)
         motion, whole = _refined(creeping, most_likely(creeping, whole.at))
         refused = many_left_out(every_frame, motion, whole)

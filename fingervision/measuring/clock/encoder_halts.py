@@ -1,4 +1,4 @@
-"""Halts of a stage between two lines of its encoder: the reading's place, met by the strokes before and after."""
+"""Path of a stage that halts between two lines of its encoder: a constant position between two strokes."""
 
 import numpy as np
 
@@ -6,21 +6,24 @@ from fingervision.domain.effect import Array
 from fingervision.measuring.clock.sharp_reversals import ALLOWED, Stroke, stroke
 
 MORE_ROWS = 2
-"""Rows by which a halt is longer than the longest time that moving strokes may spend on one reading: the rows at which
-the reading changes are late by one each."""
+"""Number of rows by which a halt must be longer than the longest time with one reading during a motion, because each of
+the two changes of the reading may be logged one row late.
+"""
 LONGER = 1.25
-"""Time on one reading, over that on the readings before and after together, from which on the stage halts: a stage that
-turns within a step, without a halt, stays for at most the sum; a stroke whose speed changes, somewhat longer."""
+"""Ratio of the time with one reading to the sum of the times with the readings before and after, above which the stage
+halts. A stage that reverses within a step, without a halt, has a ratio of at most 1; a stage whose speed changes, a
+slightly larger one.
+"""
 NEAR = 3
-"""Readings on either side of which the median time is taken."""
+"""Number of readings on either side from whose times the median is calculated."""
 
 
 def level_halts(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: float) -> Array:
-    """Replace a smoothed halt by the reading, from where the stroke before meets it until the stroke after leaves it.
+    """Replace a smoothed halt by its reading, from the end of the preceding stroke to the start of the next one.
 
-    A smoothed path runs on within an encoder step where the stage stands, because every row allows it; most halts are
-    then too far out in the direction of the motion, which a fit takes for play and for an offset. The true place lies
-    anywhere within half a step of the reading, on either side alike.
+    During a halt, a smoothed path continues to move within an encoder step, because the readings permit this motion.
+    Most halts then lie too far in the direction of the motion, and a fit mistakes this error for play and for a clock
+    offset. The true position is anywhere within half a step of the reading, on both sides with equal probability.
 
     Parameters
     ----------
@@ -40,7 +43,7 @@ def level_halts(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: flo
     row_s = float(np.median(np.diff(time_s)))
     for k in np.flatnonzero(last - first > MORE_ROWS).tolist():
         begin, end = int(first[k]), int(last[k])
-        # The first and the last reading of a record were there before, and stay.
+        # The stage may have had the first reading before the record began, and the last reading after the end.
         before_s = float(np.median(taken_s[max(k - NEAR, 0) : k])) if k else 0.0
         after_s = float(np.median(taken_s[k + 1 : k + 1 + NEAR])) if k + 1 < first.size else 0.0
         if taken_s[k] <= LONGER * (before_s + after_s) + MORE_ROWS * row_s:
@@ -65,13 +68,13 @@ def level_halts(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: flo
 
 
 def _entering(row: int, came_mm: float, speed_mm_s: float, level_mm: float, step_mm: float) -> Stroke:
-    """Stroke into (or, with a negative speed, out of) a level over the line of the encoder at its edge."""
+    """Stroke that ends (with a negative speed: begins) at a halt, through the encoder line next to the halt."""
     way = float(np.sign(came_mm))
     return Stroke(row, way * speed_mm_s, level_mm - 0.5 * way * step_mm)
 
 
 def _joined(path: Array, line: Stroke, since_s: Array, level_mm: float, *, is_leaving: bool) -> Array:
-    """Put the part of a stroke that lies outside the halt into the path."""
+    """Replace the path outside the halt by the stroke."""
     at_mm = line.height_mm + line.speed * since_s
     is_outside = (at_mm - level_mm) * line.speed > 0.0 if is_leaving else (at_mm - level_mm) * line.speed < 0.0
     return np.where(is_outside, at_mm, path)

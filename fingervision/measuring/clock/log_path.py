@@ -22,9 +22,9 @@ AVERAGED = 0.5
 """Leverage below which a smoothed row is mainly a mean of several rows, and has an error in common with its neighbours.
 """
 RIPPLE = 0.5
-"""Share of the variance of a smoothed stroke that changes from one encoder line to the next, because the windows end at
-other lines. If a whole window shared this error, the best offset would be one at which frames happen to lie on
-ripples."""
+"""Share of a smoothed stroke's variance that changes from one encoder line to the next, because the smoothing window
+then ends at another line. If this share counted as common to a window, ripples of the path could determine the offset.
+"""
 LEAST_LEVERAGE = 1.0 / 241.0
 """Leverage of a row in the widest window of the smoothing."""
 

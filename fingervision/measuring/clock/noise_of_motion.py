@@ -82,7 +82,7 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
     order = terms.size
     white_mm2 = even_mm2 * max(1.0 - _explained(terms, shrunk), 1e-3)
     extra = input_mm2[order:].copy()
-    # The error of the stretch before stays in the past of the first frames of the next one.
+    # The autoregression carries the error of the preceding stretch into the first frames of a stretch.
     carried_mm = np.zeros(extra.size)
     for k, share in enumerate(terms, start=1):
         past = slice(order - k, input_mm2.size - k)
@@ -107,7 +107,8 @@ def of_input(motion: Motion, found: Fit) -> tuple[Array, Array, NDArray[np.intp]
     Returns
     -------
     own_mm, shared_mm : ndarray of float, shape (n,)
-        Standard uncertainty of the predicted gap by the path between rows, and by the error that a stretch shares.
+        Standard uncertainty of the predicted gap due to the path between rows, and due to the common error of a
+        stretch.
     stretch : ndarray of int, shape (n,)
         Stretch of the log to which each frame belongs.
     """

@@ -10,8 +10,7 @@ from fingervision.measuring.clock.motion_model import WHITE, Alignment, Motion
 from fingervision.stage_record.encoder import input_sigma
 
 STANDS = 0.1
-"""Change in a neighbouring interval, relative to that of a jump, below which the log counts as constant on that
-side."""
+"""Change of the log in a neighbouring interval, relative to the jump, below which the log counts as constant there."""
 JUMPING = 0.7
 """Share of a log's travel in such jumps above which the log may contain set-points. A stage that is read fast enough
 shows intermediate positions, but a stage that is read slowly shows jumps as well.
@@ -42,12 +41,12 @@ class Jumps:
 
 
 def jumps_of(motion: Motion, at: Alignment) -> Jumps | None:
-    """How the gap follows the log's jumps; None if the log has too few jumps to tell.
+    """How the gap follows the log's jumps; None if the log has too few jumps for a decision.
 
     Parameters
     ----------
     motion : Motion
-        The log, and all frames: those of a move are the ones that an alignment with set-points leaves out.
+        The log and all frames, including the frames during moves, which an alignment with set-points leaves out.
     at : Alignment
         Best alignment of the log; the gap predicted from it is compared with the measured gap.
     """

@@ -67,7 +67,7 @@ def stated(
     # Frames show at which time between two rows the stage jumped, but the log does not. A program that moves and logs
     # in one cycle jumps at the same phase of each cycle, so that the error does not average out over jumps.
     if jumps is not None:
-        # Rows that are set-points precede the gap by up to half of the time of a move, and short moves do not show it.
+        # Set-points precede the gap by up to half of the duration of a move, which cannot be detected in short moves.
         variance += (row_s**2 + jumps.move_s**2) / 12.0
     u_time_s = float(np.sqrt(np.mean(variance[:-1])))
     u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
