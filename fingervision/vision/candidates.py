@@ -85,7 +85,7 @@ def found(
 ) -> CoarseFingers | NoGap:
     """Fingers found in one class (dark or light) of a binary picture, also with a part held between them.
 
-    In a picture split by its local mean, objects appear hollow; such hollows are not gaps between fingers.
+    In a picture split by its local mean, objects appear hollow; the hollow parts are not gaps between fingers.
     """
     below = settings.below_tip_px
     reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)

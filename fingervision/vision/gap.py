@@ -294,7 +294,7 @@ def _assemble(
     roughness_px: float,
     held: HeldPart | None,
 ) -> GapMeasurement | NoGap:
-    """Transform the result from the fingers' axes to the picture; refuse one with a larger variance than allowed."""
+    """Transform the result from the fingers' axes to the picture; refuse a result with too large a variance."""
     orientation = fingers.orientation
     across, along, found = [], [], []
     for k, (finger, m) in enumerate(zip((fingers.left, fingers.right), measured, strict=True)):

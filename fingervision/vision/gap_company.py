@@ -1,8 +1,9 @@
 """Recognise a space between two strokes of a letter, which looks like the gap between two fingers.
 
 If the paper of a printed text is taken for the objects, and the letters for the background, the spaces inside and
-between letters look like bars that extend from the picture's border. Between two such bars lies a part of a letter, and
-the picture contains other parts of the same size. Between two fingers lies the background, which is a single region.
+between letters look like bars that extend from the picture's border. Between two apparent bars in a text lies a part of
+a letter, and the picture contains other parts of the same size. Between two fingers lies the background, which is a
+single region.
 """
 
 import cv2

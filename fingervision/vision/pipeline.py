@@ -1,6 +1,6 @@
 """Run the image processing steps on one video frame: grey, denoise, binarise, fingers, edges, tip, gap.
 
-Only this module knows the order of the steps.
+Only the module `pipeline` determines the order of the steps.
 """
 
 from contextlib import suppress

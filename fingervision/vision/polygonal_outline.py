@@ -2,7 +2,7 @@
 
 The outline's points are divided into straight runs. Blur rounds the half-level contour at a corner: points near a
 corner determine only its radius, and sides are fitted to points farther away. Tip and inner edge are those of the
-polygon of these sides, with its corners rounded by the fitted radii.
+polygon of the fitted sides, with its corners rounded by the fitted radii.
 """
 
 from math import atan2, cos, hypot, pi, sin, sqrt, tan

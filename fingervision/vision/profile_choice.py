@@ -1,10 +1,10 @@
 """Select the model of the mean profile across a flank, from which the position of the finger's edge follows.
 
-A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these are
+A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these structures are
 indistinguishable on one flank alone: a wall half as light as the background looks like motion blur, and glare looks
-like a wall on the other side of the edge. They are distinguished by where they occur: a wall is visible on the inner
-flank only, because the camera looks into the gap from its middle; motion blurs both flanks but not the tip; glare and
-shadow surround the finger.
+like a wall on the other side of the edge. Walls, motion, glare and shadows are distinguished by where they occur: a
+wall is visible on the inner flank only, because the camera looks into the gap from its middle; motion blurs both flanks
+but not the tip; glare and shadow surround the finger.
 """
 
 from dataclasses import replace
@@ -226,9 +226,9 @@ def _without_shadow(
 ) -> EdgePoints:
     """Edges corrected for a soft shadow, whose light recovers with distance linearly or exponentially.
 
-    The edge is placed between the positions of the linear and the exponential model, the nearer to the one with the
-    smaller sum of squared residuals beyond noise. The distance between this position and that of the better model is
-    taken as a standard uncertainty.
+    The edge is placed between the positions of the linear and the exponential model, nearer to the model with the
+    smaller sum of squared residuals beyond noise. The distance between the chosen position and the position of the
+    better model is a standard uncertainty.
     """
     squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
     if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
@@ -293,7 +293,7 @@ def _room(edges: EdgePoints) -> int:
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement of the inner edge across the picture, due to a side wall."""
+    """Displacement along every line of pixels if a side wall displaces the inner edge horizontally by one pixel."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
@@ -312,7 +312,7 @@ def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixe
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Set the blur of the inner flanks to the given one, because a wall beside an edge is not blur."""
+    """Set the blur of the inner flanks to a given value, because a wall beside an edge is not blur."""
     blur_px = edges.blur_px.copy()
     blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
     blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])

@@ -1,9 +1,10 @@
 """A strip of a third tone along the fingers' sides: a drop shadow with a hard edge, or a pad.
 
-A threshold assigns such a strip either to the fingers or to the background, so that the measured outline may be that of
-the shadow, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face each other.
-If a strip is assigned to the fingers on one inner side only, it is therefore a shadow. If strips are assigned to the
-background on both inner sides and on no outer side, they are a pair of pads. In both cases the threshold was wrong.
+A threshold assigns a strip of a third tone either to the fingers or to the background, so that the measured outline may
+be that of the shadow, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face
+each other. A strip that is assigned to the fingers on one inner side only is therefore a shadow. If strips are
+assigned to the background on both inner sides and on no outer side, they are a pair of pads. In both cases the
+threshold was wrong.
 """
 
 import numpy as np

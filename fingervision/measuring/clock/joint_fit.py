@@ -116,9 +116,10 @@ def squares_at(motion: Motion, at: Alignment) -> float:
 def allowance_for_creep(motion: Motion, found: Fit) -> tuple[Array, Array]:
     """Changes of offset, rate and play, and of their variances, if creep is added to the model; each of shape (3,).
 
-    Both are zero if creep is already included. In slow motion, creep too small to be detected acts as a delay equal to
-    (creep fraction x time constant), and can also be mistaken for play. The change is that of the most probable creep;
-    the growth covers the creep that remains possible within its prior.
+    Both changes are zero if the model already includes creep. In slow motion, creep too small to be detected acts as a
+    delay equal to (creep fraction x time constant), and can also be mistaken for play. The changes of offset, rate and
+    play are those caused by the most probable creep; the changes of the variances cover the creep that remains possible
+    within its prior.
     """
     if motion.creeps:
         return np.zeros(3), np.zeros(3)

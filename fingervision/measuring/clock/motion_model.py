@@ -113,7 +113,7 @@ class Motion:
     def _behind_play(self, at: Alignment) -> tuple[Array, Array]:
         """Output of the play operator at the frames, and at the log's points.
 
-        This output is exact for a log that is linear between its points.
+        The output is exact for a log that is linear between its points.
 
         Between two samples the input is monotonic, so that the play operator clips the state at the earlier sample
         once.
@@ -189,7 +189,7 @@ class Motion:
     def weighed(self, pulls: Array) -> Array:
         """Weights of the frames' own noise (white after the autoregression) in sums over whitened frames; shape (m, k).
 
-        This is the transpose of the weights in `whitened`, which is symmetric in the shared errors.
+        The weights are the transpose of those in `whitened`; the part for shared errors is symmetric.
         """
         table = self._without_shared(pulls)
         return table * self.noise.weights[:, None] if self.noise.weights.size else table

@@ -27,7 +27,7 @@ def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm:
     Smoothing cuts the corner of a reversal, and no line of the encoder is crossed near it. All reversals are cut
     towards the inside, so that the fitted play is too small by twice the cut, and the offset is wrong by the time that
     a stroke takes for the cut. If a stage slows down before it reverses, two straight strokes do not pass through its
-    readings: such a reversal stays as smoothed.
+    readings, and the smoothed reversal is kept.
 
     Parameters
     ----------
