@@ -40,9 +40,9 @@ def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
     Raises
     ------
     UsageError
-        The address cannot be one.
+        The text is not a network address.
     MissingLibraryError, ProcessError
-        Dask is not installed, nothing answers, there are no workers, or they run other versions.
+        Dask is not installed, the scheduler does not answer, or there are no workers of the same version.
     """
     try:
         from distributed import Client
@@ -50,7 +50,7 @@ def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
         raise MissingLibraryError("Dask", "cluster", "--scheduler") from None
     if not scheduler.startswith(("tcp://", "tls://")) or not scheduler.rpartition(":")[2].isdigit():
         raise UsageError(f"--scheduler must be an address such as tcp://host:8786, but is {scheduler}.")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in a sentence
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # this program reports Dask's errors itself
     try:
         client = Client(scheduler, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError, RuntimeError) as error:
@@ -92,7 +92,7 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
     Raises
     ------
     ProcessError
-        The scheduler is gone.
+        The connection to the scheduler is lost.
     """
     from distributed import KilledWorker, as_completed
 

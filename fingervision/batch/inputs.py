@@ -19,9 +19,9 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
     Raises
     ------
     InputFileError
-        Nothing matches at all.
+        No file matches any of the names.
     UsageError
-        All that matches lies in `out`.
+        All matching files are in `out`.
     """
     found: dict[str, str] = {}
     matched = inside = False

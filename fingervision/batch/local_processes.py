@@ -75,11 +75,11 @@ class LocalCrew:
         Raises
         ------
         ProcessError
-            All of them died of it.
+            All worker processes ended during the command.
         """
         for worker in self._workers.values():
             worker.is_asked = True
-            with suppress(OSError):  # it died: that is seen when it is listened to
+            with suppress(OSError):  # the process has ended, which is noticed when its connection is read
                 worker.link.send((command, arguments))
         while self._workers:
             for link in wait([worker.link for worker in self._workers.values()]):
@@ -168,7 +168,7 @@ class LocalCrew:
             worker.process.kill()
         for worker in self._workers.values():
             worker.link.close()
-        for worker in busy:  # nothing of theirs is written any more
+        for worker in busy:  # busy workers must not write any more
             worker.process.join()
 
 
@@ -197,13 +197,13 @@ def _no_interrupt() -> Iterator[None]:
 
 def _serve(link: Connection, perform: Perform, core: int) -> None:
     """Main loop of a worker, until the connection is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the one who handed out decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the main process decides
     if hasattr(os, "sched_setaffinity"):
         with suppress(OSError):
             os.sched_setaffinity(0, {core})
-    import cv2  # 0.1 s that the process that hands out need not spend
+    import cv2  # takes 0.1 s, which the main process need not spend
 
-    cv2.setNumThreads(1)  # also where a process cannot be bound
+    cv2.setNumThreads(1)  # also if a process cannot be bound to a core
     with suppress(EOFError, OSError):
         while True:
             asked: Task | tuple[str, tuple[str, ...]] = link.recv()

@@ -35,7 +35,7 @@ def folder_names(inputs: Sequence[Path], taken: Collection[str]) -> tuple[str, .
             break
         for number in longer:
             depth[number] += 1
-    # What the path cannot tell apart (a name that itself holds the separator), or is too long: a piece of its hash.
+    # Part of a hash is added if the path does not make a name unique (a name may contain the separator) or is too long.
     for number, name in enumerate(names):
         if number in set(clashing) or len(name) > LONGEST:
             code = hashlib.sha256(str(inputs[number]).encode("utf-8", "surrogateescape")).hexdigest()[:12]

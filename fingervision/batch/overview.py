@@ -42,7 +42,9 @@ def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None
         return
     replace_text(out / TABLE, table)
     _draw(out / FIGURE, reduction, outcomes)
-    replace_text(out / PAGE, stamp + _page(out, command, outcomes))  # last: its stamp says that all three are whole
+    replace_text(
+        out / PAGE, stamp + _page(out, command, outcomes)
+    )  # last: its stamp states that all three are complete
 
 
 def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> str:

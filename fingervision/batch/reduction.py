@@ -20,7 +20,7 @@ class Reduction(Protocol):
     """Protocol of a module `results_of_<command>`."""
 
     COLUMNS: tuple[str, ...]
-    """Columns of its table after those that every command has."""
+    """Columns of the command's table, after the columns that every command has."""
 
     def digest_of(self, folder: Path) -> Digest:
         """Summarise one result folder."""
@@ -37,7 +37,7 @@ def reduction_of(command: str) -> Reduction:
     Raises
     ------
     ModuleNotFoundError
-        The command's results have none.
+        There is no module for this command.
     """
     return cast(Reduction, importlib.import_module(f"{fingervision.batch.__name__}.{PREFIX}{command}"))
 

@@ -213,7 +213,7 @@ def _lives(pid: int) -> bool:
         return False
     except PermissionError:
         return True
-    # A killed process keeps its number until somebody asks how it ended.
+    # A killed process keeps its number until its parent asks for its exit status.
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] not in "ZX"
     return True

@@ -26,7 +26,7 @@ def small_picture(curve: Sequence[float | None]) -> str:
                 y_px = HEIGHT_PX - MARGIN_PX - middle_px - (value - low) * scale_px
                 piece.append(f"{MARGIN_PX + number * step_px:.0f},{y_px:.1f}")
             elif piece:
-                # A single point is a line of no length, which a round end makes a dot.
+                # A single point is drawn as a line of zero length, whose round ends make a dot.
                 lines += f'<polyline points="{" ".join(piece * 2 if len(piece) == 1 else piece)}"/>'
                 piece = []
     return (

@@ -60,7 +60,7 @@ def outcome_of(name: str, folder: Path, record: Record) -> Outcome:
 
 def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcome:
     source = Path(task.input)
-    exists = source.exists()  # for what does not, the command has the sentence
+    exists = source.exists()  # the command itself reports a missing input
     settled = exists and is_settled(source)
     stamp, content = (stamp_of(source), content_hash(source)) if exists else ("", "")
     name = os.path.abspath(source)  # noqa: PTH100 - links keep their own names

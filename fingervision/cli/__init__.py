@@ -29,8 +29,8 @@ class Commands(click.Group):
         for number, argument in enumerate(args, start=1):
             if argument == "" or (argument.startswith("--") and argument.endswith("=")):
                 raise UsageError(
-                    f"A file name, folder name or value must not be empty, but argument {number} is"
-                    f"{': ' + argument if argument else ''}: give a name or value, or leave the option out."
+                    f"A file name, folder name or value must not be empty, but argument {number}"
+                    f"{', ' + argument + ',' if argument else ''} is empty: give one, or leave the option out."
                 )
         return super().parse_args(ctx, args)
 
@@ -43,7 +43,7 @@ class Commands(click.Group):
         if cmd_name not in self.list_commands(ctx):
             return None
         command = importlib.import_module(f"{__name__}.{cmd_name}").command
-        assert isinstance(command, click.Command)  # noqa: S101 - a file without a command is a fault of ours
+        assert isinstance(command, click.Command)  # noqa: S101 - a module without a command is a defect of this package
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -62,7 +62,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; an expected error gives one sentence and an exit code, never a traceback."""
-    # Who is asked to terminate (by a scheduler, at shut-down) ends as with Ctrl-C: in order, and with a sentence.
+    # SIGTERM (from a scheduler or at shut-down) has the effect of Ctrl-C: the command ends in order, with a message.
     with suppress(ValueError):  # not in a thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     _mend_streams()
@@ -88,11 +88,12 @@ def main() -> None:
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             click.echo(
-                "fingervision: A file name must not be longer than the operating system allows, but is: shorten it.",
+                "fingervision: A file name must fit the limits of the operating system, but is too long: shorten it.",
                 err=True,
             )
             sys.exit(ExitCode.COULD_NOT)
-        # Files are their writers' to speak of; what has no name is standard output.
+        # Errors of files are reported where the files are written; an error without a file name concerns standard
+        # output.
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EPIPE):
             raise
         _give_up_output(error)
@@ -104,7 +105,7 @@ def main() -> None:
 
 
 def _printable(words: str) -> str:
-    """Escape control characters except line ends, because a file's name may contain ones that a terminal obeys."""
+    """Escape control characters except line ends, because a file name may contain some that a terminal executes."""
     return "".join(
         each if each == "\n" or unicodedata.category(each) != "Cc" else each.encode("unicode_escape").decode()
         for each in words
@@ -113,7 +114,8 @@ def _printable(words: str) -> str:
 
 def _mend_streams() -> None:
     """Replace closed standard streams, and allow printing of file names that are not valid UTF-8."""
-    # A file that is opened would take the closed one's place, and FFmpeg would write its words into it.
+    # The next file that is opened would get the number of the closed stream, and FFmpeg would print its messages into
+    # it.
     while (lowest := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(lowest)
@@ -126,7 +128,7 @@ def _mend_streams() -> None:
 
 
 def _give_up_output(error: OSError) -> NoReturn:
-    # Else Python tries again at its end, and fails with words of its own.
+    # Otherwise Python would flush the stream again at exit, and print a message of its own.
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno != errno.EPIPE:

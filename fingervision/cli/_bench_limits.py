@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-# Option, name in calib.limits.Limits, default there (a test holds the two equal), what it is.
+# Option; name and default in calib.limits.Limits (a test compares the defaults); description.
 LIMITS = (
     ("--plane-mm", "plane_mm", 0.5, "Largest distance of the gripper from the plane of the reference, +- mm."),
     (
@@ -41,7 +41,7 @@ Command = Callable[..., Any]
 
 
 def limit_options(command: Command) -> Command:
-    """Add one option for the limit of each such property."""
+    """Add one option for the limit of each property of the set-up that the uncertainty budget needs."""
     for option, name, default, words in reversed(LIMITS):
         text = f"{words}  [default: {default:g}]"
         command = click.option(option, name, type=float, default=None, help=text)(command)

@@ -73,7 +73,7 @@ def draw_body(
     side = side or 1.0
     count = stress.size
     at_rest, there = (np.stack([side * a[ends], b[ends]]).T for a, b in ((x, y), (x + u, y + v)))
-    # One collection: a line each would take longer than the finite elements do.
+    # All edges are one collection: a separate line for each edge would take longer than the finite elements.
     axes.add_collection(LineCollection(list(at_rest), colors="0.6", linewidths=0.6, zorder=1))
     shape = Triangulation(side * (x + u)[:count], (y + v)[:count], np.asarray(plate.corner_triangles).T)
     colours = axes.tripcolor(shape, stress, shading="gouraud", cmap=_COLOURS, vmin=0.0, vmax=top_mpa, zorder=2)

@@ -17,12 +17,12 @@ from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 
 
 def body_follower(drawing: Path, points: tuple[str, ...]) -> Callable[[FrameSource, Task, Path, bool], None]:
-    """Read a drawing and the points that place it; return what measures its bodies in a recording.
+    """Read a drawing and the points that place it; return the object that measures its bodies in a recording.
 
     Raises
     ------
     DataError, InputFileError, UsageError
-        The drawing cannot be read, or a point is none.
+        The drawing cannot be read, or a point has the wrong form.
     """
     mechanism, given = mechanism_of(drawing), [parse_point(text) for text in points]
 

@@ -28,9 +28,9 @@ def measure_response(
     Raises
     ------
     UsageError
-        The options ask for two ways at once, or an item is not of their form.
+        The options request two methods at once, or an item has the wrong form.
     CalibrationError
-        The pictures tell no response.
+        The pictures do not determine a response.
     """
     if edges and densities is not None:
         raise UsageError(

@@ -75,7 +75,7 @@ def predict(
                 model = _built(name, mechanism)
                 table[name] = mechanism_figures(model)
         except FingervisionError as error:
-            # One kind's failure leaves the others their results.
+            # If one kind of model fails, the results of the other kinds are still written.
             if kind != "all":
                 raise
             refusals[name] = error
@@ -92,7 +92,7 @@ def predict(
     else:
         inputs = _inputs_mm(np.unique(read_drive(drive, columns).input_mm))
         if large_rotation or contact:
-            # A table is read as straight between its rows, and these answers bend.
+            # A table is interpolated linearly between its rows, but these results are curved.
             touches = [at for at in models[chief].touch_input_mm().values() if contact and inputs[0] < at < inputs[-1]]
             inputs = np.union1d(inputs, np.concatenate([np.linspace(inputs[0], inputs[-1], _ROWS), touches]))
     states = {name: [model.state(float(value), large_rotation=large_rotation, contact=contact) for value in inputs]

@@ -19,7 +19,8 @@ _STYLES = ("-", "--", "-.")
 _IN_PLOT = 4
 """Most curves of a plot whose legend fits into it."""
 _STILL = 0.01
-"""Range of a distance, as a share of it, below which it is plotted without its mean, whose digits would hide it."""
+"""If the relative change of a distance is smaller, the distance is plotted without its mean, whose digits would hide
+the change."""
 
 
 def write_figures(table: Mapping[str, Mapping[str, float]], path: Path) -> None:

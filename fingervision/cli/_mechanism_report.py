@@ -13,7 +13,8 @@ from fingervision.models.mechanism_figures import MechanismModel
 from fingervision.models.mechanism_state import MechanismState
 
 _APART = 0.1
-"""Relative: kinds that differ by more beyond their stated errors are worth a sentence (the issue's own bar)."""
+"""Relative difference of two kinds of model, beyond their stated errors, from which a message is printed (a
+requirement)."""
 
 
 def print_figures(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> None:

@@ -41,7 +41,7 @@ def parse_band(text: str) -> Band:
     Raises
     ------
     UsageError
-        Where it is none.
+        The text is not a frequency band.
     """
     try:
         first, last = (float(part) for part in text.split(":"))
@@ -165,7 +165,7 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     for axes in (upper, upper_force):
         low, high = axes.get_ylim()
         if high < _LEAST_RANGE * low:
-            # A decade's ticks on a line next to constant would all read alike.
+            # All tick labels of a decade would be equal where the curve is nearly constant.
             axes.set_yscale("linear")
             axes.set_ylim(low / _LEAST_RANGE, high * _LEAST_RANGE)
     for axes in (lower, lower_force):

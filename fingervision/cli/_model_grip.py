@@ -31,7 +31,7 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
     Raises
     ------
     UsageError
-        Where it has no width or stiffness, or the fingers squeeze it at rest already by more than they open.
+        The width or the stiffness is not positive, or the part does not fit between the fingers.
     """
     if width_mm is None:
         if stiffness_n_mm is not None:
@@ -70,7 +70,7 @@ def write_grip(
         limit = _closing_limit_mm(gripper, model, touch)
         at = np.linspace(limit, 0.3 * abs(limit) + (touch or 0.0), _ROWS) if inputs is None else np.sort(inputs)
         if touch is not None and at.min() < touch < at.max():
-            # The line bends there.
+            # The curve has a kink at this input.
             at = np.union1d(at, [touch])
         rows[kind] = np.array([_row(model, float(value), part) for value in at])
         if touch is not None:
@@ -96,7 +96,7 @@ def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism
     Raises
     ------
     UsageError
-        Where the part is none, or the drawing has no such pair.
+        The width or the stiffness of the part is not positive, or the drawing has no such pair.
     """
     if width_mm is None and stiffness_n_mm is None:
         return None

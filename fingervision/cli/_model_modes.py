@@ -28,7 +28,7 @@ _FILM_DPI = 80
 _LETTERS_AN_INCH = 12.0
 """Letters of a title that fit side by side."""
 _KILO = 1e4
-"""Frequency (Hz) from which on a title tells kilohertz: four digits would be a power of ten."""
+"""Frequency (Hz) from which a title states kHz: with four digits, Hz would be printed as a power of ten."""
 _MARGIN = 0.02
 _MOST_FILM_MODES = 18
 
@@ -111,7 +111,7 @@ def _in_hz(frequency_hz: float) -> str:
 def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:
     """Write a film of every mode vibrating with a period of one second, side by side."""
     figure, moving = _panels(shapes, f"{title}; slowed to one oscillation per second")
-    # H.264 with halved colour needs even sides.
+    # H.264 with subsampled colour needs an even width and height.
     sides = [2 * ceil(side * _FILM_DPI / 2) / _FILM_DPI for side in figure.get_size_inches()]
     figure.set_size_inches(sides[0], sides[1])
     figure.set_dpi(_FILM_DPI)

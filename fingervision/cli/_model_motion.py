@@ -58,7 +58,7 @@ def _between(drive: DriveHistory, more: Callable[[Array], Array]) -> DriveHistor
     times, inputs, names = [], [], []
     for name in dict.fromkeys(runs.tolist()):
         own, values = drive.time_s[runs == name], drive.input_mm[runs == name]
-        # The drive's samples stay: kinks lie at them.
+        # The drive's own samples are kept, because the input has its kinks there.
         at = np.union1d(more(own), own)
         times.append(at)
         inputs.append(np.interp(at, own, values))
@@ -121,7 +121,7 @@ def motion_asked(
     Raises
     ------
     UsageError
-        Where an option is wrong, or does nothing without another.
+        An option is wrong, or has no effect without another option.
     """
     parse_damping(damping)
     if film and modes is None:
@@ -305,7 +305,7 @@ def _motion_of(
     static: PchipInterpolator | None,
     column: str,
 ) -> Motion:
-    """Vibration of the modes: about the small answer, or about the equilibria that `static` interpolates."""
+    """Vibration of the modes about the linear response, or about the equilibria that `static` interpolates."""
     motion = modal_motion(reduced, drive, parse_damping(damping))
     if static is None:
         return motion

@@ -54,7 +54,7 @@ def say_what_limits(
     *,
     as_json: bool,
 ) -> None:
-    """Warn of stress beyond the yield stress, of fingers that penetrate each other, and of physics not in a model."""
+    """Warn of yielding, of fingers that penetrate each other, and of physical effects that a model omits."""
     for kind in by_trust(models):
         if hasattr(models[kind], "loaded"):
             _warn_of_stress(gripper, models[kind], inputs)

@@ -38,7 +38,7 @@ def perform(name: str, arguments: tuple[str, ...]) -> Ended:
             return Ended(ExitCode.COULD_NOT, "The command was stopped before its end: call it again.", finished=False)
         except FingervisionError as error:
             return Ended(int(error.exit_code), str(error), finished=False, disk_full=_is_for_want_of_room(error))
-        except Exception as error:  # a fault of ours in one recording must not cost the others
+        except Exception as error:  # a defect of this program in one recording must not stop the others
             words = f"A fault in fingervision ended the command ({type(error).__name__}: {error}): please report it."
             return Ended(ExitCode.COULD_NOT, words, finished=False, disk_full=_is_for_want_of_room(error))
     return Ended(ExitCode.DONE, "", finished=True)

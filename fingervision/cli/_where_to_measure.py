@@ -101,7 +101,7 @@ def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
         for given, other in (("px_per_mm", "calibration"), ("calibration", "px_per_mm")):
             sources = [context.get_parameter_source(name) for name in (given, other)]
             if options[given] is not None and sources[0] is not from_file and sources[1] is from_file:
-                # The scale of the command line comes before the file's, of whichever kind.
+                # A scale on the command line replaces the scale of the file, also one of the other kind.
                 options[other] = None
         is_of_file = context.get_parameter_source("u_px_per_mm") is from_file
         if is_of_file and (options["px_per_mm"] is None or context.get_parameter_source("px_per_mm") is not from_file):

@@ -173,7 +173,7 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
         raise InputFileError(f"{path} could not be read ({why(error)}): check the options.") from error
     place = path.resolve()
     if not (isinstance(base, str) and base.isprintable()) or (path.parent / base).resolve() in (*inside, place):
-        return found  # a model that rests on itself is said where it is read
+        return found  # a model that is based on itself is refused when it is read
     return hashlib.sha256(f"{found}\n{_content(path.parent / str(base), (*inside, place))}".encode()).hexdigest()
 
 

@@ -23,7 +23,7 @@ class BedCommands(click.Group):
         if cmd_name not in self.list_commands(ctx):
             return None
         command = importlib.import_module(f"{fingervision.cli.__name__}.{PREFIX}{cmd_name}").command
-        assert isinstance(command, click.Command)  # noqa: S101 - a file without a command is a fault of ours
+        assert isinstance(command, click.Command)  # noqa: S101 - a module without a command is a defect of this package
         return command
 
 

@@ -295,7 +295,7 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
         for table, each in zip(tables, recordings, strict=True):
             for part in parts:
                 refuse_moving(each[part], str(table) if part is None else f"{table} at input {part:g} mm")
-        # Every cell of the study holds the same number of readings: as many as the shortest offers.
+        # Every cell of the study holds the same number of readings: as many as the shortest recording has.
         trials = min(len(each[part]) for each in recordings for part in parts)
         study = gauge_study([[each[part][:trials] for part in parts] for each in recordings])
         percent = None if tolerance_mm is None else study.percent_of(tolerance_mm)

@@ -18,7 +18,7 @@ Examples:
 \b
 Exit codes: 0 done, whatever was found; 1 no frame could be measured, and the report says why; 2 wrong usage.
 """
-# Without a scale the edges are looked at so far below the tips (pixels).
+# Without a scale, the edges are measured at this distance (pixels) below the tips.
 WITHOUT_SCALE_PX = 10.0
 
 

@@ -158,7 +158,7 @@ def command(
     if mechanism is not None:
         from fingervision.cli._measure_bodies import body_follower
 
-        # What is wrong with the drawing or its points is said before the recording is measured.
+        # Errors of the drawing or its points are reported before the recording is measured.
         follow = body_follower(mechanism, points)
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)

@@ -183,7 +183,7 @@ def command(
             answers[name] = model.respond(given)
             row = gripper_figures(gripper, model, given, figures[name])
         except FingervisionError as error:
-            # One kind's failure leaves the others their results.
+            # If one kind of model fails, the results of the other kinds are still written.
             figures.pop(name, None)
             answers.pop(name, None)
             if kind != "all":
@@ -195,7 +195,7 @@ def command(
         rows[name] = {**row, "seconds": round(time.perf_counter() - began, 3)}
         folder = out / name if kind == "all" else out
         folder.mkdir(exist_ok=True)
-        # A model from outside the package need not know where each body stands.
+        # A model from a plug-in need not provide the position of each body.
         poses = model.body_poses(inputs) if hasattr(model, "body_poses") else {}
         write_simulation(folder / "simulation.csv", inputs, answers[name], poses)
     if inputs is None or not rows:

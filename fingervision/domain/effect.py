@@ -173,12 +173,12 @@ class Effect:
     name : str
         Name of the effect in the catalogue, as used in all files.
     stage : Stage
-        Stage of the measuring chain in which the effect acts: drive, mechanism or camera.
+        Section of the measuring chain in which the effect acts: drive, mechanism or camera.
     order : float
-        Position in the chain within the stage: effects act in ascending order. The built-in effects have multiples of
-        ten (`fingervision effects NAME` prints the number), so that a user-defined effect may be put between two of
-        them: an effect that acts after the play (60) and before the jumps (70) has, for example, 65. By default, the
-        effect acts last in its stage.
+        Position in the section of the chain: effects act in ascending order. The built-in effects have multiples of ten
+        (`fingervision effects NAME` prints the number), so that a user-defined effect may be put between two of them:
+        an effect that acts after the play (60) and before the jumps (70) has, for example, 65. By default, the effect
+        acts last in its section.
     words : str
         Short description of the effect.
     formula : str
@@ -204,7 +204,7 @@ class Effect:
         Function for bounds that depend on the data: `narrow(history)` returns the parameters to search, or the reason
         why these data cannot show the effect.
     foretold : mapping of str to (float, float)
-        Ranges of the effect's parameters that a drawing predicts; empty if a drawing predicts nothing.
+        Ranges of the effect's parameters that follow from a drawing; empty if the drawing determines none.
     checks : mapping of FurtherCheck to bool
         Checks without a motion of the stage in which the effect is visible (True) or not visible (False); checks that
         are not listed give no information on the effect.

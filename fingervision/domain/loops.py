@@ -91,7 +91,7 @@ def _forget_others(place: Path, name: str) -> None:
     """Delete libraries that were built from older sources."""
     for path in place.glob(f"{NAME}-*"):
         if path.name != name:
-            with suppress(OSError):  # another process uses it, or has thrown it away
+            with suppress(OSError):  # another process uses the file, or has deleted it
                 path.unlink()
 
 

@@ -23,7 +23,8 @@ PACKAGE = Path(__file__).resolve().parents[1]
 HEADER, DOOR = "domain/loops.h", "domain/loops.c"
 PREPARE = re.compile(r"^PREPARE\((\w+)\)", re.MULTILINE)
 LOOP = re.compile(r'^LOOP\((\w+), "(\w*)", "(\w*)"\)', re.MULTILINE)
-# Sums stay in the order in which they stand, on every processor; only what no digit shows is left to the compiler.
+# The compiler must not reorder sums, so that results are equal on all processors; only optimisations that change no
+# digit are allowed.
 FLAGS = ("-O3", "-std=c11", "-shared", "-fvisibility=hidden", "-fno-math-errno", "-ffp-contract=off", "-w")
 Number = int | float
 Constant = Number | tuple["Constant", ...]
@@ -74,7 +75,8 @@ def build(target: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
         source = Path(name) / "loops.c"
         source.write_text(one_source(), encoding="utf-8")
-        # Beside the target, so that it appears there at once and whole: another process may build it as well.
+        # The library is built beside the target and then renamed, so that it appears complete: another process may
+        # build it at the same time.
         made = Path(tempfile.mkdtemp(dir=target.parent)) / "made"
         try:
             done = subprocess.run(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Codecs state a quantiser for every so many pixels.
+# Side of a block in pixels for which codecs state a quantiser step.
 BLOCK_PX = 16
 
 

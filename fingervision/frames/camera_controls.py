@@ -59,7 +59,9 @@ def request_of(backend: str, name: str, value: float) -> tuple[int, float]:
     Parameters
     ----------
     backend : str
-        OpenCV's name of the backend. name : str Name of the setting.
+        OpenCV's name of the backend.
+    name : str
+        Name of the setting.
     value : float
         Requested value, in the user's unit.
     """

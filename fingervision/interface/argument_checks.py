@@ -46,7 +46,7 @@ def one_of(argument: str, value: object, words: Iterable[str]) -> str:
     ArgumentTypeError
         The argument is not a text.
     UnknownNameError
-        The argument is none of the allowed words; the message suggests the nearest.
+        The argument is not one of the allowed words; the message suggests the most similar word.
     """
     known = tuple(words)
     if isinstance(value, str) and value in known:

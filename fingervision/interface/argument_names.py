@@ -13,9 +13,9 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 OPTION = re.compile(r"`[^`]*`|--([a-z][a-z-]*)")
-"""A command in backticks, which stays as it is, or an option."""
+"""Matches a command in backticks, which is not changed, or an option."""
 OF_OPTIONS = {"out": "folder", "with": "with_effects", "without": "without_effects"}
-"""Arguments that have another name than their option."""
+"""Names of arguments that differ from the names of their options."""
 OF_ARGUMENTS = {
     **{argument: f"--{option}" for option, argument in OF_OPTIONS.items()},
     "source": "The recording",
@@ -24,7 +24,7 @@ OF_ARGUMENTS = {
     "name": "The name",
     "effect": "The effect",
 }
-"""What an argument is called on the command line, where it is not an option of its own name."""
+"""Words for an argument on the command line, if there is no option of the same name."""
 _of_command: ContextVar[bool] = ContextVar("of_command", default=False)
 
 

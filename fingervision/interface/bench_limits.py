@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 from calib.limits import Limits
 
-# With a calibrated lens this part of the radius at the corner is left to bend (a board's rows and columns show it).
+# Residual distortion of a calibrated lens, relative to the radius at the corner (as the rows and columns of a board
+# show).
 LENS_LEFT = 0.0002
 
 
@@ -14,9 +15,9 @@ def limits_from(stated: Mapping[str, float | None], *, lens_calibrated: bool) ->
     Parameters
     ----------
     stated : mapping of str to float or None
-        By the names of `calib.Limits`; None where not stated.
+        Limits by their names in `calib.Limits`; None for a limit that is not stated.
     lens_calibrated : bool
-        Whether a lens is taken off: what is then left is less.
+        Whether the distortion of the lens is corrected, so that the residual distortion is smaller.
     """
     given = {name: value for name, value in stated.items() if value is not None}
     defaults = {"lens_relative": LENS_LEFT} if lens_calibrated else {}

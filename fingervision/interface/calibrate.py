@@ -14,9 +14,9 @@ from fingervision.interface.reference_pictures import references_of
 
 KINDS = ("bar", "slot", "chessboard", "charuco", "scale")
 MARKER_SHARE = 0.75
-"""Side of a ChArUco marker over that of a square, where it is not stated: the usual print."""
+"""Ratio of the sides of a ChArUco marker and a square, as usually printed, if the marker's side is not stated."""
 U_SQUARE = 0.001
-"""Standard uncertainty of a square's side over the side, where it is not stated."""
+"""Relative standard uncertainty of the side of a square, if it is not stated."""
 
 
 @speaks_python
@@ -51,27 +51,30 @@ def calibrate(
     Parameters
     ----------
     kind : str
-        What the pictures show: bar or slot (objects of known size, one a picture; three sizes give scale and edge
-        bias), chessboard or charuco (three pictures or more give the lens too), scale (a line scale, one picture).
+        Kind of reference in the pictures: bar or slot (objects of known size, one object in each picture; three sizes
+        give scale and edge bias), chessboard or charuco (three pictures or more also give the lens), scale (a line
+        scale in one picture).
     pictures : mapping, sequence, path or ndarray
-        Of bars and slots a mapping of file names to sizes in mm, or a sequence of (file name or array, size); a name
-        that begins with `slot:` or `bar:` says what this one shows. Of boards a sequence of file names or arrays, the
-        first with the board in the plane of the gripper. Of a line scale one file name or array.
+        For bars and slots: a mapping of file names to sizes in mm, or a sequence of (file name or array, size); the
+        prefix `slot:` or `bar:` of a name states the kind of this object. For boards: a sequence of file names or
+        arrays; in the first picture, the board lies in the plane of the gripper. For a line scale: one file name or
+        array.
     u_size_mm : float
         Standard uncertainty of every size.
     squares : (int, int) or None
-        Of a chessboard the inner corners, of a ChArUco board the squares, along x and y.
+        Number of inner corners of a chessboard, or of squares of a ChArUco board, along x and y.
     square_mm, u_square_mm, marker_mm : float or None
-        Side of a square, its standard uncertainty (a thousandth), and of a marker (0.75 of the square).
+        Side of a square, its standard uncertainty (by default a thousandth of the side), and side of a marker (by
+        default 0.75 of the side of a square).
     pitch_mm, u_line_mm, u_length_mm : float or None
-        Of a line scale the distance of neighbouring lines, the standard uncertainty of every line's place, and of the
-        length over all lines.
+        For a line scale: distance of neighbouring lines, standard uncertainty of the position of every line, and
+        standard uncertainty of the length over all lines.
     roi : (int, int, int, int) or None
         Use only this part of every picture: first column, first row, width, height; not for boards.
     response : str
         Light that each grey level stands for: auto, linear, srgb, bt709 or a file.
     certificate, date : str
-        Of the reference.
+        Name and date of the certificate of the reference.
     camera : mapping of str to str, or None
         Settings of the camera, to be compared with a recording's.
     plane_mm, camera_distance_mm, tilt_deg, lens_relative, edge_bias_px, estimator_px, temperature_k, expansion_per_k
@@ -80,7 +83,7 @@ def calibrate(
     Returns
     -------
     Calibration
-        Scale, edge bias and budget, with what was found in each picture.
+        Scale, edge bias and budget, with the findings in each picture.
 
     Raises
     ------

@@ -31,13 +31,13 @@ class Calibration:
     Parameters
     ----------
     scale : calib.Calibration
-        The scale, its budget, and what it was made from.
+        The scale, its budget, and the references from which it was determined.
     path : Path or None
-        The file that it was read from.
+        The file from which the calibration was read; None for a new calibration.
     lines : tuple of str
         Findings of the calibration, in sentences.
     pictures : mapping of str to ndarray of uint8, shape (height, width, 3)
-        Each picture (red, green, blue) with the found edges drawn in.
+        Each picture (red, green, blue) with the detected edges drawn in.
     details : mapping
         Numbers of the fit, for programs.
 
@@ -131,12 +131,12 @@ class Calibration:
     def check(
         self, references: Any, *, u_size_mm: float = 0.001, roi: Sequence[int] | None = None
     ) -> tuple[Agreement, ...]:
-        """Measure objects of known size and say whether each agrees (E_n number, ISO 13528).
+        """Measure objects of known size and say whether each agrees with its stated size (E_n score of ISO 13528).
 
         Parameters
         ----------
         references : mapping of path to float, or sequence of (path or picture, float)
-            Pictures with their sizes in mm, as of `fingervision.calibrate`.
+            Pictures with their sizes in mm, as for `fingervision.calibrate`.
         u_size_mm : float
             Standard uncertainty of every size.
         roi : (int, int, int, int) or None

@@ -32,9 +32,9 @@ class Noted:
     Parameters
     ----------
     certificate, date : str
-        Of the reference.
+        Name and date of the certificate of the reference.
     response : str
-        Which light a grey level stands for.
+        Camera response: the light that each grey level stands for.
     camera : mapping of str to str
         Settings of the camera.
     """
@@ -121,10 +121,10 @@ def on_board(
     certified = tuple(
         replace(each, certificate=noted.certificate, date=noted.date) for each in fit.calibration.references
     )
-    # A board's corners lie between equal edges on every side: a response does not move them.
+    # A corner of a board lies between equal edges on all sides, so that the response does not move it.
     scale = _complete(read_with.noted(replace(fit.calibration, references=certified), 0.0), noted.camera)
     residuals = [fit.plane.residual_px] if fit.lens is None else fit.lens.residual_px
-    # One picture gives the plane alone, and its residuals.
+    # A single picture gives only the plane and its residuals.
     drawn = {
         found.name: picture_of_corners(grey, found.points_px, residual, f"{found.name}: {len(found.points_px)} corners")
         for (_, grey), found, residual in zip(stored, corners, residuals, strict=True)
@@ -153,7 +153,8 @@ def on_lines(
     height, width = stored.shape
     reference = Certified(f"line scale {name}", pitch_mm, u_length_mm, noted.certificate, noted.date)
     fit = scale_from_lines(lines, pitch_mm, u_line_mm, u_length_mm, (width, height), bench, reference, stated)
-    # A response moves the two edges of a line in opposite senses: its middle, and so the scale, stays.
+    # The response moves the two edges of a line in opposite directions: its middle, and therefore the scale, does not
+    # change.
     scale = _complete(read_with.noted(fit.calibration, 0.0), noted.camera)
     words = f"{name}: {len(lines.at_px)} lines, pitch {pitch_mm:g} mm"
     drawn = {name: picture_of_lines(stored, lines, fit.used, fit.residual_um, words)}

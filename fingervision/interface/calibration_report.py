@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from calib.scale_from_lines import LineScaleFit
     from calib.scale_from_sizes import ScaleFit
 
-# The budget is printed for a gap of this size in the middle of the picture, found as surely as 20 rows allow.
+# The budget is printed for a gap of this size in the middle of the picture, measured over 20 rows.
 TABLE_GAP_MM, TABLE_U_PX = 1.0, 0.0106
 
 

@@ -27,9 +27,9 @@ def drive_from_columns(table: Any) -> DriveHistory:
     ArgumentTypeError
         The argument has no columns.
     ArgumentError
-        A column is missing, or holds what is no number.
+        A column is missing, or a cell is not a number.
     DataError
-        Times do not increase, or a run comes back after another.
+        Times do not increase, or the rows of a run are not contiguous.
     """
     columns = columns_of("drive", table, "a drive table's file name, DriveHistory, DataFrame or mapping of columns")
     for name in DRIVE_COLUMNS:
@@ -52,9 +52,9 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     ArgumentTypeError
         The argument has no columns.
     ArgumentError
-        A column is missing, or holds what is no number.
+        A column is missing, or a cell is not a number.
     DataError
-        As `fingervision.read_table`.
+        For the same reasons as in `fingervision.read_table`.
     """
     columns = columns_of(
         "measured", table, "a table's file name, Measurement, MeasuredTable, DataFrame or mapping of columns"
@@ -65,7 +65,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     values = {name: _numbers("measured", name, columns[name]) for name in measured_table.NUMBERS if name in columns}
     runs = ["" if _is_missing(run) else str(run) for run in columns["run"]] if "run" in columns else None
     table_in_memory = measured_table.measured_rows(Path("measured"), values, runs)
-    # What lies in the current folder has nothing to do with these columns.
+    # A columns.toml in the current folder does not apply to columns in memory.
     return replace(table_in_memory, slots=(), u_clock_s=0.0)
 
 
@@ -75,9 +75,9 @@ def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
     Raises
     ------
     ArgumentError
-        A column is missing, or holds what is no number.
+        A column is missing, or a cell is not a number.
     DataError
-        Fewer than two rows, an input that stands twice, a gap that does not depend on the input.
+        There are fewer than two rows, an input occurs twice, or the gap does not depend on the input.
     """
     for name in ("input_mm", "gap_mm"):
         if name not in columns:
@@ -127,7 +127,7 @@ def _array(value: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _is_missing(cell: Any) -> bool:
-    """Whether a cell is empty: None, pandas' NA, or NaN, which stands for empty in a DataFrame."""
+    """Whether a cell is empty: None, pandas' NA, or NaN, which represents a missing value in a DataFrame."""
     return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
 
 

@@ -75,7 +75,7 @@ class Comparison:
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """Regions in which the residual is significantly larger than noise, the largest first."""
+        """Regions in which the residual is significantly larger than the noise, the largest residual first."""
         return self.first.places
 
     @property
@@ -165,13 +165,13 @@ def compare(
     measured : path, Measurement, MeasuredTable, DataFrame or mapping of columns
         `input_mm,gap_mm[,run,time_s,left_mm,right_mm,u_random_mm,force_n]`; a measurement needs a drive.
     model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
-        Also a list of these, or a mapping of them by name.
+        The model; or a list of models, or a mapping of names to models.
     seed : int
         Seed of the bootstrap for the threshold.
     kind : str
-        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+        Kind of model by which a gripper.toml is computed: stiffness_matrix, lumped or finite_element.
     columns : path or None
-        A columns.toml for foreign tables.
+        A columns.toml, for tables of other programs.
     call : str
         Name of this call in the provenance of the results.
 

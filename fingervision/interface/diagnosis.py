@@ -42,15 +42,15 @@ class Diagnosis:
     Parameters
     ----------
     found : fingervision.diagnosis.diagnose.Diagnosis
-        The report with the arrays behind it.
+        The report, and the arrays from which it was made.
     model : CorrectedModel
-        What was diagnosed.
+        The model that was diagnosed.
     measured : Path
         File of the table, or a name for a table in memory.
     made : Provenance
         Files with their hashes, versions and time.
     own_effects : tuple of Effect
-        Effects that were tried beside the catalogue for this call.
+        User-defined effects that were tried in addition to the catalogue in this call.
     """
 
     found: Found = field(repr=False)
@@ -170,15 +170,15 @@ def diagnose(
     with_effects, without_effects : iterable of str
         Effects that every explanation must include, or must not include.
     effects : iterable of Effect
-        User-defined effects that are tried beside the catalogue in this call; see `fingervision.effect`.
+        User-defined effects that are tried in addition to the catalogue in this call; see `fingervision.effect`.
     seed : int
         Seed of the bootstrap; the same seed gives the same report.
     kind : str
-        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+        Kind of model by which a gripper.toml is computed: stiffness_matrix, lumped or finite_element.
     columns : path or None
-        A columns.toml for foreign tables.
+        A columns.toml, for tables of other programs.
     progress : callable or None
-        Called with the share of the work that is done, from 0 to 1.
+        Function called with the completed share of the work, from 0 to 1.
     call : str
         Name of this call in the provenance of the results.
 

@@ -14,7 +14,7 @@ SIZE_PX = (640, 480)
 PX_PER_MM = 20.0
 SEED = 1
 TILTS_DEG = ((0.0, 0.0), (0.0, 14.0), (12.0, -6.0), (-10.0, 8.0), (-8.0, -12.0))
-"""Of the boards about both axes: the first lies in the plane that is measured in."""
+"""Tilts of the boards about both axes, in degrees; the first board lies in the plane of measurement."""
 CAMERA_DISTANCE_PX = 2500.0
 EXPOSURES = {"e05.png": 0.5, "e10.png": 1.0, "e20.png": 2.0, "e40.png": 4.0}
 

@@ -11,7 +11,7 @@ from fingervision.interface.example_pictures import board_pictures, exposures, m
 from fingervision.storage.sample_folder import sample_folder
 
 OWN = "own:"
-"""Begins the source of a file that lies in `fingervision/examples`, or elsewhere in the package."""
+"""Prefix of the source of a file that is inside the package, such as in `fingervision/examples`."""
 
 PAPER_RUN = {"samples.csv": "paper_run/measured.csv", "comsol.csv": "paper_run/gripper.csv"}
 PAPER = {"gripper.toml": "paper/gripper.toml"}
@@ -26,13 +26,14 @@ class Case:
     Parameters
     ----------
     words : str
-        What it shows, in half a sentence.
+        Short description of the example.
     files : mapping of str to str
-        Where each file comes from, by its name in the folder: below the samples, or with `OWN` in the package.
+        Source of each file, by its name in the new folder: a path below the samples, or below the package if it begins
+        with `OWN`.
     run : str
-        The command to begin with.
+        The first command to run.
     made : tuple of callable
-        What draws further pictures into the folder.
+        Functions that draw further pictures into the folder.
     """
 
     words: str
@@ -147,7 +148,7 @@ CASES = {
         "fingervision measure table1 --calibration calibration.json",
     ),
 }
-"""The cases by name; one has the name of the command whose examples work in it."""
+"""The examples by name; an example with the name of a command contains the files of the command's `--help` examples."""
 
 
 def copy_example(name: str, folder: Path) -> Case:
@@ -156,16 +157,16 @@ def copy_example(name: str, folder: Path) -> Case:
     Parameters
     ----------
     name : str
-        Of the case.
+        Name of the example.
     folder : Path
-        Must not be there, or be empty.
+        The new folder; an existing folder must be empty.
 
     Raises
     ------
     UnknownNameError
         No example has that name.
     UsageError
-        The folder is there already, and not empty.
+        The folder exists and is not empty.
     OutputError
         The folder or a file in it cannot be written.
     """
@@ -175,7 +176,7 @@ def copy_example(name: str, folder: Path) -> Case:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"--out must be a new folder, but {folder} exists already: name another.")
     samples, package = sample_folder(), Path(fingervision.__file__).parent
-    # Whole or not at all.
+    # The folder is created completely or not at all.
     part = folder.with_name(f".{folder.name}.part")
     try:
         for target, source in case.files.items():

@@ -35,14 +35,14 @@ def recording_of(
     Parameters
     ----------
     source, rate_hz, times_s, frames, coding
-        As of `fingervision.measure`.
+        The same as the arguments of `fingervision.measure`.
 
     Raises
     ------
     ArgumentTypeError
-        The array holds no pictures.
+        The array does not contain pictures.
     UsageError
-        An argument that this source has no use for.
+        An argument does not apply to this kind of source.
     DataError, DeviceError, InputFileError
         The file cannot be read.
     """

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from fingervision.interface.calibration import Calibration
 
 FLOAT_BITS = 16
-"""Levels that are given as floats become levels of 16 bits."""
+"""Bit depth to which pictures given as floats are converted."""
 
 
 @speaks_python
@@ -68,10 +68,11 @@ def measure(
     Parameters
     ----------
     source : ndarray, path, int or FrameSource
-        One picture of shape (height, width) or (height, width, 3), a stack of them with the frames first, in uint8,
-        uint16, or float from 0 (black) to 1 (end of the scale); colours are red, green, blue, with an opaque alpha or
-        without. Or the name of a video file, an image, a folder of images, a glob, a camera or a stream; or a camera's
-        number. A three-dimensional array is one picture in colour where its last dimension is 3 or 4.
+        Either an array: one picture of shape (height, width) or (height, width, 3), or a stack of pictures with the
+        frames as first dimension, in uint8, uint16, or float from 0 (black) to 1 (full scale). Colours are red, green,
+        blue; an alpha channel must be opaque. A three-dimensional array is a single picture in colour if its last
+        dimension is 3 or 4. Or the name of a video file, an image, a folder of images, a glob, a camera or a stream; or
+        the number of a camera.
     calibration : path, Calibration or None
         The scale with its uncertainty; one of `calibration` and `px_per_mm` is required.
     px_per_mm : float or None
@@ -94,7 +95,7 @@ def measure(
     drive_offset_s : float or None
         Clock offset, added to the drive's times; None determines it from the motion.
     columns : path or None
-        A columns.toml that says how a foreign drive table is read.
+        A columns.toml that states the meaning of the columns of a drive table from another program.
     response : str, path or CameraResponse
         Light that each grey level stands for: auto, linear, srgb, bt709 or a file.
     bits : int or None
@@ -104,20 +105,20 @@ def measure(
     face : str
         Edge of a thick part: front, of the face towards the camera, or outline.
     coding : str
-        What an array's pictures went through before: lossless, intraframe (JPEG) or interframe (H.264); the errors of
-        neighbouring pixels are then correlated, and the uncertainty is larger.
+        Compression of an array's pictures before: lossless, intraframe (JPEG) or interframe (H.264). After lossy
+        compression the errors of neighbouring pixels are correlated, and the uncertainty is larger.
     frames : int, (int, int) or None
-        How many frames of a camera are measured; or the first and the last frame of a recording, counted from 0 and
-        both included.
+        Number of frames to measure from a camera; or first and last frame of a recording, counted from 0, both
+        included.
     gauges : path, sequence of Gauge, or None
-        Gauges to measure beside the gap, as a gauges.toml states them; their values are in `gauge_rows`.
+        Gauges to measure in addition to the gap; their values are in `gauge_rows`.
     progress : callable or None
         Called repeatedly with the number of measured frames and the number of frames that the source announces.
 
     Returns
     -------
     Measurement
-        One row a frame.
+        The result, with one row per frame.
 
     Raises
     ------
@@ -175,20 +176,21 @@ def measure_into(
     Parameters
     ----------
     folder : Path or None
-        Where to; None takes measured/<name of the recording>.
+        Folder for the results; None takes measured/<name of the recording>.
     recording : str
         A video file, a folder of images, or a glob.
     task : Task
-        What is measured.
+        Settings of the measurement.
     rate_hz : float or None
-        Images in a second, where they have no times of their own.
+        Images per second, if the images carry no times.
     on_progress : callable or None
-        As of `measure`.
+        The same as the argument `progress` of `measure`.
 
     Raises
     ------
     UsageError, FingervisionError
-        As of `measure`; or the folder is another recording's, or cannot be written.
+        For the same reasons as in `measure`; or the folder holds the results of another recording, or cannot be
+        written.
     """
     source = open_source(recording, Wish(rate_hz=rate_hz))
     out = folder or usual_folder(recording)

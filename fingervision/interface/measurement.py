@@ -39,7 +39,7 @@ class Measurement:
     _found : MeasuredInMemory
         Rows, series and summary.
     _again : callable
-        Opens the recording once more, for pictures.
+        Function that opens the recording again, to draw pictures.
 
     Examples
     --------
@@ -86,12 +86,12 @@ class Measurement:
 
     @property
     def gap_mm(self) -> NDArray[np.float64]:
-        """Gaps of the frames that have one, shape (n,); `frames_ok` says which these are."""
+        """Gaps of the frames that have a gap, shape (n,); `frames_ok` gives the numbers of these frames."""
         return self._found.series.gap_mm
 
     @property
     def u_gap_mm(self) -> NDArray[np.float64] | None:
-        """Standard uncertainties of `gap_mm`, shape (n,); None where the scale was stated without an uncertainty."""
+        """Standard uncertainties of `gap_mm`, shape (n,); None if the scale was stated without an uncertainty."""
         return self._found.series.u_mm if self._found.series.has_budget else None
 
     @property
@@ -106,7 +106,7 @@ class Measurement:
 
     @property
     def time_s(self) -> NDArray[np.float64] | None:
-        """Times of the frames that have a gap, shape (n,); None where the recording has no times."""
+        """Times of the frames that have a gap, shape (n,); None if the recording has no times."""
         times = self._found.series.times_s()
         return None if times is None else times[0]
 
@@ -117,12 +117,12 @@ class Measurement:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What summary.json holds."""
+        """The content of summary.json."""
         return self._found.summary
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """Sentences on what to change about the recording, and remarks; why no frame has an input stands first."""
+        """Sentences on what to change in the recording, and remarks; if no frame has an input, first the reason."""
         refusal = () if self.no_input is None else (self.no_input,)
         return (*refusal, *self._found.summary["advice"])
 
@@ -204,7 +204,7 @@ class Measurement:
         Parameters
         ----------
         frame : int
-            Its number in the recording, from 0. A recording is read up to it once more.
+            Number of the frame in the recording, from 0. The recording is read again up to this frame.
 
         Returns
         -------
@@ -250,17 +250,17 @@ class Measurement:
         return dataset(self._found)
 
     def plot(self, axes: "tuple[Axes, Axes] | None" = None) -> "tuple[Axes, Axes]":
-        """Draw the gap over time with its expanded uncertainty (k = 2), as gap.png has it.
+        """Draw the gap over time with its expanded uncertainty (k = 2), as in gap.png.
 
         Parameters
         ----------
         axes : (Axes, Axes) or None
-            Matplotlib axes for the gap and for its uncertainty; None makes a new figure of them.
+            Matplotlib axes for the gap and for its uncertainty; None makes a new figure.
 
         Returns
         -------
         (Axes, Axes)
-            What was drawn in.
+            The axes of the gap and of its uncertainty.
         """
         from fingervision.interface.measurement_pictures import plotted
 
@@ -273,11 +273,12 @@ class Measurement:
         Parameters
         ----------
         folder : path
-            Made where it is not there. One with the results of another recording is refused.
+            The folder, which is created if it does not exist. A folder with the results of another recording is
+            refused.
         overlay : bool
             Also write overlay.mp4.
         steps : int or None
-            Also write every step of this frame.
+            Number of a frame of which the pictures of all processing steps are also written.
 
         Returns
         -------

@@ -36,7 +36,7 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     UsageError
         The measurement has no drive.
     DataError
-        The drive gave no frame an input, or there are too few such frames, or they do not move.
+        No frame has an input from the drive, there are too few such frames, or the input does not change.
     """
     task, clock = found.task, found.clock
     if task.drive is None:

@@ -27,16 +27,16 @@ BITS = (8, 16)
 
 
 def scale_of(calibration: Any, px_per_mm: Any, u_px_per_mm: Any = None) -> tuple[Scale, Path | None]:
-    """Return the scale, and the file that it was read from.
+    """Return the scale, and the file from which it was read.
 
     Parameters
     ----------
     calibration : path, Calibration or None
-        A calibration.json, or what one holds.
+        A calibration, or the path of a calibration.json.
     px_per_mm : float or None
-        The scale alone.
+        The scale without a calibration, in pixels per mm.
     u_px_per_mm : float or None
-        Standard uncertainty of that scale.
+        Standard uncertainty of `px_per_mm`.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def range_of(frames: Any) -> tuple[tuple[int, int] | None, Any]:
     (int, int) or None
         First and last frame, both included.
     object
-        The number of frames, unchecked; None where there is none.
+        The number of frames, unchecked; None if `frames` is a range or None.
 
     Raises
     ------

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 80
-"""Of a figure in a cell: 720 pixels for 9 inches, about the width of a notebook's column."""
+"""Resolution of a figure in a notebook cell: 720 pixels for 9 inches, about the width of a notebook's column."""
 
 
 def png_of(picture: NDArray[np.uint8]) -> bytes:

@@ -14,9 +14,9 @@ from fingervision.interface.argument_names import speaks_python
 from fingervision.plugins.watched_import import importing
 
 ARGUMENTS = 3
-"""Of an effect's function: the signal, the history, the values of its parameters."""
+"""Number of arguments of an effect's function: the signal, the history, and the values of the parameters."""
 _registered: dict[str, Effect] = {}
-"""What the decorator added, by name, as it was given back."""
+"""Effects that the decorator added, by name."""
 
 
 @speaks_python
@@ -37,8 +37,8 @@ def effect(
     Parameters
     ----------
     stage : str
-        Where it acts: drive (the function gets and gives the input in mm, shape (n,)), mechanism or camera (it gets and
-        gives a `Response`, the two measuring points).
+        Section of the measuring chain in which the effect acts: drive (the function receives and returns the input in
+        mm, shape (n,)), mechanism or camera (the function receives and returns a `Response`, the two measuring points).
     parameters : Parameter or iterable of Parameter
         Parameters with bounds; one parameter, the size, has a neutral value at which the effect changes nothing.
     name : str or None
@@ -48,14 +48,14 @@ def effect(
     residual : str
         Description of the residual (measured minus simulated) that the effect causes.
     after : str or None
-        Effect of the same stage after which this effect acts; None puts it after all effects of its stage.
+        Effect of the same section after which this effect acts; None puts the effect after all effects of its section.
     **needs
         Further fields of an effect: needs_times, needs_shared_clock, needs_edges, needs_force, memory, start, narrow.
 
     Returns
     -------
     callable
-        A decorator that gives the effect.
+        A decorator that returns the effect.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def effect(
             act=function,
             **needs,
         )
-        # Whoever imports a file of effects adds what it holds, and says where it comes from.
+        # The code that imports a file of effects adds its effects, with their origin.
         if not importing():
             _registered[own.name] = register(own)
         return own
@@ -139,7 +139,7 @@ def added(effects: Iterable[Effect]) -> Iterator[None]:
 def _order(stage: Stage, after: str | None) -> float:
     known = catalogue()
     if after is None:
-        # The last of its stage; what has the same place goes by name.
+        # The effect acts last in its section; effects with the same order are sorted by name.
         return max((each.order for each in known.values() if each.stage == stage), default=0.0) + 1.0
     own_stage: Mapping[str, Effect] = {key: each for key, each in known.items() if each.stage == stage}
     return own_stage[one_of("after", after, own_stage)].order

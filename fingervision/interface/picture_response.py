@@ -20,7 +20,7 @@ class PictureResponse:
     Parameters
     ----------
     response, other : CameraResponse
-        The response that is used, and the standard one that it may be as well.
+        The response that is used, and the alternative standard response.
     is_known : bool
         Whether the user stated it.
     """

@@ -33,11 +33,11 @@ class Reference:
     Parameters
     ----------
     kind : str
-        bar or slot.
+        Kind of the object: bar or slot.
     source : Path or ndarray
         The picture.
     value : float
-        The size in mm, or what else is known of the picture.
+        The size in mm, or another known value of the picture.
     """
 
     kind: str
@@ -51,9 +51,9 @@ def references_of(pictures: Any, kind: str) -> list[Reference]:
     Parameters
     ----------
     pictures : mapping of path to float, or sequence of (path or ndarray, float[, str])
-        A path may begin with `slot:` or `bar:`, where that is not what `kind` says.
+        Pictures with sizes; a path may begin with `slot:` or `bar:`, if its object is of another kind than `kind`.
     kind : str
-        What is shown where nothing else is said.
+        Kind of the objects whose path has no prefix.
 
     Raises
     ------
@@ -101,12 +101,12 @@ def known_sizes(references: Sequence[Reference], u_size_mm: float) -> list[Known
 
 
 def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
-    """Read pictures as grey levels, with a name each; all of one size, no file twice.
+    """Read pictures as grey levels, and name each; all must have the same size, and no file may be named twice.
 
     Raises
     ------
     UsageError
-        A file is named twice, or what is no picture.
+        A file is named twice, or an item is not a picture.
     DataError, InputFileError
         A picture cannot be read, or differs in size from the others.
     """

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from fingervision.models.corrected import CorrectedModel
 
 SLACK = 1e-9
-"""Share of a model's range by which an input may lie beyond it: rounding."""
+"""Share of the range of a model by which an input may exceed the range, because of rounding."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,9 +52,9 @@ class Simulation:
     input_mm : ndarray of float, shape (n,)
         Input of the drive.
     time_s : ndarray of float, shape (n,), or None
-        Times, where the drive has them.
+        Times; None if the drive has no times.
     run : tuple of str, length n, or None
-        Run of each sample, where the drive has runs.
+        Name of the run of each sample; None if the drive has no runs.
     response : Response
         The measuring points.
     """
@@ -196,18 +196,18 @@ def simulate(
     Parameters
     ----------
     model : path, CorrectedModel, Diagnosis, DataFrame or mapping of columns
-        A simulation table, gripper.toml, model.toml, FMU or Python file; or what one holds.
+        A simulation table, gripper.toml, model.toml, FMU or Python file; or a model in memory.
     drive : path, DriveHistory, DataFrame or mapping with time_s and input_mm, or inputs in mm of shape (n,)
-        The input. Bare inputs have no times: a model with effects that have memory needs these.
+        The input over time. An array of inputs has no times, but a model with effects that have memory needs times.
     kind : str
-        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+        Kind of model by which a gripper.toml is computed: stiffness_matrix, lumped or finite_element.
     columns : path or None
-        A columns.toml for foreign tables.
+        A columns.toml, for tables of other programs.
 
     Returns
     -------
     Simulation
-        One value an input.
+        The prediction, with one value per input.
 
     Raises
     ------
@@ -261,7 +261,7 @@ def simulate(
 
 
 def _inputs(drive: Any, columns: Any) -> tuple[NDArray[np.float64] | None, NDArray[np.float64], tuple[str, ...] | None]:
-    """Times, inputs and runs of a drive, whichever type it is given as."""
+    """Times, inputs and runs of a drive of any accepted type."""
     import os
     from collections.abc import Mapping
 

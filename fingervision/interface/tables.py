@@ -24,7 +24,7 @@ from fingervision.tables import read as tables
 
 TABLES = ("measured", "drive", "simulation")
 IN_MEMORY = Path("in memory")
-"""Folder of the names of what has no file."""
+"""Folder in the names of tables and models that have no file."""
 
 
 @overload
@@ -53,21 +53,22 @@ def read_table(
     kind: str = "measured",
     columns: "str | os.PathLike[str] | None" = None,
 ) -> MeasuredTable | DriveHistory | TableModel:
-    """Read a table of any laboratory: format, columns and units are recognised, or asked for.
+    """Read a table of any program; format, columns and units are recognised, or an error asks for them.
 
     Parameters
     ----------
     path : path
         The table.
     kind : str
-        What it holds: measured, drive or simulation.
+        Kind of table: measured, drive or simulation.
     columns : path or None
-        A columns.toml (`fingervision table FILE` writes one); None: the one beside the table, if any.
+        A columns.toml (`fingervision table FILE` writes one); None takes a columns.toml in the folder of the table, if
+        there is one.
 
     Returns
     -------
     MeasuredTable, DriveHistory or TableModel
-        As `kind` says.
+        The table, of the type that belongs to `kind`.
 
     Raises
     ------
@@ -104,7 +105,7 @@ def read_model(
     path : path
         The file.
     kind : str
-        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+        Kind of model by which a gripper.toml is computed: stiffness_matrix, lumped or finite_element.
     columns : path or None
         A columns.toml for a simulation table.
 
@@ -130,9 +131,9 @@ class Given:
     Parameters
     ----------
     value : MeasuredTable or CorrectedModel
-        What it holds.
+        The table or the model.
     path : Path
-        Its file; of what was in memory a name that stays the same for the same content.
+        The file; for a table or model in memory, a name that is the same for the same content.
     """
 
     value: Any
@@ -145,7 +146,7 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
     Raises
     ------
     ArgumentTypeError
-        The argument holds no table.
+        The argument is not a table.
     DataError, InputFileError, OpenQuestionError
         The table cannot be read, or its content cannot be used.
     """

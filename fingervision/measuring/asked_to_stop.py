@@ -1,4 +1,4 @@
-"""Handle Ctrl-C and SIGTERM between two frames, so that no row is cut off."""
+"""Handle Ctrl-C and SIGTERM between two frames, so that no row of the table is incomplete."""
 
 import signal
 import threading
@@ -9,7 +9,7 @@ from types import FrameType
 
 @contextmanager
 def asked_to_stop() -> Iterator[threading.Event]:
-    """Record a first Ctrl-C or SIGTERM instead of raising it; a second one is raised as usual.
+    """Record the first Ctrl-C or SIGTERM instead of raising it; a second signal is raised as usual.
 
     Signals are not recorded outside the main thread, nor in a worker process, whose parent process handles them.
 

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from fingervision.domain.loops import loop
 from fingervision.vision.grey import GreyImage
 
-# The smallest square that JPEG and H.264 transform, but for H.264's 4 x 4, whose damage comes in squares of 16.
+# Side of the squares (pixels): the smallest transform of JPEG and H.264, except for that of 4 x 4 in H.264, whose
+# damage appears in squares of 16.
 SQUARE_PX = 8
-# A step at the border stands out where it is so many times the two steps beside it on either side. A real edge that
-# happens to lie there is spread by the lens and the pixels: one of a Gaussian spread of 0.5 px has a step half as large
-# beside it.
+# Smallest ratio of a step at a border to the two steps on either side of it. Lens and pixels blur real edges, so that
+# an edge with a Gaussian blur of 0.5 px has a neighbouring step of half its size.
 OUTSTANDING = 3.0
-# A wrong coefficient may draw a wave, whose steps along a border cancel; their sizes also hold the noise of the
-# picture, so that more of them is asked for.
+# Factor by which the least step is increased if mean absolute steps are used. They also detect waves caused by wrong
+# coefficients, whose signed steps along a border cancel, but contain the picture's noise.
 WAVES = 2.0
 
 Levels = NDArray[np.float32]
@@ -34,7 +34,7 @@ _mean_change = loop("block_damage_mean_change")
 
 
 def foreign_corners(picture: Picture, before: Picture, least_step: float, levels_only: bool = False) -> int:
-    """Count corners of codec squares that are visible in a picture and were not in the previous one.
+    """Count corners of codec squares that are visible in a picture and not in the previous picture.
 
     Parameters
     ----------
@@ -43,19 +43,20 @@ def foreign_corners(picture: Picture, before: Picture, least_step: float, levels
     least_step : float
         Least step in grey levels; smaller steps also occur with undamaged coding.
     levels_only : bool
-        Whether only wrong levels of squares are looked for, and no waves in them, which takes a third of the time.
+        Whether only wrong mean levels of squares are detected, and no waves in them, which takes a third of the time.
 
     Returns
     -------
     int
-        Number of points where an outstanding step along a vertical border meets one along a horizontal border.
+        Number of points where a conspicuous step along a vertical border meets a conspicuous step along a horizontal
+        border.
     """
     upright = _outstanding(picture, before, least_step, levels_only)
-    if not upright.any():  # as in nearly every sound picture
+    if not upright.any():  # true for nearly every undamaged picture
         return 0
     lying = _outstanding(picture.T, before.T, least_step, levels_only).T
-    # upright[j, i] runs along block row j at the border behind block column i; a corner has one above or below it, and
-    # a lying one to its left or right.
+    # upright[j, i] is the border segment in block row j after block column i. A corner has a vertical segment above or
+    # below it, and a horizontal segment to its left or right.
     meets_upright = upright[:-1] | upright[1:]
     meets_lying = lying[:, :-1] | lying[:, 1:]
     return int(np.count_nonzero(meets_upright & meets_lying))
@@ -69,16 +70,16 @@ def _outstanding(picture: Picture, before: Picture, least_step: float, levels_on
     for steps, least in measures[:1] if levels_only else measures:
         step = steps(picture, before)
         here, left, right = step[:, at], _largest_beside(step, at, -1), _largest_beside(step, at, 1)
-        # A wrong level is quiet on both sides, a wrong wave on the side of the sound picture alone.
+        # Beside a wrong level, both sides have small steps; beside a wrong wave, only the undamaged side has.
         beside = np.maximum(left, right) if steps is _levelled else np.minimum(left, right)
         alone = (here > least) & (here > OUTSTANDING * beside)
-        if alone.any():  # hardly ever in sound pictures
+        if alone.any():  # rare in undamaged pictures
             stands_out |= alone & (steps(picture)[:, at] > steps(before)[:, at])
     return stands_out
 
 
 def _largest_beside(step: Levels, at: slice, way: int) -> Levels:
-    """Larger one of the two steps to the left (-1) or right (1) of each border."""
+    """Larger of the two steps to the left (-1) or right (1) of each border."""
     near, far = (step[:, at.start + away : at.stop + away : SQUARE_PX] for away in (way, 2 * way))
     return np.asarray(np.maximum(near, far))
 
@@ -90,7 +91,7 @@ def _levelled(levels: Picture, less: Picture | None = None) -> Levels:
     """
     if less is None or np.float32 in (levels.dtype, less.dtype):
         rows = _block_rows(_difference(levels, less))
-    else:  # pictures as they are stored, which nearly every frame of a Motion JPEG stream passes
+    else:  # stored integer levels: the usual case in a Motion JPEG stream
         rows = np.empty((levels.shape[0] // SQUARE_PX, levels.shape[1]), dtype=np.float32)
         _mean_change(levels, less, rows)
     return np.asarray(np.abs(np.diff(rows, axis=1)))

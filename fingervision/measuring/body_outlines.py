@@ -13,8 +13,9 @@ from fingervision.vision.outline_chunks import REACH_PX, Chunks, FlatMap
 Array = NDArray[np.float64]
 
 CHUNK_PX = 24.0
-"""Length of a chunk: long enough for an estimate of its blur, and short enough that usually all or nothing of it is
-covered."""
+"""Length of the pieces (chunks) into which an outline is divided: long enough to estimate the blur, and short enough
+that a chunk is usually covered completely or not at all.
+"""
 FROM_CORNERS_PX = 4.0
 """Distance of chunks from corners, where the blur of the adjoining edge matters: three times a blur of 1.2 px."""
 BESIDE = 1e-4
@@ -49,7 +50,7 @@ class Placement:
     def axes(self) -> Array:
         """Unit vectors of the drawing's axes in the picture, as columns."""
         c, s = np.cos(self.angle_rad), np.sin(self.angle_rad)
-        # Rows of a picture run downwards: a drawing seen from its front has its y axis upwards.
+        # The picture's y axis points downwards, whereas the y axis of a drawing seen from its front points upwards.
         side = 1.0 if self.is_mirrored else -1.0
         return np.array([[c, -side * s], [s, side * c]])
 
@@ -100,7 +101,7 @@ class BodyOutline:
             if count < 1:
                 continue
             way = (ends[:, k] - starts[:, k]) / length[k]
-            # The body lies to the left in the drawing: its outward normal is to the right there.
+            # In the drawing, the body is to the left of its outline, so that the outward normal points to the right.
             out = place.turn_sign * np.array([way[1], -way[0]])
             for at in FROM_CORNERS_PX + free * (np.arange(count) + 0.5) / count:
                 middles.append(starts[:, k] + at * way)

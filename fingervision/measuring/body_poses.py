@@ -41,13 +41,14 @@ from fingervision.vision.rigid_outline import LEAST_IN_VIEW, RigidFit, capture_r
 Array = NDArray[np.float64]
 
 LEAST_SIZE_ERROR, MOST_SIZE_ERROR, SURE = 1e-3, 0.01, 4.0
-"""Smallest relative size error that is reported, largest that is accepted, and standard uncertainties from which on an
-error counts as significant. Printed parts are off by 0.2 % (mechanics.md, section 5), and a scale by no more; beyond 1
-% the scale or the drawing is wrong."""
+"""Smallest relative size error that is reported, largest size error that is accepted, and number of standard
+uncertainties above which a size error is significant. Printed parts and scales have errors of about 0.2 %; above 1 %,
+the scale or the drawing is wrong.
+"""
 BODIES, GAPS = "bodies.csv", "gaps.csv"
 LAID_BY_ALL = (
-    "no fixed body is in view: the drawing was placed by all bodies together, so that poses are relative to the mean "
-    "of the bodies in the first frame and not to the ground. Only the motion of the bodies and the angles of hinges "
+    "no fixed body is in view, so that the drawing was placed by all bodies together: poses are relative to the "
+    "bodies' mean position in the first frame instead of the ground, and only their changes and the angles of hinges "
     "are meaningful."
 )
 
@@ -182,27 +183,26 @@ class BodyTracker:
         if abs(error) < SURE * u or abs(error) < LEAST_SIZE_ERROR:
             return
         words = (
-            f"the bodies of {self.mechanism.name} are seen {with_uncertainty(100.0 * abs(error), 200.0 * u)} % (95 %) "
-            f"{'larger' if error > 0.0 else 'smaller'} than drawn at {self.scale.px_per_mm:.5g} px/mm"
+            f"the bodies of {self.mechanism.name} appear {with_uncertainty(100.0 * abs(error), 200.0 * u)} % (95 %) "
+            f"{'larger' if error > 0.0 else 'smaller'} than in the drawing at {self.scale.px_per_mm:.5g} px/mm"
         )
         if abs(error) > MOST_SIZE_ERROR:
             raise DataError(
-                f"The drawing must have the size of the mechanism in the picture, but on frame {index} {words}: check "
+                f"The drawing must have the size of the mechanism in the picture, but in frame {index} {words}: check "
                 "the scale and the lengths of the drawing."
             )
         self._shared = replace(self._shared, size_error=abs(error))
         self.placed = replace(
-            self.placed,
-            notes=(*self.placed.notes, f"{words}; the uncertainty u of the poses includes this difference."),
+            self.placed, notes=(*self.placed.notes, f"{words}; the uncertainty of the poses includes this.")
         )
 
     def _note_shadows(self, names: Sequence[str], index: int) -> None:
         if self.placed is None or not names:
             return
         words = (
-            f"on frame {index} one side of {' and of '.join(names)} is blurred differently from the others, by a "
-            f"shadow, by glare, or because the body moved. The uncertainty u of the poses includes this difference; "
-            f"even light removes it."
+            f"in frame {index}, one side of {' and of '.join(names)} has a different blur than the other sides: a "
+            "shadow or glare may lie along this side, or the body moved. The uncertainty of the poses includes this "
+            "effect; uniform light removes it."
         )
         self.placed = replace(self.placed, notes=(*self.placed.notes, words))
 
@@ -245,7 +245,8 @@ class BodyTracker:
             whole = random + into @ shared[name].covariance @ into.T
             found[name] = SeenPose(OK, float(pose[0]), float(pose[1]), float(pose[2]), whole, random)
         for name in torn_off(self._joints, found):
-            # Something like it was taken for it: the next frame is searched from where it was seen last.
+            # The body was mistaken for something similar, so that the search in the next frame starts from its last
+            # valid pose.
             number = next(k for k, outline in enumerate(self.outlines) if outline.body.name == name)
             found[name], self._last[number] = SeenPose(NOT_FOUND), before[number]
         return found | self._hinges(found, shared)

@@ -16,7 +16,9 @@ from fingervision.vision.rigid_outline import RigidFit, capture_rigid, halved
 Array = NDArray[np.float64]
 
 TURNS = 36
-"""Number of directions tried: they are 10 degrees apart, and at half of that every thin bar still overlaps itself."""
+"""Number of directions that are tried, 10 degrees apart; a thin bar still overlaps the same bar rotated by half of this
+step.
+"""
 GRID = 160
 """Grid points along the picture's longer side for the comparison of silhouettes."""
 SKIPPED = 2
@@ -25,16 +27,20 @@ LEAST_OVERLAP = 0.7
 """Least overlap (intersection over union) of the areas of picture and drawing; below it the picture shows something
 else."""
 AS_GOOD = 0.03
-"""Difference of overlap within which two placements count as equally good: blur and a moved finger cause as much."""
+"""Difference of overlap within which two placements count as equally good; blur or a moved finger cause such a
+difference.
+"""
 ALIKE = 0.9
-"""Overlap of two placements with each other above which they are the same, so that the picture is symmetric: bars of 50
-px that are half a grid step apart overlap this much."""
+"""Overlap of two placements above which they count as the same silhouette, as for a symmetric drawing; bars of 50 px
+that are shifted by half a grid step have this overlap.
+"""
 APART_RAD = 0.35
 LEVELS = 4
-"""Number of times the picture is halved for the first fit: edges up to 50 px away are then found."""
+"""Number of times that the picture is halved for the first fit, which then finds edges up to 50 px away."""
 LEAST_LAID = 0.6
 """Least share of the chunks in view that must be found for a placement: with less, the bodies are covered, or edges of
-a shadow are taken for theirs, and all poses would refer to a wrong placement."""
+a shadow are mistaken for theirs, and all poses would refer to a wrong placement.
+"""
 OTHER_SCALE = 0.1
 """Largest relative difference between the scale of given points and the stated scale: points are given to a few pixels
 in some hundred."""
@@ -184,13 +190,13 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     if any(_climbed(drawn, mechanism, entry[1], size, 0.0)[0] < ALIKE for entry in others):
         raise DataError(
             f"The drawing {mechanism.name} fits the picture equally well in {1 + len(others)} ways: give --at "
-            "X,Y=XMM,YMM for three points of it."
+            "X,Y=XMM,YMM for three points of the drawing."
         )
-    # A symmetric drawing: its front is towards the camera, turned as little as may be.
+    # For a symmetric drawing, the placement with its front towards the camera and the smallest rotation is chosen.
     chosen = min((top, *others), key=lambda entry: (entry[1].is_mirrored, abs(_wrapped(entry[1].angle_rad))))
     note = (
-        "the drawing is symmetric and fits the picture in more than one way. The fit with the front towards the "
-        "camera and the smallest rotation was chosen; give --at for three points to choose another."
+        "the drawing is symmetric and fits the picture in several ways; the placement with its front towards the "
+        "camera and the smallest rotation was chosen. Give --at for three points to choose another placement."
     )
     return Placed(chosen[1], chosen[2], (note,))
 
@@ -258,7 +264,7 @@ def levels_of(grey: Array, mechanism: Mechanism, place: Placement) -> tuple[floa
     if inside.all() or not inside.any():
         raise DataError(
             f"The drawing {mechanism.name} must lie inside the picture and leave some background visible, but covers "
-            f"{'all' if inside.any() else 'none'} of it: check --at and the scale."
+            f"{'all' if inside.any() else 'none'} of the picture: check --at and the scale."
         )
     return float(np.median(small[inside])), float(np.median(small[~inside]))
 

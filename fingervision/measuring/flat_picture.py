@@ -12,8 +12,9 @@ from fingervision.vision.outline_chunks import FlatMap
 Array = NDArray[np.float64]
 
 FOLDED_PX = 0.5
-"""Largest error of mapping a point forth and back: beyond it the lens's distortion polynomial is not invertible, and
-the point lies in no picture."""
+"""Largest error of mapping a point forth and back; with a larger error, the lens's distortion polynomial is not
+invertible at this point, which then cannot appear in a picture.
+"""
 NOWHERE_PX = -1e6
 
 

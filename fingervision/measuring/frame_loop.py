@@ -26,7 +26,7 @@ from fingervision.storage.lost_frames import lost_frames
 from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.vision.pipeline import Settings
 
-# Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
+# Rows are computed and written for this number of frames at once, or for the frames of this time (s) if they are fewer.
 FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
 
 Progress = Callable[[int, int | None], None]
@@ -60,7 +60,7 @@ def prepared(description: Description, task: Task) -> Prepared:
     """Collect the information on a recording that is known before its frames are read."""
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
-    # What is stored without loss may have come compressed from the camera.
+    # A recording stored without loss may contain pictures that the camera had compressed.
     coding = coding_of(recorded_camera(description.files))
     if coding is not Coding.LOSSLESS and not description.lossy:
         description = replace(description, coding=coding)
@@ -122,7 +122,7 @@ def measure_frames(
                 series.add_budget(gap_budget(measured, how.row_maker.scale))
             take_rows(results, rows)
 
-        # Whatever ends the loop.
+        # The remaining rows are passed on however the loop ends.
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:

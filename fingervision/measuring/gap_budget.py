@@ -53,6 +53,8 @@ def gap_budget(measured: Sequence[GapMeasurement], scale: Scale) -> Budget:
             *of_scale.lines,
             BudgetLine(TIPS, u_tip_mm, "the calibration's edge bias and the slope of each edge"),
             seen,
-            BudgetLine(RESPONSE, u_response_shift_mm(measured, scale), "what another usual response would change"),
+            BudgetLine(
+                RESPONSE, u_response_shift_mm(measured, scale), "the change of the gap under the other usual response"
+            ),
         )
     )

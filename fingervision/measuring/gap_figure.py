@@ -15,7 +15,7 @@ from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.series import GapSeries
 
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
-# More points than this cannot be told apart on the picture; each column then shows the range that it covers.
+# Largest number of points that can be distinguished in the figure; with more points, each column shows its range.
 MOST_POINTS = 2000
 COVERAGE_FACTOR = 2.0
 GAP_COLOUR, BAND_COLOUR, FAILURE_COLOUR = "#11507a", "#8fbcdb", "#c0392b"
@@ -78,7 +78,7 @@ def draw_gap_axes(
             lower.plot(*_thinned(where[piece], expanded_um[piece]), ".-", color=GAP_COLOUR, linewidth=0.8, markersize=1)
         upper.legend(loc="best", framealpha=0.8, fontsize="small")
     else:
-        upper.text(0.5, 0.5, "no frame could be measured", ha="center", va="center", transform=upper.transAxes)
+        upper.text(0.5, 0.5, "no frame has a gap", ha="center", va="center", transform=upper.transAxes)
     if where_not.size:
         marks = where_not[:: max(1, where_not.size // MOST_POINTS)]
         upper.plot(
@@ -134,7 +134,7 @@ def _pieces(series: GapSeries) -> list[slice]:
     if not frames.size:
         return []
     ends = [0, *(np.flatnonzero(np.diff(frames) > 1) + 1).tolist(), frames.size]
-    if len(ends) > MOST_POINTS // 4:  # more holes than the picture has room for
+    if len(ends) > MOST_POINTS // 4:  # more interruptions than the figure can show
         ends = [0, frames.size]
     return [slice(start, end) for start, end in pairwise(ends)]
 

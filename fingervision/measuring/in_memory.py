@@ -107,7 +107,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
         if gauges is not None:
             gauges.add(item, result.outcome)
         if not first and isinstance(item, Frame):
-            # The decoder's memory may be used again for the next picture.
+            # The pixels are copied, because the decoder may use its memory again for the next picture.
             first.append(replace(item, pixels=item.pixels.copy()))
 
     with ExitStack() as stack:

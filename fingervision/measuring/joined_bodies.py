@@ -22,8 +22,10 @@ LONGEST, SHORTEST = 1.1, 0.6
 flexure on a deforming body move a few per cent differently from those on a rigid body; an arc of 3 rad has a chord of
 0.66."""
 MOST_ACROSS, MOST_ACROSS_NECK = 0.3, 0.1
-"""Displacement across the chord over the flexure's length: a leaf guided in parallel is used up to a fifth of it. The
-part of a notch that bends is a third of its length, and is moved by up to a third of that."""
+"""Largest displacement across the chord relative to the flexure's length, for a leaf and for a notch. A leaf in a
+parallel guide is displaced by up to a fifth of its length. The bending part of a notch is a third of its length, and is
+displaced by up to a third of this part.
+"""
 SURE = 4.0
 """Number of standard uncertainties of the distance that is exceeded in 1 of 16 000 cases by chance."""
 

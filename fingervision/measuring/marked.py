@@ -8,7 +8,8 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.storage.recorded_video import TICKS_PER_S
 
-# A packet with the time of the one before it is written a tick later, since times in a file must grow.
+# Tolerance in ticks: a packet with the time of the previous packet is written one tick later, because times in a file
+# must increase.
 TICKS_AFTER = 3
 
 

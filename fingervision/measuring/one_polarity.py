@@ -15,7 +15,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 
 Outcome = GapMeasurement | NoGap | LostFrame
 
-# So many frames with a number vote, and no more than so many pixels are kept until they have.
+# Number of frames with a gap that decide by majority, and largest number of pixels that are stored until the decision.
 VOTERS, MOST_KEPT_PX = 15, 15_000_000
 
 
@@ -42,8 +42,8 @@ def one_polarity(
     Yields
     ------
     (Frame or LostFrame, GapMeasurement or NoGap or LostFrame)
-        Every frame with its result. The first frames with a gap are yielded after all of them have voted; frames
-        without a gap that come before these are yielded at once.
+        Every frame with its result. The first frames with a gap are yielded after all of them have been counted; frames
+        without a gap before them are yielded at once.
     """
     source = iter(frames)
     if settings.fingers_are_dark is None:

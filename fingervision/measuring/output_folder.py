@@ -79,8 +79,8 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
         present = [name for name in names if (path / name).exists()]
         if present and not _is_ours(path / GAPS):
             raise OutputError(
-                f"{path} already holds {present[0]}, and no earlier measurement of fingervision wrote it: "
-                "name another folder with --out."
+                f"{path} already contains {present[0]}, which was not written by an earlier measurement of "
+                "fingervision: name another folder with --out."
             )
         for name in present:
             if name == STEPS:

@@ -16,9 +16,9 @@ from fingervision.frames.source import Description
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import draw_overlay
 
-# MPEG's clock, which MP4 keeps to the tick.
+# Clock of MPEG; MP4 files store times to one tick of this clock.
 CLOCK_HZ = 90_000
-# Frames without times are shown at this rate.
+# Frame rate of the video for frames without times.
 SHOWN_AT_HZ = 25.0
 OPTIONS = {"crf": "20", "preset": "veryfast"}
 
@@ -46,7 +46,7 @@ class OverlayVideo:
         self._path = path
         self._last_tick = -1
         self._first_s: float | None = None
-        # H.264 with halved colour needs even sides; the last column or row is repeated where they are odd.
+        # H.264 with chroma subsampling needs an even width and height; an odd last column or row is repeated.
         self._pad = ((0, description.height_px % 2), (0, description.width_px % 2), (0, 0))
         try:
             self._container = av.open(f"file:{path}", "w", options={"movie_timescale": str(CLOCK_HZ)})

@@ -66,7 +66,7 @@ class SharedErrors:
             Present position of the reference point in the picture.
         """
         arm = about_px + fit.shift_px - self.about_px
-        # A drawing that was laid off by a shift and a turn puts the body's reference point off by both.
+        # Errors of the drawing's shift and rotation both displace the body's reference point.
         carried = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])
         placed, shadows = np.zeros((3, 3)), fit.by_shadows
         outward, scale = fit.by_outward, fit.by_scale + np.array([arm[0], arm[1], 0.0])

@@ -57,7 +57,11 @@ def choose_response(
         other = standard_response("srgb" if response.name == "linear" else "linear")
     if calibrated is not None and calibrated.name != response.name:
         shift_px = scale.response_shift_px if isinstance(scale, Calibration) else None
-        size = "" if not shift_px else f", which moves a gap by about {abs(shift_px):.2f} px on the calibration's edges"
+        size = (
+            ""
+            if not shift_px
+            else f", which changes a gap by about {abs(shift_px):.2f} px at the edges of the calibration"
+        )
         return (
             response,
             other,
@@ -69,7 +73,8 @@ def choose_response(
         return (
             response,
             other,
-            f"The recording's own tag says {tag}, but the calibration's camera response {calibrated.name} is used: "
+            f"A tag in the recording states the camera response {tag}, but that of the calibration, "
+            f"{calibrated.name}, is used: "
             "state --response if another camera made this recording.",
         )
     return response, other, ""

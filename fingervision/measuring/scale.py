@@ -10,7 +10,8 @@ from calib.distances import Distances
 from calib.stated_scale import StatedScale
 from fingervision.domain.errors import DataError, UsageError
 
-# From a picture of a street to one through a microscope; what lies beyond is a slip, and overflows later.
+# Permitted scales, from a picture of a street to a picture through a microscope; other values are typing errors, and
+# would cause an overflow.
 LEAST_PX_PER_MM, MOST_PX_PER_MM = 1e-3, 1e6
 
 Floats = NDArray[np.float64]
@@ -62,14 +63,16 @@ def check_one_scale(calibration: object, px_per_mm: object, u_px_per_mm: object)
         Both a calibration and a scale are given, or the uncertainty of a scale that is not.
     """
     if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are given: leave one out.")
+        raise UsageError(
+            "The scale must be given by either --calibration or --px-per-mm, but both are given: leave out one of them."
+        )
     if u_px_per_mm is not None and calibration is not None:
         raise UsageError(
-            "--u-px-per-mm belongs to --px-per-mm, but --calibration is given, which has its own uncertainty: "
-            "leave one out."
+            "--u-px-per-mm belongs to --px-per-mm, but --calibration is given, which has its own uncertainty: leave "
+            "out one of them."
         )
     if u_px_per_mm is not None and px_per_mm is None:
-        raise UsageError("--u-px-per-mm needs the scale whose uncertainty it is, but there is none: add --px-per-mm S.")
+        raise UsageError("--u-px-per-mm states the uncertainty of a scale, but no scale is given: add --px-per-mm S.")
 
 
 class Scale(Protocol):

@@ -16,9 +16,11 @@ from fingervision.domain.status import Status
 from fingervision.measuring.rows import Result
 from fingervision.storage.gaps_csv import GapRow
 
-# Even and odd rows that see a finger farther apart than this (pixels) are fields; colour sensors leave smaller combs.
+# Distance (pixels) between a finger in even rows and in odd rows above which the rows are interlaced fields; colour
+# sensors cause smaller distances.
 COMB_PX = 0.2
-# Decimals of a part of the uncertainty, mm: the sum must not depend on how many frames came at once.
+# Number of decimals (mm) of a contribution to the uncertainty, so that sums do not depend on how many frames are
+# processed at once.
 PLACES = 9
 
 
@@ -33,7 +35,7 @@ class FirstBad:
     time_s : float or None
         Presentation time, where it is known.
     words : str
-        Sentence that says what happened to the frame.
+        Sentence that states the reason.
     """
 
     frame: int
@@ -100,7 +102,7 @@ class GapSeries:
         """Add the rows of more frames."""
         for result, row in zip(results, rows, strict=True):
             self.counts[row.status] += 1
-            # In memory alone: without a time a frame is drawn at its number.
+            # NaN is used in memory only; a frame without a time is plotted at its number.
             time_s = float("nan") if row.time_s is None else row.time_s
             if row.gap_mm is None or row.u_random_mm is None or row.u_gap_px is None:
                 self._bad_frame.append(row.frame)
@@ -152,7 +154,7 @@ class GapSeries:
 
     @property
     def response_px(self) -> NDArray[np.float64]:
-        """Change of each gap (px) if the camera response were the alternative one.
+        """Change of each gap (px) under the alternative camera response.
 
         It is 0 if the response is known.
         """

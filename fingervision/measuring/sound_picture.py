@@ -18,20 +18,23 @@ from fingervision.domain.status import Status
 from fingervision.measuring.block_damage import SQUARE_PX, Levels, foreign_corners
 from fingervision.vision.grey import GreyImage, to_grey
 
-# A jump: farther from where the last two frames lead than so many standard uncertainties of that difference.
+# Number of standard uncertainties by which a position must deviate from the extrapolation of the last two frames to
+# count as a jump.
 JUMP_U = 3.0
-# Corners of foreign squares, and steps in units of the fingers' contrast. Sound films (H.264 of crf 18 to 45, Motion
-# JPEG of quality 3 to 31, steps of 7 and 16 px, noise of 1 to 4 levels, and the real drops; 2000 frames, whole
-# pictures) had at most one corner with steps of 0.08 of the contrast, and two with 0.06; a damaged square has four.
+# Least number of corners of foreign squares, and least step in units of the fingers' contrast. Undamaged videos (H.264
+# of crf 18 to 45, Motion JPEG of quality 3 to 31, steps of 7 and 16 px, noise of 1 to 4 levels, and videos of real
+# drops; 2000 frames, whole pictures) had at most one corner with steps of 0.08 of the contrast, and two corners with
+# steps of 0.06; a damaged square has four corners.
 FEWEST_CORNERS, LEAST_STEP = 2, 0.08
-# How far around the measuring points pixels take part: the outline is followed so far below them, and to both sides.
+# Extent of the inspected region around the measuring points: below them (pixels and measuring heights), to both sides,
+# and beyond the tips.
 REACH_PX, REACH_HEIGHTS, ASIDE_PX, BEYOND_TIP_PX = 45.0, 1.5, 64.0, 16.0
 
 WORDS = (
-    "The picture of the frame contains squares that the picture before does not contain and that do not move with the "
-    "fingers: the recording is damaged there."
+    "The recording is damaged at this frame: the picture contains squares that the previous picture does not have and "
+    "that do not move with the fingers."
 )
-WORDS_BEHIND = "The frame is coded as a difference from a frame whose picture is damaged."
+WORDS_BEHIND = "The frame is coded as a difference to a damaged frame."
 
 Points = NDArray[np.float64]
 
@@ -115,8 +118,8 @@ def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> 
         return True
     if frame.coding is not Coding.INTRAFRAME:
         return False
-    # JPEG codes each block's level as a difference to the one before it: a damaged level raises or lowers all that
-    # follow, up to the next restart marker, so that the only corners may lie far from the fingers.
+    # JPEG codes the level of each block as a difference to the previous block, so that a damaged level changes all
+    # blocks up to the next restart marker; the only corners may then be far from the fingers.
     whole = _squares(0, frame.height_px, frame.height_px), _squares(0, frame.width_px, frame.width_px)
     return _has_squares(frame, outcome, last, whole, least_step, levels_only=True)
 

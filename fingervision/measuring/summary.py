@@ -19,35 +19,36 @@ from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.series import GapSeries
 
-# Of the expanded uncertainty U = k u (JCGM 100:2008, 6.2): about 95 % for a normal distribution.
+# Coverage factor k of the expanded uncertainty U = k u (JCGM 100:2008, 6.2), for a coverage of about 95 %.
 COVERAGE_FACTOR = 2
 LOSSLESS_ADVICE = (
-    "The recording is lossy ({codec}): its errors are several times those of the camera's noise and correlated from "
-    "pixel to pixel and frame to frame. Record losslessly (FFV1 or raw) where the last hundredth of a pixel counts."
+    "The recording is compressed with loss ({codec}): its errors are several times those of the camera's noise, and "
+    "are correlated between pixels and between frames. Record losslessly (FFV1 or raw) if a hundredth of a pixel "
+    "matters."
 )
 NO_LIMITS = (
-    "The calibration {name} has no limits (its key budget.limits): u_gap_mm therefore includes no uncertainty for the "
-    "distance of the fingers from the plane of the reference, tilt, lens and temperature. Calibrate with "
+    "The calibration {name} has no limits (key budget.limits): u_gap_mm does not include the fingers' distance from "
+    "the plane of the reference, tilt, lens distortion and temperature. Calibrate with "
     "`fingervision calibrate`, or add the limits of the set-up."
 )
-# What stands beside an edge or has moved it: what it means, and what takes it away.
+# Advice for each disturbance of the edges: what was found, how it is treated, and how to remove it.
 BESIDE = {
-    "wall": "the side wall of a thick finger is visible beside the edge: --face states which edge is measured, and "
-    "u_shift_px includes what remains undecided. A longer lens, light from behind or a mask over the wall removes "
-    "this uncertainty.",
-    "shadow": "a soft shadow lies beside the edges; the edges are corrected for it, and u_shift_px includes the "
-    "uncertainty of the correction. Light from behind, or from both sides, removes the shadow.",
-    "glare": "a bright line lies along the edges; the edges are corrected for glare, and u_shift_px includes the "
-    "difference if the line is a bevel. Diffuse light, or light from behind, removes the line.",
+    "wall": "the side wall of a thick part is visible beside the edge; --face states which edge is measured, and "
+    "u_shift_px includes the distance of edges that cannot be distinguished. A lens of longer focal length, light "
+    "from behind or a mask over the wall removes the disturbance.",
+    "shadow": "a soft shadow lies beside the edges; its effect is corrected, and u_shift_px includes the uncertainty "
+    "of the correction. Light from behind, or from both sides, removes the shadow.",
+    "glare": "a bright line lies along the edges; its effect is corrected, and u_shift_px includes the possibility "
+    "that the line is a bevel. Diffuse light, or light from behind, removes the line.",
     "motion": "the fingers move while the shutter is open; u_shift_px includes the possible shift at round tips. A "
-    "shorter exposure removes this shift.",
-    "sharpening": "the camera sharpens its pictures; the edges are corrected for it, and u_shift_px includes the "
+    "shorter exposure reduces the motion.",
+    "sharpening": "the camera sharpens its pictures; the shift of the edges is corrected, and u_shift_px includes the "
     "uncertainty of the correction. Switch sharpening off in the camera's settings.",
-    "roughness": "the edges deviate from a mean line by more than their noise (by roughness, print, texture or a "
-    "lossy codec): the mean line is measured, and the uncertainty includes the deviations. A rough finger touches "
-    "a part with its crests, which lie outside the mean line.",
-    "interlaced": "even and odd rows were exposed at two times (interlaced video): the gap is that at the mean of the "
-    "two times. Record progressive pictures.",
+    "roughness": "the edges deviate from a mean line by more than their noise (roughness, printing, texture, or a "
+    "lossy codec); the mean line is measured, and the uncertainty includes the scatter. A rough finger makes contact "
+    "by its peaks, which lie farther outside.",
+    "interlaced": "even and odd rows were exposed at different times (interlaced video); the gap is the mean of both. "
+    "Record progressive video.",
 }
 BYTES_AT_ONCE = 1 << 20
 LEAST_BITS_A_PIXEL = 0.05
@@ -146,9 +147,10 @@ def _about_unseen(description: Description, series: GapSeries) -> list[str]:
     if not 0.0 < bits < LEAST_BITS_A_PIXEL:
         return []
     return [
-        f"In {count} of {series.frames} frames no fingers with straight edges were found, and the recording holds "
-        f"{bits:.2g} bit a pixel ({description.codec}): compression to less than {LEAST_BITS_A_PIXEL:g} smears edges "
-        f"beyond recognition. Record at a higher bit rate, or losslessly, before you change light, focus or region."
+        f"In {count} of {series.frames} frames no fingers with straight edges were found, and the recording has "
+        f"{bits:.2g} bits per pixel ({description.codec}): compression to less than {LEAST_BITS_A_PIXEL:g} bits per "
+        "pixel can destroy the edges. Record at a higher bit rate, or losslessly, before you change light, focus or "
+        "region."
     ]
 
 
@@ -159,9 +161,8 @@ def _about_fingers(series: GapSeries) -> list[str]:
     counts = " and ".join(f"{tone} in {count}" for tone, count in series.votes.most_common())
     taken = "dark" if series.votes["dark"] >= series.votes["light"] else "light"
     return [
-        f"The first frames do not agree whether the fingers are dark or light: {counts} of these frames. All frames "
-        f"were measured with {taken} fingers: look at the pictures of --steps, and state --fingers dark or --fingers "
-        f"light."
+        f"The first frames disagree about the brightness of the fingers: {counts} of them. All frames were measured "
+        f"with {taken} fingers: look at frames of both kinds with --steps, and state --fingers dark or --fingers light."
     ]
 
 
@@ -211,29 +212,29 @@ def _scale(scale: Scale, file: Path | None) -> dict[str, Any]:
 
 def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
     response = (
-        f"the camera's response, taken as {settings.get('response', 'linear')} and not measured: the change by "
-        f"another usual response, less the part that the calibration compensates (u_shift_px holds the whole change)"
+        f"the camera's response, assumed to be {settings.get('response', 'linear')} and not measured: change of the "
+        "gap under another response, as far as the calibration does not correct it (u_shift_px includes all of it)"
     )
     is_assumed = not settings.get("response_known", True)
     random = (
-        "u_random_mm and u_gap_px: the part that changes from frame to frame, caused by noise at both edges, by the "
-        "tips where the edges are sloped, by deviations from the edge model, and by compression"
+        "u_random_mm and u_gap_px, the parts that change from frame to frame: noise at both edges, noise of both tips "
+        "through the slope of the edges, residuals of the edge model, compression"
     )
     never = [
         "movement during the exposure",
         "change of the set-up since the calibration (focus, camera, light)",
-        "the difference between a finger's outline and its edge seen from above (thickness, burr)",
+        "difference between the outline of a finger and the edge seen by the camera (thickness, burr)",
     ]
     if not isinstance(scale, Calibration):
         return {
             "coverage_factor": COVERAGE_FACTOR,
-            "expanded": "U = k u_random_mm with k = 2; it includes only the random part.",
+            "expanded": "U = k u_random_mm with k = 2; U includes only the random part.",
             "covers": [random],
             "not_included": [
-                f"the uncertainty of the scale: {scale.px_per_mm:g} px/mm was stated without an uncertainty, so that "
-                f"u_gap_mm is empty; calibrate, or state --u-px-per-mm",
+                f"the uncertainty of the scale: {scale.px_per_mm:g} px/mm was stated without an uncertainty, "
+                "so that u_gap_mm is empty; calibrate to obtain it",
                 "edge bias (blooming), lens distortion, tilt, distance from the plane of the scale, temperature",
-                "bright rims, walls and shadows beside the edges, and light beyond full scale",
+                "bright rims, walls and shadows beside the edges, and light above full scale",
                 *([response] if is_assumed else []),
                 *never,
             ],
@@ -247,14 +248,14 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
             f"unknown edge bias within +-{scale.limits.edge_bias_px:g} px"
             if is_stated(scale)
             else "scale and edge bias with their covariance, from the calibration",
-            "a bright rim, a wall or a shadow that the edges show, or light just beyond full scale",
+            "effects of bright rims, walls, shadows and light just above full scale, as far as the edges show them",
             *([response] if is_assumed else []),
             *(
                 f"{words}: {scale.how_stated(name, unit)}"
                 for name, words, unit in (
                     ("plane_mm", "distance of the fingers from the calibration plane", "mm"),
                     ("tilt_deg", "tilt of the plane", "degrees"),
-                    ("lens_relative", "residual lens distortion, relative", ""),
+                    ("lens_relative", "uncorrected lens distortion, relative", ""),
                     ("temperature_k", "temperature", "K"),
                 )
                 if hasattr(scale.limits, name)

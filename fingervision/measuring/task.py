@@ -28,7 +28,7 @@ class Task:
     scale_file : Path or None
         Calibration file from which the scale was read.
     below_tip_mm : float
-        Height of measuring below each finger's tip.
+        Measuring height: distance below each finger's tip.
     direction : Direction or None
         Direction in which the tips point; None determines it in every frame.
     region : Region or None
@@ -40,7 +40,7 @@ class Task:
     overlay : bool
         Whether a video with the measured edges drawn in is written.
     steps_frame : int or None
-        The frame of which every step is written as a picture.
+        Number of the frame of which every processing step is written as a picture.
     response : CameraResponse or None
         Camera response, if the user knows it.
     bits : int or None
@@ -52,7 +52,7 @@ class Task:
     frames : (int, int) or None
         First and last frame to be measured, counted from 0, both included; None measures all.
     gauges : tuple of Gauge
-        Other measurements beside the gap; none by default.
+        Gauges to be measured in addition to the gap; none by default.
     """
 
     scale: Scale

@@ -26,7 +26,8 @@ def u_tip_bias_mm(measured: Sequence[GapMeasurement], edge_bias_px: float, px_pe
     px_per_mm : float
         Scale of the calibration.
     """
-    # Slopes are given across the picture: the left finger grows into the gap to the right, the right one to the left.
+    # Slopes refer to the picture's axis across the fingers; the gap is to the right of the left finger, and to the left
+    # of the right finger.
     slopes = np.array([(m.left.slope, -m.right.slope) for m in measured], dtype=float)
     share = (np.sqrt(1.0 + slopes**2) - slopes).mean(axis=1)
     return np.asarray(np.abs((1.0 - share) * edge_bias_px) / px_per_mm)

@@ -29,8 +29,8 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
             )
         else:
             lines.append(
-                f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; it does not "
-                f"include the uncertainty of the scale, which was not stated."
+                f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; U does not "
+                "include the uncertainty of the scale, which was not stated."
             )
         lines += _assumed_response(summary, series)
     return [*lines, *summary["advice"]]
@@ -48,8 +48,8 @@ def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str
         return []
     return [
         f"The camera's response is not known and was taken as {settings['response']}; another usual response would "
-        f"change the gap by {1e3 * moved_mm:.1f} µm (median), which is not in U: state the response with --response, "
-        f"or measure it with `fingervision calibrate response`."
+        f"change the gap by {1e3 * moved_mm:.1f} µm (median), which U does not include: state the response with "
+        "--response, or measure it with `fingervision calibrate response`."
     ]
 
 
@@ -64,7 +64,7 @@ def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
     values = f"gap {least:.4f} mm" if gap["count"] == 1 else f"gap {least:.4f} to {greatest:.4f} mm"
     u_mm, only = gap["median_u_gap_mm"], ""
     if u_mm is None:
-        u_mm, only = gap["median_u_random_mm"], ", from frame to frame alone"
+        u_mm, only = gap["median_u_random_mm"], ", from frame to frame only"
     median = "" if gap["count"] == 1 else ", median"
     found = of if gap["count"] == frames else f"{gap['count']} of {of} with a gap"
     bad = series.counts[Status.DAMAGED]

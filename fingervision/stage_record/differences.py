@@ -7,7 +7,7 @@ import numpy as np
 from fingervision.domain.effect import Array
 
 EVEN = 1e-6
-"""Relative spread of the time steps below which they are equal to the file's digits."""
+"""Relative spread of the time steps below which the steps are equal within the digits of the file."""
 
 
 def differences(values: Array, time_s: Array, order: int) -> Array:

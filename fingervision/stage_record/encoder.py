@@ -35,8 +35,8 @@ ON_LINE, EXACT_SHARE = 1e-3, 0.2
 """Distance, as a share of a step, within which a value lies exactly on a line, and share of such values above which the
 deviations are not jitter."""
 BETWEEN = 0.4
-"""Distance from the lines, in steps, that jitter seldom exceeds; of values unrelated to lines a fifth lies beyond
-it."""
+"""Distance from the lines, in steps, that jitter seldom exceeds; of values that are unrelated to lines, a fifth lies
+beyond this distance."""
 FEWEST_LINES = 8
 """Least number of lines that a record must cross for their spacing to be determined."""
 BEYOND_CHANCE = 4.0
@@ -46,8 +46,9 @@ PEAK_STEP = 0.2
 MOST_LINES = 400
 """Largest number of lines over the range: finer lines are no finer than the noise of other records."""
 MOST_EQUAL = 0.8
-"""Share of the changes that advance by the same number of lines, above which steady motion is mistaken for lines. If it
-is an encoder after all, moving by nearly a whole number of lines per row, only its jitter stays in the record."""
+"""Share of the changes that advance by the same number of lines, above which the apparent lines are a steady motion. If
+the record comes from an encoder that moves by nearly a whole number of lines per row, this error only leaves the jitter
+in the record."""
 PAUSING = 0.02
 """Ratio of the number of pauses of a single row, within a motion by single steps, to the number of moving samples,
 above which the values were rounded: a motion at 0.98 steps per row pauses once in 50. Set points in equal steps pause
@@ -66,7 +67,7 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...], time_s: Array | None =
     runs : tuple of slice
         Samples of each run.
     time_s : ndarray of float, shape (n,), or None
-        Their times, increasing within each run; None where they follow at equal steps.
+        Times of the samples, increasing within each run; None for equal time steps.
 
     Returns
     -------
@@ -75,19 +76,19 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...], time_s: Array | None =
 
     Notes
     -----
-    High-order differences of a smooth motion vanish, so that what they leave is noise. For a straight motion a low
-    order is sufficient, for an oscillation a higher one is needed; the smallest estimate over the orders is used. Their
-    median is robust against reversals.
+    High-order differences of a smooth motion vanish, so that only noise remains. For a straight motion a low order of
+    the differences is sufficient, for an oscillation a higher order is needed; the smallest estimate over all orders is
+    used. The median of the differences is robust against reversals.
     """
     orders = ORDERS if input_mm.size >= MANY else ORDERS[:1]
     times = np.arange(float(input_mm.size)) if time_s is None else time_s
     sigma = min(_sigma_by_differences(input_mm, times, runs, order) for order in orders)
     step = _grid(input_mm)
-    # Rounding that is finer than the noise is no encoder's: it averages out with the noise.
+    # Rounding that is finer than the noise needs no encoder step: it averages out with the noise.
     if step < sigma or not _rounds(input_mm, runs, step):
         step = 0.0
     if step > 0.0:
-        # Roundings that alternate have large third differences, curved motions scatter about lines.
+        # Alternating rounding has large third differences, whereas a curved motion scatters about straight lines.
         sigma, rounding = min(sigma, _scatter(input_mm, runs)), step / float(np.sqrt(12.0))
         sigma = sigma if sigma > ROUNDED * rounding else rounding
     return (sigma if 1e-7 * np.ptp(input_mm) < sigma < np.inf else 0.0), step
@@ -133,7 +134,7 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
     jitter = np.abs(values - (np.round(values / step - shift) + shift) * step) / step
     sigma = float(np.sqrt(-2.0 * np.log(np.abs(peak[best])))) / (2.0 * np.pi)
     between = 2.0 * float(norm.sf(BETWEEN / sigma))
-    # Equal steps of a motion lie on lines exactly, and what is between them is no jitter.
+    # A motion in equal steps lies exactly on lines, and values between the lines are then not jitter.
     if np.mean(jitter < ON_LINE) > EXACT_SHARE or np.mean(jitter > BETWEEN) > 1.5 * between + 0.005:
         return input_mm
     return snapped
@@ -190,7 +191,7 @@ def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:
 def _grid(input_mm: Array) -> float:
     """Spacing of a grid on which all values lie; 0 if there is none."""
     steps = np.diff(np.unique(np.round(input_mm, 9)))
-    # Where every sample is several lines on, the steps differ by single ones.
+    # If every sample is several lines ahead of the sample before, the increments differ by single lines.
     lines = np.concatenate([steps, np.diff(np.unique(steps))])
     lines = lines[lines > RESOLVED_MM]
     step = float(np.min(lines, initial=np.inf))

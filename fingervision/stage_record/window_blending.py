@@ -40,7 +40,7 @@ def blended(smooth_mm: Array, time_s: Array, runs: tuple[slice, ...], leverage: 
             weights = 1.0 - np.abs(np.arange(-half, half + 1)) / (half + 1.0)
             weights /= weights.sum()
             around = at[:, None] + np.arange(-half, half + 1)
-            # Uneven samples have their weighted mean time beside the sample.
+            # If samples are not equidistant, their weighted mean time differs from the time of the sample.
             late_s = time[around] @ weights - time[at]
             speed = (values[at + half] - values[at - half]) / (time[at + half] - time[at - half])
             out[run][at] = values[around] @ weights - speed * late_s

@@ -12,8 +12,8 @@ between readings (move, settle, average) is 28.5 s. Effects with time constants 
 treated as invisible."""
 SWAPPED = 0.75
 """Fraction of the moves between targets that contradict the stated direction, above which the directions are considered
-as interchanged. With correct directions, hardly any move contradicts: only the return of one-directional cycles, one
-move per number of targets."""
+as interchanged. With correct directions, only the return moves of one-directional cycles contradict, one move in each
+cycle."""
 LONGEST_OVERSHOOT_MM = 0.5
 """Longest assumed overshoot beyond a target: the largest play in the catalogue of effects. The overshoot is shorter if
 the targets are closer together, so that it does not pass a neighbouring target."""
@@ -69,7 +69,7 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
             readings = [replace(reading, side=-reading.side) for reading in readings]
             notes.append(f"According to the times, {came}: the two directions were exchanged.")
         elif len({reading.side for reading in readings}) > 1:
-            # A table of one side may well be sorted by its targets.
+            # A table with a single direction of approach may be sorted by its targets.
             notes.append(f"In the order of the rows, {came}: are the two directions exchanged in the table?")
     targets = np.unique([reading.target_mm for reading in readings])
     closest = float(np.min(np.diff(targets))) if targets.size > 1 else LONGEST_OVERSHOOT_MM

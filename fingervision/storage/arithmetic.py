@@ -39,7 +39,7 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
     Raises
     ------
     DataError
-        Where it is no finite number of a sensible size, or uses what is not known.
+        The value is not a finite number of at most `LARGEST`, or the expression contains an unknown name or operation.
     """
     if isinstance(raw, str):
         try:
@@ -51,7 +51,7 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
     elif isinstance(raw, bool) or not isinstance(raw, int | float):
         raise DataError(f"{what} must be a number or an arithmetic expression with names, but is {raw!r}.")
     else:
-        # A whole number may have more digits than a float holds.
+        # A whole number may be too large for a float.
         value = float(raw) if not abs(raw) > 10.0 * LARGEST else math.copysign(math.inf, 1 if raw > 0 else -1)
     if not abs(value) <= LARGEST:
         said = f"{raw:g}" if isinstance(raw, float) else f"{value:g}"

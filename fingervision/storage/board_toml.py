@@ -24,7 +24,7 @@ from fingervision.storage.toml_section import Section, read_document
 
 SCHEMA = 1
 FASTEST_PERIOD_MS, SLOWEST_PERIOD_MS = 4, 250
-# The drive line must be down within 100 ms of silence; the board's clock may be slow by some percent.
+# The drive line must be off within 100 ms after the last message; the board's clock may be slow by some per cent.
 LONGEST_SILENCE_MS = 95
 # Pins 0 and 1 are the serial line.
 PORTS = (range(2, 8), range(8, 14), range(14, 20))
@@ -38,7 +38,7 @@ def read_board(path: Path) -> BoardSettings:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or a value in it cannot be meant; the sentence names the line.
+        The file cannot be read, or a value in it is not allowed; the message names the line.
     """
     values, text = read_document(path, "board")
     top = Section(path, text, "", values)

@@ -62,7 +62,7 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
     Raises
     ------
     DataError
-        The table is of another recording.
+        The table belongs to another recording.
     """
     with gaps.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))

@@ -72,7 +72,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
 
 def _response_content(calibration: Calibration) -> dict[str, Any] | None:
     response = calibration.camera_response
-    if response is None:  # a stated scale has no pictures of its own, and no shift by their response either
+    if response is None:  # a stated scale has no calibration pictures, and therefore no shift by their response
         return None if calibration.response_shift_px is None else {"shift_px": calibration.response_shift_px}
     is_standard = response.name in CURVES
     return {

@@ -15,7 +15,7 @@ def refuse_foreign(out: Path) -> None:
     Raises
     ------
     OutputError
-        Something else stands there.
+        The path holds a file that is not a calibration.
     """
     if not out.exists():
         return

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 # Newest schema of calibration.json that this program reads, and the one that it writes.
 SCHEMA = 1
-# A standard uncertainty that stands twice in the file (alone and in the covariance) may have been rounded by hand.
+# A standard uncertainty that occurs twice in the file (alone and in the covariance) may have been rounded by hand.
 SAME_U = 0.01
 
 
@@ -39,7 +39,7 @@ class CalibrationReader:
     Raises
     ------
     DataError
-        The content is no object with a schema.
+        The content is not a JSON object with a schema.
     """
 
     def __init__(self, path: Path, content: object) -> None:
@@ -57,7 +57,8 @@ class CalibrationReader:
         Raises
         ------
         DataError
-            The schema is newer than this program, a value is missing or not allowed, or two contradict each other.
+            The schema is newer than this program, a value is missing or not allowed, or two values contradict each
+            other.
         """
         schema = self._content["schema"]
         if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
@@ -191,7 +192,7 @@ class CalibrationReader:
         return parts
 
     def _limits(self, stated: object) -> tuple[Limits, frozenset[str]]:
-        # A file of another program may state no limits: its covariance is then all the budget there is.
+        # A file of another program may state no limits: the budget then consists of the covariance alone.
         nothing = {item.name: 0.0 for item in fields(Limits)} | {"camera_distance_mm": Limits().camera_distance_mm}
         if stated is None:
             return Limits(**nothing), frozenset()

@@ -25,7 +25,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, is no table, or a required column is missing: with the nearest name found.
+        The file cannot be read, is not a table, or lacks a required column; the message names the most similar column.
     """
     text = _text(path)
     lines = _reader(path, text)

@@ -37,7 +37,7 @@ def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any],
     Raises
     ------
     DataError
-        Where an uncertainty is no positive number, or belongs to a list.
+        An uncertainty is not a positive number, or belongs to a list.
     """
     bare = copy.deepcopy(dict(tables))
     uncertainties = {}
@@ -78,7 +78,7 @@ def changed_tables(
     Raises
     ------
     DataError
-        Where a name is that of no number.
+        A name does not denote a number of the drawing.
     """
     changed = copy.deepcopy(dict(tables))
     places = {name: (path, raw) for name, path, raw in _walk(changed)}

@@ -26,11 +26,11 @@ def read_drive(path: Path) -> DriveHistory:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, a column is missing, a cell is no number, times do not increase, or a run comes back
-        after another.
+        The file cannot be read, a column is missing, a cell is not a number, times do not increase, or the rows of a
+        run are not contiguous.
     """
     block = None
-    with suppress(FingervisionError):  # a file that cannot be read is told below, in a drive table's words
+    with suppress(FingervisionError):  # a file that cannot be read is reported below
         block = read_block(path)
     if block is not None and {"time_s", "input_mm"} <= block.keys() and "run" not in block:
         kept = {name: block[name] for name in COLUMNS if name in block}
@@ -73,7 +73,7 @@ def drive_rows(
     Raises
     ------
     DataError
-        Times do not increase, or a run comes back after another.
+        Times do not increase, or the rows of a run are not contiguous.
     """
     times = values["time_s"]
     back = np.flatnonzero(~(np.diff(times) > 0.0))

@@ -11,7 +11,7 @@ LOCK = ".lock"
 fcntl: Any
 try:
     import fcntl
-except ImportError:  # not on Windows, where an open file is locked as it is
+except ImportError:  # not on Windows, where an open file is always locked
     fcntl = None
 
 
@@ -48,7 +48,7 @@ class FolderLock:
                 ) from None
             if self._is_there():
                 return
-            os.close(self._file)  # it was removed by the one who held it, between opening and locking
+            os.close(self._file)  # its holder removed it between opening and locking
 
     def _is_there(self) -> bool:
         try:

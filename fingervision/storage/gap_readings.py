@@ -8,7 +8,7 @@ from fingervision.domain.errors import DataError, unreadable
 from fingervision.storage.decimal_number import decimal_number
 from fingervision.storage.plain_file import plain, why
 
-# Inputs nearer than this are one part (mm): stages return to a place no better.
+# Inputs that differ by less (mm) count as one part, because stages do not return to a position more exactly.
 SAME_INPUT_PLACES = 3
 
 

@@ -180,7 +180,7 @@ def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force
     Raises
     ------
     OutputError
-        The table cannot be read or written again; the old one stays.
+        The table cannot be read, or its new version cannot be written; the old table is kept.
     """
     part = path.with_name(f".{path.name}.part")
     columns = 3 if has_force else 2

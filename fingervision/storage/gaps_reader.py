@@ -29,7 +29,7 @@ class GapsReader:
         Raises
         ------
         OSError
-            The table is there and cannot be read.
+            The table exists but cannot be read.
         """
         try:
             with self.path.open("rb") as file:

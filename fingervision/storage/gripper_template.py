@@ -32,7 +32,7 @@ def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
     Raises
     ------
     DataError, InputFileError
-        Where a key is unknown, a number is no number, or the drawing cannot be a mechanism.
+        A key is unknown, a value is not a number, or the drawing is not a valid mechanism.
     """
     origin = str(path)
     reader = DrawingReader({}, origin)

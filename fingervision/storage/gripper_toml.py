@@ -43,9 +43,10 @@ _LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
         "_per_k": (1e-9, 1e-2),
     }
 )
-"""Magnitudes by the unit at a name's end: nothing outside them is a gripper, and larger numbers overflow. Lengths from
-a tenth of a micrometre to 100 m, moduli up to ten times diamond's in Pa, which is asked about where the yield stress
-stands beside it, densities from aerogel to osmium, thermal expansions from glass ceramics' to ten times rubber's."""
+"""Plausible ranges of numbers, by the unit at the end of the name; much larger numbers would overflow. Lengths are from
+0.1 µm to 100 m. Moduli are up to ten times that of diamond in Pa; a modulus in Pa instead of MPa is detected by its
+ratio to the yield stress. Densities range from aerogel to osmium, thermal expansions from glass ceramics to ten times
+that of rubber."""
 _SPELT: Mapping[str, str] = MappingProxyType(
     {"_mm": "mm", "_deg": "degrees", "_mpa": "MPa", "_kg_m3": "kg/m3", "_per_k": "1/K"}
 )
@@ -59,7 +60,8 @@ def read_gripper(path: Path) -> Gripper:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a gripper.
+        The file cannot be read, a key is missing or unknown, a value is not a number, or the drawing is not a valid
+        gripper.
     """
     try:
         text = text_of(path)
@@ -71,7 +73,7 @@ def read_gripper(path: Path) -> Gripper:
         raise DataError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
     try:
         tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and endless nesting
         raise DataError(f"{path} must be TOML, but is not: {error}.") from error
     refuse_other_file(path, tables, "the drawing of a gripper or mechanism", DRAWINGS)
     return gripper_from_tables(tables, str(path))

@@ -71,8 +71,8 @@ def read_iso230_table(path: Path) -> Iso230Rows | None:
     Raises
     ------
     DataError
-        In a sentence: columns missing, words that are no direction, a reading that stands twice, deviations under the
-        name of positions or the other way round.
+        A column is missing, a word is not a direction, a reading occurs twice, or deviations are labelled as positions
+        (or positions as deviations).
     """
     header = _header(path)
     if TARGET not in header or "input_mm" in header:
@@ -97,7 +97,7 @@ def iso230_rows(
     Raises
     ------
     DataError
-        As `read_iso230_table`.
+        For the same reasons as in `read_iso230_table`.
     """
     blocks = {name: match for name in header if (match := MATRIX.fullmatch(name)) is not None}
     quantities = {name: match["quantity"].lower() for name, match in blocks.items()} or {
@@ -114,7 +114,7 @@ def iso230_rows(
     if not sided and "direction" not in header:
         raise DataError(
             f"{path} must have a column direction (up or down: the side from which the target was approached), but "
-            f"has {','.join(header)}: add it; or, where the rows stand in the order of travel, name the columns "
+            f"has {','.join(header)}: add it; or, if the rows are in the order of travel, name the columns "
             "input_mm and gap_mm."
         )
     wanted = ("run", *(() if sided else ("direction",)), *(() if blocks else ("cycle", "time_s", "u_random_mm")))

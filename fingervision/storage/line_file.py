@@ -8,8 +8,8 @@ from time import monotonic
 
 from fingervision.domain.errors import OutputError
 
-# Lines wait for company so long, and in front of it once more as long; a second at most is lost when the program is
-# killed.
+# Longest time (s) for which a complete line waits in memory. A row may wait as long again before its line is added, so
+# that at most one second is lost when the program is killed.
 FLUSH_EVERY_S = 0.5
 
 
@@ -74,7 +74,7 @@ class LineFile:
             while written < len(block):
                 written += os.write(self._file.fileno(), block[written:])
         except OSError as error:
-            # Half a line is no line.
+            # An incomplete line is removed.
             self._whole_bytes += block[:written].rfind(b"\n") + 1
             with suppress(OSError):  # a pipe cannot be cut back
                 os.ftruncate(self._file.fileno(), self._whole_bytes)

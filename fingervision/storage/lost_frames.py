@@ -88,7 +88,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
         run = json.loads((files[0].parent / RUN).read_text(encoding="utf-8"))
         named = str(run["lost"]) if run["video"] == files[0].name else ""
     except (OSError, ValueError, LookupError, TypeError):
-        return ()  # there is none, or it is something else's
+        return ()  # there is no run.json, or it belongs to something else
     if named != LOST:
         return ()
     path = files[0].parent / LOST

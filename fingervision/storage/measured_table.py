@@ -19,8 +19,8 @@ from fingervision.storage.summary_json import u_clock_beside
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")
-# Each run has constants of its own in the fit, whose matrices grow with rows times runs: 1000 runs of 20 000 rows are
-# 160 MB, and no bench records more in a day.
+# In the fit, each run has its own constants, so that the matrices grow with rows times runs: 1000 runs of 20 000 rows
+# need 160 MB, and no test bed records more in a day.
 MOST_RUNS = 1000
 NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
 
@@ -31,8 +31,8 @@ def read_measured_table(path: Path) -> MeasuredTable:
     Raises
     ------
     DataError, InputFileError
-        In a sentence: columns missing, cells that are no numbers, fewer than five rows, an input or a gap that
-        never changes, times that repeat within a run.
+        A column is missing, a cell is not a number, there are fewer than five rows, the input or the gap never changes,
+        or times repeat within a run.
     """
     targets = read_iso230_table(path)
     if targets is not None:
@@ -86,7 +86,7 @@ def measured_rows(
     Raises
     ------
     DataError
-        As `read_measured_table`.
+        For the same reasons as in `read_measured_table`.
     """
     values = dict(values)
     edges = "left_mm" in values and "right_mm" in values
@@ -225,7 +225,7 @@ def _runs(
 ) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
     """Order of the rows; runs are sorted by their first time (or smallest input), independently of their names."""
     key = inputs if time is None else time
-    # Each group is sorted by its key: its first is the least.
+    # Each group is sorted by its key, so that its first row has the smallest key.
     groups = sorted(_by_run(names, key).items(), key=lambda item: (key[item[1][0]], float(np.sum(inputs[item[1]]))))
     ends = np.cumsum([rows.size for _, rows in groups])
     runs = tuple(slice(int(end) - rows.size, int(end)) for end, (_, rows) in zip(ends, groups, strict=True))

@@ -79,7 +79,7 @@ class MechanismDrawing:
         Raises
         ------
         DataError, InputFileError
-            A number is unknown, or the drawing cannot be a mechanism.
+            A name does not denote a number of the drawing, or the changed drawing is not a valid mechanism.
         """
         tables = changed_tables(self.tables, changes, str(self.path), absolute=absolute) if changes else self.tables
         if "gripper" in tables:
@@ -106,7 +106,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or states an uncertainty that is none.
+        The file cannot be read, or an uncertainty in it is not a positive number.
     """
     try:
         tables = tomllib.loads(text_of(path))
@@ -124,7 +124,8 @@ def read_mechanism(path: Path) -> Mechanism:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a mechanism.
+        The file cannot be read, a key is missing or unknown, a value is not a number, or the drawing is not a valid
+        mechanism.
     """
     return read_drawing(path).mechanism()
 

@@ -28,7 +28,7 @@ from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
 """Key of the curve of a position error map: pairs of input and error, in mm."""
-# A fit that ends at a bound may be beyond it by rounding.
+# A fitted value at a bound may exceed the bound by a rounding error.
 BOUND_SLACK = 1e-6
 
 
@@ -54,7 +54,7 @@ def read_model(
     Raises
     ------
     DataError, InputFileError, ModelError, UsageError
-        The file is neither, or its base is missing.
+        The file is not a model of any supported format, or the base of a corrected model is missing.
     """
     if path.suffix.lower() in SUFFIXES:
         return _function(path, {})
@@ -193,7 +193,7 @@ def write_model(
     Raises
     ------
     OutputError
-        The base model's name is not UTF-8, which a TOML file must be.
+        The name of the base model cannot be written in UTF-8, the encoding of TOML files.
     """
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
     lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
@@ -202,7 +202,7 @@ def write_model(
         lines += ["", "[[effect]]", f'name = "{effect}"']
         lines += [f"place = {json.dumps(place, ensure_ascii=False)}"] if place else []
         lines += [f"end = {json.dumps(end, ensure_ascii=False)}"] if end else []
-        # Whoever reads the file needs the effect too, where it is no built-in one.
+        # To read the file, an effect that is not built in must be available.
         origin = origin_of(effect) if effect in catalogue() else None
         lines += [] if origin is None or origin.built_in else [f"from = {json.dumps(str(origin), ensure_ascii=False)}"]
         lines.append("[effect.parameters]")

@@ -33,7 +33,7 @@ def number_block(lines: Sequence[str], separator: str | None, wide: int) -> NDAr
         block = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except ValueError:
         return None
-    # Lines that were skipped as blank would shift the numbers of the rows.
+    # If blank lines were skipped, the following rows would get wrong row numbers.
     if block.shape != (len(lines), wide) or not np.all(np.isfinite(block)):
         return None
     return block

@@ -43,7 +43,7 @@ def numbers_in(path: Path, name: str, cells: Sequence[str]) -> Numbers:
     Raises
     ------
     DataError
-        A cell is no finite number; the first is named with its data row.
+        A cell is not a finite number; the message names the first such cell and its data row.
     """
     try:
         read = float if are_decimal(cells) else decimal_number

@@ -21,7 +21,7 @@ def out_folder(path: Path) -> Iterator[None]:
         yield
     except FileExistsError:
         raise OutputError(f"--out must be a folder, but {path} is a file: name another.") from None
-    except OutputError:  # of a file in it, with its own sentence
+    except OutputError:  # error of a file in the folder, which has its own message
         raise
     except OSError as error:
         raise OutputError(

@@ -1,4 +1,4 @@
-"""Read input files: pipes and devices, which could wait for ever, are refused, and so is text that is not UTF-8."""
+"""Read input files; refuse pipes and devices, which could block for ever, and text that is not UTF-8."""
 
 import codecs
 import errno
@@ -35,7 +35,7 @@ def plain(path: Path) -> Path:
 
 
 class NotUtf8Error(ValueError):
-    """A text file has another encoding than UTF-8; the message is a clause that states which, and what to do."""
+    """A text file has another encoding than UTF-8; the message states the encoding and the remedy."""
 
 
 def text_of(path: Path) -> str:
@@ -72,7 +72,7 @@ def in_utf8(path: Path, text: str) -> str:
     Raises
     ------
     OutputError
-        It holds a name that is not.
+        The text contains a file name that UTF-8 cannot encode.
     """
     try:
         text.encode()

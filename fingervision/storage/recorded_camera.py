@@ -26,5 +26,5 @@ def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:
         run = json.loads((files[0].parent / RUN).read_text(encoding="utf-8"))
         camera = run["device"]["camera"] if run["video"] == files[0].name else {}
     except (OSError, ValueError, LookupError, TypeError):
-        return {}  # there is none, or it is something else's
+        return {}  # there is no run.json, or it belongs to something else
     return {str(name): str(value) for name, value in camera.items()} if isinstance(camera, dict) else {}

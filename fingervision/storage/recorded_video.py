@@ -14,10 +14,11 @@ from fingervision.frames.open_container import open_container
 from fingervision.frames.received import OwnPacket
 from fingervision.vision.grey import to_grey
 
-# What a time in the recording is a multiple of.
+# All times in the recording are multiples of 1 / TICKS_PER_S seconds.
 TICKS_PER_S = 1_000_000
 TIME_BASE = Fraction(1, TICKS_PER_S)
-# Matroska keeps milliseconds alone; MP4 in fragments keeps every tick, and each frame stands for itself.
+# Matroska stores times in milliseconds only; fragmented MP4 stores exact times, and each frame is a fragment of its
+# own.
 CONTAINER = {"movflags": "frag_every_frame+empty_moov+default_base_moof", "flush_packets": "1"}
 # Version 3 has a checksum for each slice.
 FFV1 = {"level": "3", "slices": "4", "slicecrc": "1", "g": "1"}
@@ -152,7 +153,7 @@ class RecordedVideo:
             shown, decoded = (round((time_s - self._first_s) * TICKS_PER_S) for time_s in (own.time_s, own.decode_s))
             if self._last_tick < 0 and not own.is_key:
                 continue
-            # Times of decoding must grow; a jump of the source's clock is bridged by a tick.
+            # Decoding times must increase; if the source's clock jumps back, the next time is one unit later.
             decoded = max(decoded, self._last_tick + 1)
             self._last_tick = decoded
             packet.stream, packet.time_base = self._stream, TIME_BASE
@@ -173,7 +174,7 @@ class RecordedVideo:
         self._stream = self._container.add_stream("ffv1", options=FFV1)
         self._stream.width, self._stream.height, self._stream.pix_fmt = width_px, height_px, pixel_format
         self._stream.codec_context.time_base = self._stream.time_base = TIME_BASE
-        self._stream.codec_context.thread_count = 1  # threads of frames would each hold one back
+        self._stream.codec_context.thread_count = 1  # with several threads, each would hold back one frame
 
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)

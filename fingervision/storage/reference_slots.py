@@ -26,5 +26,5 @@ def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
             for slot in listed
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        # The folder is another program's, or the run broke off before it was finished.
+        # The folder belongs to another program, or the run was interrupted.
         return ()

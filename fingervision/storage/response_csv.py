@@ -13,7 +13,7 @@ from fingervision.storage.decimal_number import decimal_number
 from fingervision.storage.plain_file import NotUtf8Error, text_of, why
 
 COLUMNS = ("level", "light")
-# Full scales that pictures have.
+# Full-scale levels of pictures, by bit depth.
 TOP_LEVELS = (255, 1023, 4095, 16383, 65535)
 
 
@@ -25,7 +25,7 @@ def response_named(name: str) -> CameraResponse | None:
     UsageError
         The name is neither a standard response nor an existing file.
     DataError
-        The file is no response.
+        The file is not a camera response.
     """
     if name == "auto":
         return None
@@ -45,7 +45,7 @@ def read_response(path: Path) -> CameraResponse:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or is no response.
+        The file cannot be read, or is not a camera response.
     """
     try:
         lines = text_of(path).splitlines(keepends=True)

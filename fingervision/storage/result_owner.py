@@ -114,7 +114,7 @@ def _owner(out: Path) -> str | None:
     try:
         found = json.loads((out / OWNER).read_text(encoding="utf-8", errors="surrogateescape"))["input"]
     except (OSError, ValueError, LookupError, TypeError):
-        return None  # made by hand, or by a version that did not say
+        return None  # made by hand, or by an older version
     return found if isinstance(found, str) else None
 
 

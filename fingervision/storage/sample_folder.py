@@ -14,7 +14,7 @@ def sample_folder() -> Path:
     Raises
     ------
     InstallationError
-        The installation lacks them.
+        The installation does not contain the sample files.
     """
     package = Path(fingervision.__file__).parent
     for folder in (package / NAME, package.parent / NAME):

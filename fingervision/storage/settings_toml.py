@@ -89,7 +89,7 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
         The file or folder cannot be written.
     """
     lines = [
-        "# For `fingervision live SOURCE --settings FILE`, and `measure` alike.",
+        "# For `fingervision live SOURCE --settings FILE`, and for `measure`.",
         f"schema = {SCHEMA}",
     ]
     for key in TOP_KEYS[1:-1]:

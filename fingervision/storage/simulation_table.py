@@ -17,8 +17,8 @@ def read_simulation_table(path: Path) -> TableModel:
     Raises
     ------
     DataError, InputFileError
-        In a sentence: columns missing, empty cells, fewer than two rows, an input that stands twice, a gap that
-        does not depend on the input at all.
+        A column is missing, a cell is empty, there are fewer than two rows, an input occurs twice, or the gap is the
+        same at all inputs.
     """
     cells = read_columns(path, ("input_mm", "gap_mm"), ("left_mm", "right_mm", "force_n"))
     return simulation_rows(path, {name: numbers_in(path, name, texts) for name, texts in cells.items()})
@@ -37,7 +37,7 @@ def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
     Raises
     ------
     DataError
-        As `read_simulation_table`.
+        For the same reasons as in `read_simulation_table`.
     """
     for name, each in columns.items():
         if not each.complete:

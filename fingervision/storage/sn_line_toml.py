@@ -27,7 +27,7 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
     Raises
     ------
     DataError
-        Where it is no falling line of positive amplitudes over rising cycles.
+        The amplitudes are not positive and decreasing, or the numbers of cycles do not increase.
     """
     what = f"{name} in {origin}"
     if not isinstance(raw, dict) or not {"cycles", "amplitude_mpa"} <= set(raw) <= set(_KEYS):

@@ -39,7 +39,7 @@ def read_steps(path: Path) -> StepData:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or a value in it cannot be meant; the sentence names the line.
+        The file cannot be read, or a value in it is not allowed; the message names the line.
     """
     values, text = read_document(path, "step data")
     top = Section(path, text, "", values)

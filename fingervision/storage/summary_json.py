@@ -29,7 +29,7 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
     """
     part = path.with_name(f".{path.name}.part")
     try:
-        # A name that is not UTF-8 keeps its bytes as JSON's own escapes.
+        # A file name that is not valid UTF-8 is written with JSON escapes.
         part.write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
         part.replace(path)
     except OSError as error:
@@ -72,7 +72,7 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
     of = recording_of(folder)
     if of is None or Path(of).resolve() == Path(recording).resolve():
         return
-    # A name may be relative to a folder from which an earlier call was made: there, the last part tells.
+    # A name may be relative to the folder of an earlier call; its last part is then compared.
     if not Path(of).exists() and Path(of).name == Path(recording).name:
         return
     raise UsageError(f"--out must be a folder of its own, but {folder} holds the results of {of}: name another folder.")

@@ -1,4 +1,4 @@
-"""What a TOML file of this program is, told by its tables, so that a file given to the wrong option can be named."""
+"""Recognise the purpose of a TOML file of this program by its tables, for the message on a file for another option."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 from fingervision.domain.errors import DataError
 
-# Table or key that no other file has, whether it is a list of tables, and what takes such a file.
+# Table or key that only this kind of file has, whether it is a list of tables, and the option that takes the file.
 _PURPOSES = {
     "the description of a bed": (("actuator", dict), "the option --bed takes it"),
     "a gauge file": (("gauge", list), "the option --gauges of measure and live takes it"),
@@ -20,7 +20,7 @@ DRAWINGS = ("the drawing of a mechanism", "the drawing of a gripper", "a mechani
 
 
 def refuse_other_file(path: Path | str, tables: Mapping[str, Any], need: str, wanted: Collection[str]) -> None:
-    """Refuse a file that is plainly another of this program's files, and say which option or command takes it.
+    """Refuse a TOML file of another purpose; the message names the option or command that takes the file.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ def refuse_other_file(path: Path | str, tables: Mapping[str, Any], need: str, wa
     need : str
         What the file must be, for the message.
     wanted : collection of str
-        What the file may be, in the words of this module.
+        Accepted kinds of file, in the words of this module.
 
     Raises
     ------
     DataError
-        The tables are those of another file.
+        The tables belong to another kind of file.
     """
     for what, ((key, kind), takes) in _PURPOSES.items():
         if isinstance(tables.get(key), kind):

@@ -24,7 +24,7 @@ from fingervision.tables.understanding import Taken, Understood, understand
 from fingervision.tables.units import CANONICAL as CANONICAL_UNIT
 
 RANGE_UNIT = {role: CANONICAL_UNIT[dimension] for role, dimension in DIMENSION.items()}
-"""Unit in which a column's range is stated: that in which it was read, whatever the file's unit is."""
+"""Unit in which the range of a column is stated: the unit after conversion, not that of the file."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,7 @@ class Account:
     channels : BodyChannels
         User-named channels.
     also : str
-        Other kind of table as which this interpretation holds just as well; empty if there is none.
+        Another kind of table as which the file can be interpreted in the same way; empty if there is none.
     """
 
     path: Path
@@ -148,11 +148,11 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
     Raises
     ------
     DataError, InputFileError, OpenQuestionError
-        No table can be read at all.
+        The file cannot be read as a table of any kind.
     """
     kinds = KINDS if kind is None else (kind,)
     if not path.is_file():
-        read_raw(path, Entry())  # says why not
+        read_raw(path, Entry())  # raises an error with the reason
     for each in kinds:
         if is_own(path, each, given[each]):
             return _own(path, each)
@@ -166,7 +166,7 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 
 
 def _same_as_simulation(understood: Mapping[str, Understood]) -> bool:
-    """Whether a table has nothing that tells a measurement from a simulation: the gap over the input, without times."""
+    """Whether a table can be a measurement as well as a simulation: it holds the gap over the input, without times."""
     measured, simulation = understood["measured"], understood["simulation"]
     return (
         measured.runs is None
@@ -179,7 +179,7 @@ def _open_columns(table: Understood) -> int:
     """Number of columns whose role or unit is unresolved; a missing required column counts twice."""
     missing = sum(question.key.startswith("columns.") for question in table.questions)
     missing += sum(bool(question.missing) for question in table.questions)
-    # A column called after a program's model holds no measurement.
+    # A column that is named after a simulation program contains no measurement.
     sources = [column_name(each.name).source for each in table.taken if each.role == "gap"]
     return missing + sum(source not in (None, table.kind) for source in sources)
 
@@ -187,7 +187,7 @@ def _open_columns(table: Understood) -> int:
 def _account(table: Understood, given: Entry, raw: RawTable, also: str) -> Account:
     question: FingervisionError | None = None
     try:
-        # What a table of either kind leaves open is answered once, for both.
+        # Questions that arise for both kinds of table are answered once, for both kinds.
         (replace(table, kind="table") if also else table).decided()
         if table.kind == "drive":
             drive_of(table, given)
@@ -221,7 +221,8 @@ def _entry(taken: tuple[Taken, ...], given: Entry, raw: RawTable) -> Entry:
         or (each.name if names.count(each.name) == 1 else str(names.index(each.name) + 1))
         for each in taken
     }
-    # Units that the table states itself are not written down: they stay under the same doubts at the next call.
+    # Units that the table itself states are not written to columns.toml, so that the next call doubts them in the same
+    # way.
     line = 0 if not raw.named and "header_line" in raw.settings else given.header_line
     return replace(given, columns=columns, words={**_dialect(raw), **given.words}, header_line=line)
 

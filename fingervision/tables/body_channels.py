@@ -75,7 +75,7 @@ def channels_in(raw: RawTable, used: Collection[int], decimal: str) -> BodyChann
             continue
         values, unread = _numbers(column, decimal)
         if unread:
-            found.notes.append(f"the column {column.name} was left out: {unread} of its cells are no numbers.")
+            found.notes.append(f"the column {column.name} was left out: {unread} of its cells are not numbers.")
             continue
         size = sizes[of_name[0]]
         found.columns[name] = values if size == 1.0 else Numbers(values.value * size, values.present)

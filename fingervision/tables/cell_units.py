@@ -1,4 +1,4 @@
-"""Cells that hold a number and its unit, such as the durations of MATLAB's timetables (`0.1 sec`)."""
+"""Read cells that contain a number and its unit, such as the durations of MATLAB's timetables (`0.1 sec`)."""
 
 import re
 from dataclasses import replace
@@ -12,7 +12,7 @@ WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\W\d_]+)")
 
 
 def with_units_of_cells(raw: RawTable) -> RawTable:
-    """Move the unit of a column's cells beside its name, if all of its cells have the same."""
+    """Move the unit from the cells of a column to the column's name, if all cells have the same unit."""
     columns = tuple(_column(column) for column in raw.columns)
     return raw if columns == raw.columns else replace(raw, columns=columns)
 

@@ -32,7 +32,7 @@ def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.
     try:
         if decimal == "," and any("," in cell for cell in cells):
             if any("." in cell for cell in cells):
-                raise ValueError  # noqa: TRY301 - points would be taken for decimals: cell by cell
+                raise ValueError  # noqa: TRY301 - points would be read as decimal points: the cells are read one by one
             value = np.array([float(cell.replace(",", ".")) for cell in cells], dtype=np.float64)
         else:
             value = np.array(list(map(float, cells)), dtype=np.float64)

@@ -146,7 +146,7 @@ def _one_clock(
         about.notes.append(f"{raw.columns[elapsed[0]].name} is read as the time, not {others}.")
         return elapsed
     if len(times) == 1 and not elapsed and len(both) > 1:
-        return times  # a day and a time of day in columns of their own: joined later
+        return times  # date and time of day in separate columns are joined later
     if len(times) > 1 and _alike([raw.columns[k] for k in times]):
         return times[:1]  # a clock beside each channel
     return times or both

@@ -63,7 +63,7 @@ def column_name(text: str) -> ColumnName:
         return ColumnName(text, text, "")
     if match is not None:
         unit = next(part for part in match.group("a", "b", "c", "d") if part is not None)
-        # Brackets may hold a remark: `gap (left)`, `position (actual) [mm]`.
+        # Brackets may contain a remark instead of a unit: `gap (left)`, `position (actual) [mm]`.
         if known_unit(unit) is not None or role_of(f"{match['base']} {unit}") is None:
             return ColumnName(text, re.sub(r"[\[\](){}]", " ", match["base"]).strip(), spelled(unit))
         return ColumnName(text, f"{match['base']} {unit}", "")

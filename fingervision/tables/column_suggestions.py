@@ -1,4 +1,4 @@
-"""Which column to suggest for a role, where the user must decide: by name, unit and values."""
+"""Choose the column that a question to the user suggests for a role: by name, unit and values."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,10 @@ from fingervision.tables.units import factor, known_unit, spelled
 from fingervision.tables.words import mentions, tokens
 
 LOOKED_AT = 200
-"""Cells of a column that are looked at: enough to tell a clock or a counter from a position."""
+"""Number of cells of a column that are examined: enough to distinguish a clock or a counter from a position."""
 BY_NAME, BY_UNIT, BY_CLOCK, BY_READING = 4, 3, 3, 1
-"""Points for a word of the role in the name, a unit of its dimension, times that increase, and a word that tells a
-reading from a command. A suggestion is only an example in a question; the user decides."""
+"""Points for a word of the role in the name, a unit of its dimension, times that increase, and a word that
+distinguishes a reading from a command. A suggestion is only an example in a question; the user decides."""
 READINGS = frozenset(
     [
         "actual",
@@ -32,13 +32,13 @@ READINGS = frozenset(
         "misurata",
     ]
 )
-"""Words by which a column is a measured position and no command."""
+"""Words that denote a measured position, and not a command."""
 
 
 def likeliest(
     raw: RawTable, names: Sequence[ColumnName], role: str, candidates: Sequence[int], decimal: str
 ) -> int | None:
-    """Find the column that is most probably meant for a role; None if no column comes into question.
+    """Find the most probable column for a role; None if no column is possible.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def likeliest(
     role : str
         `time`, `input`, `gap` and so on.
     candidates : sequence of int
-        Columns that are free.
+        Numbers of the columns that have no role yet.
     decimal : str
         Decimal mark of cells that are still text.
 
@@ -60,7 +60,7 @@ def likeliest(
     """
     points = {k: _points(raw.columns[k], names[k], role, decimal) for k in candidates}
     best = max(candidates, key=lambda k: points[k], default=None)
-    # A file without names and units gives no hint; the columns in their order are as good as any.
+    # If a file has no names and units, the columns are suggested in their order.
     return best if best is not None and points[best] >= 0 else None
 
 

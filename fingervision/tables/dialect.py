@@ -109,7 +109,7 @@ def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -
             if mark == between == "," and not all('"' in line for line in sample[-QUOTED_LINES:]):
                 continue
             found = _explained(rows, mark)
-            # Ties go to the first: likelier separators, the point.
+            # Among equal results the first is taken: the more probable separator, and the decimal point.
             if found is not None and (best is None or found[0] > best[0] + 1e-9):
                 best = found[0], Dialect(between, mark, found[1])
     if best is None:

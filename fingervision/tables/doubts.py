@@ -23,9 +23,9 @@ GREATEST_GAP_MM = 500.0
 """Largest plausible gap, beyond the field of view of any such set-up."""
 LEAST_SPEED_MM_S, GREATEST_SPEED_MM_S = 2e-3, 50.0
 USUAL_STEPS_S = (1e-3, 1.0)
-"""Speed of the input during motions (mm/s) and time between rows (s). Usual set-ups move at 0.01 to 2 mm/s and record 5
-to 1000 rows per second; if both are slower (or faster) by a factor of a thousand, times have another unit, or the log
-spans hours, which the user may confirm."""
+"""Usual time between rows (s), judged together with the usual speed of the input during motions (mm/s). Usual set-ups
+move at 0.01 to 2 mm/s and record 5 to 1000 rows per second; if both are slower (or faster) by a factor of a thousand,
+times have another unit, or the log spans hours, which the user may confirm."""
 FEWEST_FOR_SPEED = 20
 LEAST_OVERLAP = 0.5
 """Smallest fraction of the rows with a gap that should have an input; with a smaller fraction, the two records hardly

@@ -36,7 +36,7 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
     Raises
     ------
     DataError
-        The stated encoding does not fit, or none does.
+        The stated encoding does not fit, or no known encoding fits.
     """
     if given is not None:
         try:
@@ -54,7 +54,7 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
     try:
         return content.decode("utf-8"), "utf-8"
     except UnicodeDecodeError as error:
-        # A file that was cut off within a character is UTF-8 still.
+        # A UTF-8 file may be cut off within a character.
         if error.start > len(content) - 4 and error.reason == "unexpected end of data":
             return content[: error.start].decode("utf-8"), "utf-8"
     return _older(content)
@@ -65,7 +65,7 @@ def _utf16_without_mark(sample: bytes) -> str | None:
     if len(sample) < 4:
         return None
     zeros = [sample[start::2].count(0) / len(sample[start::2]) for start in (0, 1)]
-    # Half of the characters and more are digits and separators in any table.
+    # In any table, at least half of the characters are digits and separators.
     if zeros[1] > 0.5 and zeros[0] < 0.1:
         return "utf-16-le"
     return "utf-16-be" if zeros[0] > 0.5 and zeros[1] < 0.1 else None
@@ -81,7 +81,8 @@ def _older(content: bytes) -> tuple[str, str]:
             continue
     from charset_normalizer import from_bytes
 
-    # Without UTF-16 and UTF-32, which have marks or zero bytes: in these any text of an even length is some text.
+    # UTF-16 and UTF-32 are recognised by byte-order marks or zero bytes before; here they would accept any text of even
+    # length.
     best = from_bytes(sample, cp_exclusion=WIDE).best()
     if best is not None:
         try:

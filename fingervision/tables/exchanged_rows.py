@@ -6,7 +6,7 @@ from fingervision.tables.column_names import column_name
 from fingervision.tables.dialect import Dialect, is_comment, is_value, split
 
 MOST_LINES = 12
-"""Most lines of such a table, and least ratio of its columns to its lines."""
+"""Largest number of lines of a table with one column per line, and smallest ratio of its columns to its lines."""
 LEAST_RATIO = 3
 
 

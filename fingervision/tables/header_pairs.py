@@ -1,4 +1,4 @@
-"""Names and units of a text table's columns, and headers with a label before each value."""
+"""Header of a text table (names and units of the columns), and headers with a label before each value."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from fingervision.tables.units import known_unit
 
 NAME, UNIT = "name", "unit"
 CLOCK = "Time"
-"""Name of the column of times that stands before each channel."""
+"""Name of the column of times before each channel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def labelled_pairs(lines: Sequence[str], dialect: Dialect) -> Header | None:
     Returns
     -------
     Header or None
-        None if no line has such pairs.
+        None if no line has pairs of label and value.
     """
     if dialect.wide < 4 or dialect.wide % 2:
         return None

@@ -61,9 +61,9 @@ def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
     Raises
     ------
     DataError
-        As `storage.iso230_table.read_iso230_table`.
+        For the same reasons as in `storage.iso230_table.read_iso230_table`.
     OpenQuestionError
-        A unit is open, or whether the readings are positions or deviations.
+        A unit is unknown, or it is unknown whether the readings are positions or deviations.
     """
     names = [column_name(column.name) for column in raw.columns]
     targets = _places(names, "target", given)
@@ -205,7 +205,7 @@ def _length(
     unit = given.units.get(role) or column.unit or names[place].unit
     size = factor(unit, "length") if unit else None
     if size is None:
-        why = f"is '{unit}', which is no length" if unit else "is not stated"
+        why = f"is '{unit}', which is not a length" if unit else "is not stated"
         questions.append(Question(f"the unit of '{column.name}' ({role}) {why}", f"units.{role}=mm"))
     values = _plain(raw, place)
     return Numbers(values.value * (size or 1.0), values.present)
@@ -246,5 +246,6 @@ def _words(raw: RawTable, place: int) -> list[str]:
 
 
 def _texts(values: Numbers) -> list[str]:
-    # Twelve digits: a picometre on a metre, without the last bit of a factor.
+    # Numbers are rounded to twelve digits (a picometre in a metre), which removes rounding errors of the unit
+    # conversion.
     return [f"{value:.12g}" if there else "" for value, there in zip(values.value, values.present, strict=True)]

@@ -19,7 +19,7 @@ HIRAGANA_KATAKANA = "".join(chr(code) for code in (*range(0x3041, 0x3094), *rang
 WESTERN = "éäüöèóàíáñçúßêôìòùâîûåøæëïãœÿõ"
 CENTRAL_EUROPEAN = "óáéíąłęčěřžšýőűćńśźżňťůúďöü"
 TURKISH = "\u0131şğüçö"
-"""Letters, each in the order of their frequency in the languages that share an encoding."""
+"""Letters of the languages that share an encoding, most frequent first."""
 SIGNS = {"µ": 0.2, "°": 0.1, **dict.fromkeys("²³±·…€§«»\u00d7\u2013\u2014\u2018\u2019\u201c\u201d\xa0", 0.01)}
 """Probabilities of the signs in any table: units, quotation marks, dashes."""
 UNITS = dict.fromkeys("\u339c\u339b\u339d\u2103", 0.02)
@@ -41,13 +41,14 @@ NEXT_LETTER = 0.89
 CAPITALISED, CAPITALS = 0.3, 0.1
 """Probability that a word begins with a capital, and that it has only capitals."""
 ODD = 0.01
-"""Probability of what hardly occurs within a word: a capital after a small letter, letters of two alphabets, a sign.
-By the first, KOI8-R and Windows-1251 differ, whose small and capital letters stand in each other's places."""
+"""Probability of sequences that hardly occur within a word: a capital after a small letter, letters of two alphabets, a
+sign. A capital after a small letter distinguishes KOI8-R from Windows-1251, in which small and capital letters have
+exchanged codes."""
 BESIDE_ANOTHER = 0.15
 """Probability of an accented letter beside another one, relative to one by itself: `größe`, `ölçü`."""
 LEAST = -6.0
-"""Mean logarithm of the likelihood of a byte below which no language fits. Letters drawn at random from the 94 x 94
-places of a double-byte set would have -4.5, but are usual in none."""
+"""Mean logarithm of the likelihood of a byte below which no language fits. Random letters from the 94 x 94 codes of a
+double-byte set would have -4.5, but are not the usual letters of any language."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +64,7 @@ class Language:
     others : int
         Number of other letters that may occur.
     other_letters : pattern
-        Which these are; any further character is as good as excluded.
+        Pattern of these other letters; any further character is nearly impossible.
     is_latin : bool
         Whether most of its letters are ASCII.
     """
@@ -108,7 +109,8 @@ LANGUAGES = (
     Language(("cp949",), _even(KOREAN), 2350, re.compile(r"[\uac00-\ud7a3]")),
 )
 WESTERN_FIRST = 1.0
-"""Logarithm of the prior odds of a Western encoding over another: at equal likelihood, `µ` alone, it is taken."""
+"""Logarithm of the prior odds of a Western encoding over another: at equal likelihood, such as for a single `µ`, the
+Western encoding is chosen."""
 
 SELDOMER = 0.5
 """Logarithm of the prior odds of an encoding over the next one of the same language."""
@@ -157,7 +159,7 @@ def _log_likelihood(text: str, language: Language) -> float:
             total += accented * log(BESIDE_ANOTHER)
         elif len({letter.isascii() for letter in letters}) > 1:
             total += log(ODD)
-    # An ellipsis before a letter is an Ö of another encoding.
+    # An ellipsis before a letter is probably an Ö in another encoding.
     return total + log(ODD) * len(re.findall(r"…\w", text))
 
 

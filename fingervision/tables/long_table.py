@@ -1,4 +1,4 @@
-"""Refuse this program's own tables with several rows per frame as measured tables, and say which table to give."""
+"""Refuse this program's tables with several rows per frame as measured tables, and name the right table."""
 
 from fingervision.domain.errors import DataError
 from fingervision.tables.raw_table import RawTable
@@ -7,7 +7,7 @@ LONG_TABLES = {
     ("time_s", "body", "status", "angle_mrad"): "a bodies.csv, one row per body and frame",
     ("time_s", "gauge", "quantity", "value"): "a gauges.csv, one row per number",
 }
-"""Columns that no other table has, and what such a table is."""
+"""Columns by which a table with several rows per frame is recognised, and its description."""
 
 
 def refuse_long_table(raw: RawTable) -> None:
@@ -16,7 +16,7 @@ def refuse_long_table(raw: RawTable) -> None:
     Raises
     ------
     DataError
-        The table is one of these.
+        The table is a bodies.csv or a gauges.csv.
     """
     names = {column.name for column in raw.columns}
     for columns, what in LONG_TABLES.items():

@@ -89,7 +89,7 @@ def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Ent
     Raises
     ------
     DataError, InputFileError
-        The named file is not there, or a key is wrong.
+        The named file does not exist, or a key in it is wrong.
     """
     path = columns if columns is not None else table.parent / NAME
     if columns is None and not path.is_file():

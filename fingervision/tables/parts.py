@@ -26,9 +26,9 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
     Raises
     ------
     DataError
-        The file has no part with columns of numbers, or not the stated part.
+        The file has no part with columns of numbers, or does not contain the stated part.
     OpenQuestionError
-        Several may be meant.
+        Several parts may be the table, and the user has not chosen one.
     """
     listed = ", ".join(f"'{name}'" for name in names)
     if (stated := given.words.get("part")) is not None:

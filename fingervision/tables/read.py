@@ -163,8 +163,8 @@ def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
         if path.is_dir() or path.suffix.lower() in TABLE_ENDINGS:
             raise
         raise DataError(
-            f"{path} is no model: it must be a simulation table, a gripper.toml, mechanism.toml or model.toml, an FMU, "
-            f"or a Python file with simulate(time_s, input_mm). As a table it cannot be read: {error}"
+            f"{path} is not a model: it must be a simulation table, a gripper.toml, mechanism.toml or model.toml, an "
+            f"FMU, or a Python file with simulate(time_s, input_mm). As a table it cannot be read: {error}"
         ) from error
 
 
@@ -183,7 +183,7 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
     Raises
     ------
     DataError, InputFileError, ModelError, UsageError
-        As `storage.model_toml.read_model` and `read_simulation_table`.
+        For the same reasons as in `storage.model_toml.read_model` and `read_simulation_table`.
     """
     reader: Callable[[Path], TableModel] = partial(_table_or_no_model, columns=columns)
     return model_toml.read_model(path, kind, table=reader)

@@ -28,7 +28,7 @@ def terminal_plot(
     top, bottom = f"{np.max(y):.4g}", f"{np.min(y):.4g}"
     left, right = f"{np.min(x):.4g}", f"{np.max(x):.4g}"
     if x.size <= FEW:
-        # Few points are joined, so that the eye finds the curve.
+        # If there are few points, they are joined by lines, so that the curve is visible.
         at = np.linspace(0.0, x.size - 1.0, JOINED)
         x, y = (np.interp(at, np.arange(x.size), values) for values in (x, y))
     columns, rows = (WIDE, HIGH) if plain else (2 * WIDE, 4 * HIGH)

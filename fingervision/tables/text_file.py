@@ -22,11 +22,12 @@ def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, is too large, is no text, or has a line without end.
+        The file cannot be read, is too large, is not text, or has a line of more than `LONGEST_LINE` characters.
     """
     try:
         with path.open("rb") as file:
-            # Looked at before the whole is read: a file of one line is often huge. UTF-32 has four bytes a character.
+            # The first line is checked before the whole file is read, because a file of one line is often huge. UTF-32
+            # has four bytes per character.
             head = file.read(4 * LONGEST_LINE)
             if len(head) == 4 * LONGEST_LINE and b"\n" not in head and b"\r" not in head:
                 raise _too_long(path)
@@ -41,7 +42,7 @@ def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
         raise InputFileError(f"The table {path} could not be read ({error.strerror}).") from error
     text, name = decode(content, encoding)
     if "\x00" in text:
-        # What a logger's disk held when its power went: zeros at the end.
+        # If a logger loses power, its file may end with zero bytes.
         text = text.rstrip("\x00")
         if "\x00" in text:
             raise DataError(

@@ -49,11 +49,12 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
         cells = split(lines[at], dialect.separator)
         if not _is_row(cells, dialect) or _is_label(cells, lines[at + 1 :], dialect):
             continue
-        # A header that numbers its columns has fewer values than a row: `Position 1, Position 2` has none.
+        # Numbers in column names are not values: the header `Position 1, Position 2` contains no value.
         values = sum(is_value(cell, dialect.decimal) for cell in cells)
         words = sum(role_of(column_name(cell).base) is not None for cell in cells)
         if not named or values > words:
-            # `rate, 0.5, mm/s` above the table is as wide as a row of three, and holds a number as well.
+            # A line such as `rate, 0.5, mm/s` above the table has as many cells as a row of three columns, and contains
+            # a number.
             if not named or 2 * values >= dialect.wide:
                 return at
             poor = at if poor is None else poor
@@ -103,11 +104,11 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
         known = sum(column_name(name).role is not None or column_name(name).source is not None for name in names)
         found.append((known, at, names))
     if not found and units and not all(known_unit(cell) for cell in units if cell):
-        # `a,b` could be ares and bits; names are likelier above numbers than rare units alone.
+        # `a,b` could mean ares and bits, but names are more probable above numbers than a line of rare units.
         return Header(units, (), units_at)
     if not found:
         return Header((), units or (), -1)
-    # The most words that mean something; among equals the line nearest to the numbers.
+    # The line with the most known words is chosen; among equal lines, the line nearest to the numbers.
     _, at, names = max(found, key=lambda item: (item[0], item[1]))
     return Header(names, units or (), at)
 
@@ -131,7 +132,7 @@ def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
 
 def _all_units(cells: Sequence[str]) -> bool:
     """Whether a line contains only units and empty cells, with at least one unit."""
-    # `t` is a name and a tonne, `s` a second: a word of a role is a name only beside others that are.
+    # `t` can be a name or a tonne, and `s` a second: such a word is a name only if the line contains other names.
     return any(cells) and all(is_unit(cell) for cell in cells) and sum(role_of(cell) is not None for cell in cells) == 0
 
 
@@ -147,7 +148,7 @@ def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
         if len(cells) != wide:
             continue
         if "=" in cells or all(is_value(cell, dialect.decimal) for cell in cells):
-            return None  # a key and its value, or numbers
+            return None  # the line holds a key and its value, or numbers
         return tuple(cells)
     return None
 

@@ -56,7 +56,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     DataError
         The lines contain no table, or too many lines do not fit its columns.
     OpenQuestionError
-        A mark may be a decimal comma or set thousands apart.
+        A mark in the numbers may be a decimal sign or a thousands separator.
     """
     dialect = find_dialect(lines, given.words.get("separator", ""), given.words.get("decimal", ""))
     if dialect is None:
@@ -192,7 +192,7 @@ class _Rows:
             prose = sum(_is_prose(text, self._dialect.decimal) for text in told)
             if prose > MOST_PROSE * len(told):
                 raise DataError(
-                    f"{self._path} is no table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
+                    f"{self._path} is not a table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
                     "words, and a table has rows of two numbers or more. Name the file that holds the table."
                 )
             raise DataError(

@@ -25,8 +25,8 @@ ORDERS = ("dmy", "mdy")
 DAY_NUMBERS = (36526.0, 58500.0)
 """Days since 1899-12-30 of the years 2000 to 2060: a date as a spreadsheet stores it."""
 DAY_STEP = 0.01
-"""Largest median step between such numbers, in days: a log has a row every quarter of an hour at least, and seconds
-that follow one another by less than this began long before."""
+"""Largest median step between day numbers, in days: a log has at least one row per quarter of an hour. Numbers with
+larger steps are taken as seconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +141,7 @@ def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
     numbers = [_ordinal(word, order) for word in words]
     if None in numbers:
         return None
-    # Counted from the first: a float holds the microseconds then.
+    # Times are counted from the first time, so that a float holds microseconds exactly enough.
     known = [number for number in numbers if number is not None]
     return np.array([number - known[0] for number in known] or [0], dtype=np.float64)
 

@@ -94,7 +94,7 @@ class Understood:
         Raises
         ------
         OpenQuestionError
-            Something is.
+            There is an open question.
         """
         if self.questions:
             raise OpenQuestionError(self.path, self.kind, self.questions)
@@ -116,7 +116,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     Raises
     ------
     DataError
-        What the user has decided does not fit the table.
+        A decision of the user in columns.toml does not fit the table.
     """
     refuse_long_table(raw)
     about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))
@@ -212,7 +212,7 @@ def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about
     if odd.size:
         at = int(odd[0])
         words = (
-            f"{odd.size} of {len(column)} cells of '{column.name}' are no numbers ('{column.content[at][:40]}' in "
+            f"{odd.size} of {len(column)} cells of '{column.name}' are not numbers ('{column.content[at][:40]}' in "
             f"{raw.place(at)})"
         )
         if odd.size > max(1.0, MOST_UNREAD * len(column)) and "unreadable_cells" not in given.accept:
@@ -242,7 +242,7 @@ def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findin
     if read.open_order:
         about.questions.append(Question(f"the order of day and month in '{read.since}' is ambiguous", "date_order=dmy"))
     if read.unread:
-        about.left_out.append(f"{read.unread} cells of '{column.name}' are no times")
+        about.left_out.append(f"{read.unread} cells of '{column.name}' are not times")
     about.notes += [*read.notes, f"The times in {column.name} are counted from {read.since}."]
     return read.numbers
 

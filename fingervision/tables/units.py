@@ -77,7 +77,7 @@ def factor(text: str, dimension: str) -> float | None:
     Raises
     ------
     InstallationError
-        The pint library is not there.
+        The library pint is not installed.
     """
     try:
         units = registry()

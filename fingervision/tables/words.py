@@ -76,7 +76,7 @@ def tokens(name: str) -> tuple[str, ...]:
 
 
 def _plain(name: str) -> str:
-    """Lower case without accents; `ł` and `ø` have no accent that could be taken off."""
+    """Lower case without accents; `ł` and `ø` are not letters with an accent, and are replaced separately."""
     apart = unicodedata.normalize("NFKD", name)
     letters = "".join(letter for letter in apart if not unicodedata.combining(letter)).lower()
     return letters.translate(WITHOUT_STROKE)
@@ -85,11 +85,11 @@ def _plain(name: str) -> str:
 WITHOUT_STROKE = str.maketrans("łøđ", "lod")
 BY_TOKEN = {_plain(word): role for role, words in ROLES.items() for word in words.split()}
 NUMBERED = re.compile(r"([^\W\d_]+)\d+")
-"""A word with a number behind it: `ch0`, `position1`, `ai1`."""
+"""A word that ends with a number: `ch0`, `position1`, `ai1`."""
 
 
 def _meaning(word: str) -> str:
-    """A word without the number of a channel behind it, if it is known so."""
+    """Remove the number of a channel from the end of a word, if the shorter word is known."""
     if word in BY_TOKEN or word in FILLERS:
         return word
     bare = NUMBERED.fullmatch(word)
@@ -134,7 +134,8 @@ def role_of(name: str) -> str | None:
         return None
     found = set(roles)
     if len(found) > 1:
-        # Words of a place: the left finger's position is not the input; what is about time or date is that.
+        # Priority of roles: the position of the left finger is not the input, and a name with a word for time or date
+        # is a time.
         for role in ("left", "right"):
             if role in found and found <= {role, "input", "gap"}:
                 return role
@@ -149,7 +150,7 @@ def role_of(name: str) -> str | None:
 
 
 def mentions(name: str) -> frozenset[str]:
-    """Roles of which a name has a word, whatever else stands in it.
+    """Roles of the words in a name, whatever other words the name contains.
 
     Examples
     --------

@@ -88,7 +88,7 @@ class _Guarded:
         except Exception as error:
             if not hasattr(type(self._device), name):
                 raise
-            _say(self._who, f"tell its {name}", error, self._origin)
+            _say(self._who, f"return its {name}", error, self._origin)
         if not callable(found) or isinstance(found, type):
             return found
 

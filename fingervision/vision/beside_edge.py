@@ -23,9 +23,9 @@ from fingervision.vision.profile_models import GLARE, ProfileFit
 
 Floats = NDArray[np.float64]
 
-# Edge and what stands beside it settle within so many looks.
+# Largest number of rounds in which edge and disturbance are fitted alternately.
 LOOKS = 5
-# The blur that a look finds is near the profile's own: never below this share of it.
+# Least blur found in a round, as a share of the blur of the profile.
 LEAST_BLUR_SHARE = 0.5
 
 _take_off = loop("beside_edge_without")

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from fingervision.domain.loops import loop
 from fingervision.vision.grey import GreyImage, full_scale
 
-# A picture of so many pixels is counted by pairs of neighbours, in half of the time; in a smaller one the table of all
-# pairs takes as long as it saves.
+# Number of pixels from which pixels are counted in pairs of neighbours, which takes half of the time; for smaller
+# pictures, the table of all pairs takes as long as it saves.
 LARGE_PX = 1_000_000
 
 _count = loop("binarise_histogram")

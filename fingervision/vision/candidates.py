@@ -16,18 +16,21 @@ from fingervision.vision.grey import GreyImage
 from fingervision.vision.part_removal import is_likelier, looks_parted, without_part
 from fingervision.vision.settings import Settings
 
-# Classes that differ by less, in units of the spread within, show nothing.
+# Least difference of the two classes, in units of the standard deviation within the classes.
 SEPARATION_FLOOR = 3.0
-# Classes that stand so far apart are not two halves of uneven light: another split would find the same things again.
+# Separation above which the two classes are not caused by uneven light, so that a second split would find the same
+# objects again.
 CLEAR_SEPARATION = 8.0
-# An edge at the limit of blur (5 px) makes half of its contrast within so many pixels to either side, shade does not.
+# Distance on either side of an edge (pixels) within which even an edge with the largest blur (5 px) changes by half of
+# its contrast, and the least change as a share of the contrast; gradual shading changes less.
 EDGE_REACH_PX, EDGE_SHARE = 3, 0.2
-# Light ground left and right of one dark thing looks like two light fingers that the border cuts off.
+# Light background on both sides of a single dark object looks like two light fingers at the picture's border.
 MAY_BE_GROUND = NoGap(
     Status.NO_FINGERS,
-    "Light on both sides of something dark reaches the picture's borders: state --fingers light if these are fingers.",
+    "Light areas on both sides of a dark object reach the picture's borders: state --fingers light if the light areas "
+    "are the fingers.",
 )
-# The outline is followed so far below the measuring height (pixels, or in units of that height).
+# Length of outline that is used below the measuring height (pixels, or in units of the measuring height).
 REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 
 
@@ -58,14 +61,12 @@ def candidates(
                 and fingers.are_cut
             ):
                 fingers = MAY_BE_GROUND
-            # The class that makes up the picture's border may be a sheet of paper.
+            # The class of the picture's border may be a sheet of printed paper.
             if light_gap is not dark_first and isinstance(fingers, CoarseFingers):
                 mask = split.dark if light_gap else split.light
                 fingers = LETTERS if has_company(mask, fingers, settings.below_tip_px) else fingers
             if isinstance(fingers, CoarseFingers) and not (fingers.is_rooted or fingers.is_joined):
-                unsure.append(
-                    (split, fingers, light_gap)
-                )  # something may come in from the border in the other polarity
+                unsure.append((split, fingers, light_gap))  # an object of the other polarity may extend from the border
             else:
                 yield split, fingers, light_gap
                 clear = (

@@ -17,19 +17,21 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.uint8]
 
-# A run of ground that is narrower is a scratch, and what bounds it must be as wide (pixels).
+# Least width (pixels) of a run of background, as narrower runs are scratches, and of the objects on both of its sides.
 LEAST_GROUND_PX, LEAST_BESIDE_PX = 3, 5
-# From row to row the sides of a channel move by no more than this (a slope of 25 degrees and a pixel of noise).
+# Largest displacement of a channel's sides from row to row: a slope of 25 degrees, and one pixel of noise.
 MOST_STEP_PX = 2
-# A channel has so many times the measuring height in rows, and at least so many.
+# Least number of rows of a channel, as a multiple of the measuring height (in pixels), and absolutely.
 LEAST_HEIGHTS, LEAST_ROWS = 1.5, 14
-# Its sides are straight: so much of the rows lie within so many pixels of a line; corners and fillets do not.
+# Least share of a channel's rows whose sides lie within this distance (pixels) of a straight line; corners and fillets
+# do not.
 ON_LINE_SHARE, ON_LINE_PX = 0.75, 1.2
-# A line through one channel passes through another one of the same fingers within this (pixels); sides lean no more.
+# Largest distance (pixels) of a second channel of the same fingers from the line through the first, and largest slope
+# of the sides.
 SAME_LINE_PX, STEEPEST = 2.5, 0.55
-# The longest of so many channels are looked at.
+# Largest number of channels that are examined, the longest first.
 MOST_CHANNELS = 6
-# A picture with more runs of ground than this is texture: what lies above them is not looked at.
+# Largest number of background runs that are examined; a picture with more runs shows texture.
 MOST_RUNS = 4096
 
 _line = loop("channels_line")

@@ -24,10 +24,10 @@ from fingervision.vision.straight_edge_fit import (
 Floats = NDArray[np.float64]
 
 ITERATIONS = 30
-# The outline is looked at in so many pieces (a square's eighths are all alike, its sixteenths are not); a scatter of
-# their own radii beyond the 99.9 % quantile of its chi-square widens the uncertainty.
+# Number of pieces into which the outline is divided (the eighths of a square are all equal, its sixteenths are not). A
+# scatter of the pieces' radii beyond the 99.9 % quantile of chi-square increases the uncertainty.
 PIECES, CHI_SQUARE_999 = 16, 39.25
-# Light may change over the disc as a plane inside and another outside: six linear parameters; and four that are sought.
+# Number of linear parameters (one plane of light inside the disc and one outside), and of all parameters.
 LINEAR, PARAMETERS = 6, 10
 
 
@@ -110,12 +110,12 @@ def fit_circle(
             xx, yy = columns.astype(np.float64) + origin_px[0], rows.astype(np.float64) + origin_px[1]
             seen = levels[rows, columns]
             if seen.size < 4 * PARAMETERS or p[2] < 1.5:
-                raise NoCircleFitError("too few pixels")
+                raise NoCircleFitError("the zone has too few pixels")
         if contrast is None:
             linear, _ = _columns(xx, yy, p)
             contrast = float(_least_squares(linear, seen)[0][3])
         if abs(contrast) < LEAST_CONTRAST:
-            raise NoCircleFitError("there is no contrast")
+            raise NoCircleFitError("the zone has no contrast")
         linear, moved = _columns(xx, yy, p)
         design = np.concatenate((linear, contrast * moved))
         found, inverse, scaled, scale = _least_squares(design, seen)

@@ -4,7 +4,7 @@ If an edge is parallel to the codec's blocks, all its rows share an error, which
 does not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture
 either. The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For
 an edge of contrast A the codec's transform coefficients change by about A per pixel of displacement, so that the
-displacement is a fixed fraction of `step / A`.
+displacement is a fixed fraction of the ratio of step to contrast.
 """
 
 from dataclasses import replace
@@ -23,19 +23,19 @@ from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
 
-# Standard uncertainty of one edge's place in units of step over contrast. Measured on drawn recordings, upright and
-# leaning, 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
+# Standard uncertainty of one edge's position in units of step / contrast, measured on rendered recordings of upright
+# and tilted fingers at 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
 DISPLACED = 0.42
-# The blocks this far across (standard deviations of the blur, and pixels more) and along the finger from the measuring
-# point carry the edge.
+# Extent of the blocks that affect an edge, from the measuring point: across the finger (a multiple of the blur plus
+# pixels), and along the finger.
 ACROSS_SIGMAS, ACROSS_PX, ALONG_PX = 3.0, 2.0, 40.0
-# Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
-# coded by itself is displaced by less than one that is copied from its neighbours.
+# If the stream does not state its quantiser: standard uncertainty in units of the displacement estimated from the rows'
+# mean residual. An independently coded picture is displaced by less than a picture predicted from others.
 SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 1.5}
-# The same for a picture that claims to be as the sensor saw it (saved again, enlarged, interpolated from colours): its
-# rows are looked at as well, and what they share is in every frame alike, as far as anybody knows.
+# The same factor for a picture that is stored without loss but may have been processed before (saved again, enlarged,
+# demosaiced); its error is assumed to be the same in every frame.
 EVEN_SHIFTS = 2.0
-# Quantisers are stated for 8 bits.
+# Full scale for which quantiser steps are stated: 8 bits.
 EIGHT_BITS = 255.0
 
 
@@ -125,7 +125,7 @@ def _stored_contrast(level: float, contrast: float, light: Floats, top_level: in
 def _by_slope(slope: float) -> float:
     """Displacement of the measuring point across the finger per displacement of an outline along its normal.
 
-    A leaning edge moves farther across the finger than along its own normal. The tip is displaced by its own codec
+    A tilted edge moves farther across the finger than along its normal. The tip is displaced by its own codec
     error as well, and shifts the measuring height along the edge.
     """
     return hypot(hypot(1.0, slope), slope)

@@ -8,14 +8,15 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# Midpoints of the integral over the corner's half angle: exact to 1e-4 sigma up to turns of 150 degrees.
+# Number of midpoints in the integral over the corner's half angle; the error is 1e-4 sigma for turns up to 150 degrees.
 MIDPOINTS = 48
-# Halvings of the interval that holds the half-level.
+# Number of halvings of the interval that contains the half-level.
 HALVINGS = 30
-# Turns that differ by less than this share one answer (radians): they differ by less than 1e-3 sigma.
+# Step of the turn (radians) for which results are stored; the error is below 1e-3 sigma.
 STEP = 0.005
-# What blur adds to the square of the half-level's depth falls off along the sides as exp(-c s^2), s in sigma: c by the
-# exact half-level of a right corner, Phi(a) Phi(s) = 1/2, between s = 0.5 and 2.
+# Coefficient c of the model exp(-c s^2) for the decrease of the blur's effect along the sides, where s is the distance
+# from the vertex in sigma. The value is fitted to the exact half-level of a right-angled corner, Phi(a) Phi(s) = 1/2
+# with the depth a, between s = 0.5 and 2.
 FALL = 0.4
 
 

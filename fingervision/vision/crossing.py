@@ -12,17 +12,18 @@ from fingervision.domain.loops import loop
 from fingervision.domain.status import Status
 from fingervision.vision.coarse_fingers import CoarseFinger, CoarseFingers
 
-# A piece of the finger is looked for up to so many pixels, or times the measuring height, beyond its tip.
+# Distance beyond the tip within which a continuation of the finger is searched (pixels, and as a multiple of the
+# measuring height).
 BEYOND_PX, BEYOND_HEIGHTS = 40, 8.0
-# It is there where so many rows are set in this share of the finger's breadth, and not set so many pixels to its sides.
+# Least number of rows of a continuation, in each of which this share of the finger's width is covered, and the pixels
+# at this distance from both sides are not.
 FEWEST_ROWS, FILLED_SHARE, SIDE_PX = 5, 0.9, 5
-# The finger's two sides are lines between these heights below the tip (in units of the measuring height).
+# Range of heights below the tip in which lines are fitted to the finger's two sides (in units of the measuring height).
 FROM_HEIGHTS, TO_HEIGHTS = 1.0, 4.0
 
 CROSSED = NoGap(
     Status.NO_FINGERS,
-    "An object lies across the fingers and hides their tips: remove the object, or restrict the region (--roi) to "
-    "exclude it.",
+    "An object lies across the fingers and hides their tips: remove the object, or give a region without it (--roi).",
 )
 
 _rows_beyond = loop("crossing_rows_beyond")

@@ -20,23 +20,26 @@ from fingervision.domain.loops import loop
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# Half-lengths of the window (pixels). A frame uses the first that holds three standard deviations and a little more.
+# Half-lengths of the window (pixels). The smallest one is used that contains three standard deviations of the blur plus
+# 2.5 pixels.
 REACHES_PX = (6, 8, 11, 15, 21, 28)
 REACH_SIGMAS, REACH_EXTRA_PX = 3.0, 2.5
 SMALLEST_SIGMA_PX = 0.15
-# Blur from one row of the table to the next. A blur that is wrong by half of this leaves the position where it is (an
-# edge is odd, its error even) and changes the contrast by less than a thousandth.
+# Ratio of the blurs of neighbouring rows of the table. A blur error of half a step does not affect the position,
+# because a step is antisymmetric and the effect of the blur error symmetric; the contrast changes by less than 0.1 %.
 SIGMA_RATIO = 1.03
-# Offsets lie an eighth of a pixel apart: what the linear step leaves over is below 1e-4 px.
+# Spacing of the offsets in the table, at which the error of the linear step is below 1e-4 px, and largest offset.
 OFFSET_STEP_PX, LARGEST_OFFSET_PX = 0.125, 2.5
-# A step goes no farther than the filters are nearly linear, and no edge is without contrast (grey levels).
+# Largest change of position and of blur in a step, within which the filters are nearly linear; least contrast of an
+# edge (grey levels).
 LARGEST_MOVE_PX, LARGEST_WIDENING_PX, LEAST_CONTRAST = 1.0, 0.3, 1e-3
-# Blur of an edge is looked for within these limits (pixels); `blurred` begins at 5.
+# Limits of the fitted blur (pixels); the status `blurred` begins at 5.
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
-# Variance of a pixel's own width, which a slanted edge feels along the line.
+# Variance of the position within a pixel (a uniform distribution of width 1), which adds to the squared blur.
 PIXEL_VARIANCE = 1.0 / 12.0
-# Optics as sharp as this leave nearly all light of an edge to one pixel, which tells the edge's place or the blur but
-# not both: sharp rectangles at all sub-pixel places are fitted with blurs from 0.2 to 0.42 px.
+# Least blur that can be resolved. With a smaller blur, nearly the whole step is within one pixel, which determines
+# either the position or the blur: sharp rectangles at all sub-pixel positions are fitted with blurs from 0.2 to 0.42
+# px.
 LEAST_RESOLVED_BLUR_PX = 0.45
 
 _row = loop("edge_filters_row")

@@ -1,7 +1,7 @@
 """Deviations of a finger's flank from a blurred step: a bright rim, or clipped levels.
 
 A rim or clipping moves the fitted edge by the same amount in every row, and leaves a pattern in the residuals of the
-fit. From the pattern it is estimated how far the edge may have moved, which is added to the uncertainty. The edge
+fit. The possible displacement of the edge is estimated from this pattern and added to the uncertainty. The edge
 itself is not corrected, because real optics cause similar patterns, and a correction derived from them would vary from
 frame to frame.
 """
@@ -15,25 +15,27 @@ from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
-# One row in so many is looked at, of the half that lies farther from the tip, where the edge is straightest; there must
-# be so many of them, each with most of the usual contrast.
+# Every second row is used, of the half of the flank farther from the tip, where the edge is straightest; least number
+# of rows, and least contrast of a row as a share of the usual contrast.
 THINNING, FEWEST_ROWS, LEAST_CONTRAST = 2, 6, 0.7
-# Widths of the rims that are looked for, on the ground and inside the finger (pixels).
+# Widths of the rims that are searched: positive on the background, negative inside the finger (pixels).
 RIM_PX = (1.5, 3.0, -2.0)
-# By how much of its contrast the flanks that are looked for lie beyond the end of the scale.
+# Clipped parts of a flank that are searched, as shares of its contrast.
 BEYOND = (0.1, 0.4)
-# What the fit takes up (level, contrast, position, blur), and with what is looked for.
+# Number of profiles that the fit absorbs (level, contrast, position, blur), index of the position, and number of all
+# profiles including the searched ones.
 FITTED, POSITION = 4, 2
 MARKS = FITTED + len(RIM_PX) + len(BEYOND)
-# A rim counts where it explains so many times the noise's variance, and makes this share of the contrast; what is cut
-# off is stated less so many standard uncertainties.
+# A rim is significant if it explains this multiple of the noise's variance and has this share of the contrast. The
+# clipped part is reduced by this number of standard uncertainties.
 SIGNIFICANT, LEAST_SHARE, SURE_SIGMAS = 30.0, 0.02, 1.5
-# A mark that the fit takes up but for this share of its power cannot be told from an edge.
+# Least share of a profile's power that the fit does not absorb; with less, the profile cannot be distinguished from an
+# edge.
 LEAST_OWN = 1e-3
-# What is left of a sharp flank far beyond the scale looks like a sharper flank. Where sigma (the pixel included) is
-# below this, nobody can tell the two apart: at twice the light the edge is moved by less than twice so much.
+# Blur (including the pixel's width) below which a clipped sharp flank cannot be distinguished from a sharper flank, and
+# the possible displacement in this case; even at twice the light, the edge is displaced by less than twice this value.
 HIDING_BLUR_PX, HIDDEN_SHIFT_PX = 0.65, 0.25
-# A row that fits worse than this (variance, in units of the noise's) has dust on it.
+# Variance of a row's residuals, in units of the noise's variance, above which the row shows dust.
 DUSTY = 6.0
 
 _edge_mark = loop("edge_profile_edge_mark")

@@ -11,14 +11,14 @@ from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
-# A step is at least so many standard errors of the profile's derivative, and of the profile's own scatter.
+# Least derivative of a step, in standard errors of the profile's derivative, and of the profile's own scatter.
 SIGNIFICANT = 6.0
-# A Gaussian edge of sigma 5 px, the widest that is measured, has a steepest pixel of 0.4 / 5 of its contrast: what is
-# less steep for its size is shade.
+# Least ratio of the steepest slope to the contrast; less is gradual shading. A Gaussian edge of sigma 5 px, the widest
+# edge that is measured, has the ratio 0.4 / 5 per pixel.
 LEAST_STEEPNESS = 0.05
-# Two maxima are two edges where the derivative between them falls below this share of the lower one.
+# Two maxima are two edges if the derivative between them falls below this share of the lower maximum.
 VALLEY_SHARE = 0.6
-# A lobe ends where the derivative has fallen to this share of its maximum.
+# Share of its maximum to which the derivative falls at the end of a step.
 LOBE_SHARE = 0.15
 NO_LIGHT: Floats = np.empty(0)
 
@@ -63,7 +63,8 @@ def _bins(direction_rad: float, slope: float, length_px: float, half: int) -> _B
     cosine, sine = np.cos(direction_rad), np.sin(direction_rad)
     s = -sine * x + cosine * y
     t = cosine * x + sine * y - slope * s
-    # Every pixel is shared by the two strips that it lies between: whole pixels would beat with the slanted strips.
+    # Every pixel is divided between the two nearest strips; whole pixels would cause beats between the pixel grid and
+    # the slanted strips.
     strip = np.floor(t).astype(np.intp) + half
     kept = (np.abs(s) <= 0.5 * length_px) & (strip >= 0) & (strip < 2 * half)
     rows, columns = np.nonzero(kept)
@@ -153,7 +154,7 @@ def candidates(found: Profile) -> list[StepCandidate]:
     level = found.level
     if level.size < 5:
         return []
-    # Of this difference of strips under independent noise: weights 1/4, 1/4, -1/4, -1/4.
+    # Standard error of the difference of strips with the weights 1/4, 1/4, -1/4, -1/4 under independent noise.
     floor = SIGNIFICANT * 0.5 * sqrt((found.variance + 1.0 / 12.0) / max(found.strip_px, 1.0))
     place, contrast = np.empty(level.size), np.empty(level.size)
     _, count = _steps(level, found.weight, floor, place, contrast)

@@ -33,16 +33,16 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 Number = TypeVar("Number", np.float64, np.bool_)
 
-# Passes of Gauss-Newton that also refine the blur; it converges quadratically from the first look. Where a pass still
-# moved a blur by more than so much it was held back by its largest step (tips that stay sharp beside flanks that motion
-# spreads): then more follow. A last pass leaves the blur as it is.
+# Number of Gauss-Newton passes that also refine the blur, which converge quadratically; number of further passes if the
+# last one changed a blur by more than this (pixels). A blur may change slowly because its step is limited, for instance
+# that of sharp tips beside flanks that are blurred by motion. A final pass leaves the blur unchanged.
 BLUR_PASSES, MORE_PASSES, SETTLED_PX = 2, 8, 0.2
-# Blur across and along are told apart where the lines' variances differ by this share, more than noise makes of them,
-# and where, on average, lines see less than so much of the other axis in all.
+# Blurs across and along the fingers are separated if the squared blurs of the lines differ by this share, more than
+# noise explains, and if the lines' average share of the other axis is below this limit.
 UNLIKE, MOST_OF_OTHER = 0.15, 0.7
-# Lines of each finger's flanks and of its tip share their blur: the number of that blur, for every line.
+# Index of the blur of every line: the lines of a finger's flanks have one blur, those of its tip another.
 BLUR_OF_LINE = np.concatenate((np.where(IS_ROW, 0, 1), np.where(IS_ROW, 2, 3)))
-# Variance of rounding to whole grey levels: no noise is smaller.
+# Variance of rounding to whole grey levels, the least noise.
 ROUNDING = 1.0 / 12.0
 
 _inside = loop("edges_inside")
@@ -115,7 +115,7 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     light : ndarray of float, shape (levels,)
         Light for every grey level (look-up table), on the same scale as the levels.
     top_level : int
-        Highest level of the scale; its light is where the picture is cut off.
+        Highest level of the scale, at whose light the picture is clipped.
 
     Returns
     -------
@@ -125,7 +125,8 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     blur = first_blur(upright, lines, light)
     filters = edge_filters(reach_for(blur))
     position = first_position(line_levels(upright, lines, light, filters.reach_px))
-    # Where the coarse outline lies a pixel off, the window follows the edge: what finds must not sway what measures.
+    # If the coarse outline is off by a pixel, the window is moved to the edge, so that the coarse outline does not
+    # affect the result.
     coarse = lines.coarse + lines.outward * np.floor(position).astype(np.intp)
     lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
     levels = line_levels(upright, lines, light, filters.reach_px)

@@ -8,7 +8,7 @@ from fingervision.vision.edge_filters import blurred_step
 from fingervision.vision.profile_lines import INNER, ProfileLines
 
 Floats = NDArray[np.float64]
-# Places of the left and of the right finger's inner lines that lie in the same rows.
+# Indices of the left and of the right finger's inner lines in the same rows.
 Facing = tuple[NDArray[np.int_], NDArray[np.int_]]
 
 _are_apart = loop("facing_are_apart")

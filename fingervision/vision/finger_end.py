@@ -23,19 +23,19 @@ Flags = NDArray[np.bool_]
 
 # Tukey's biweight at 95 % efficiency (Holland & Welsch, Commun. Stat. A6, 1977), and the robust standard deviation.
 BIWEIGHT_REACH, SIGMAS_IN_MEDIAN = 4.685, 1.4826
-# How often the outline is looked at anew, and how many times the biweight's own reach a residual may have in the one or
-# two steps of each look: the first forgive what the first guess got wrong, only the last tell dust from shape.
+# Rounds of the fit, each with one or two steps: factor on the reach of the biweight in each step (0: no step). The
+# first rounds tolerate errors of the initial estimate; only the last rounds reject dust.
 LOOKS = ((100.0, 0.0), (10.0, 10.0), (1.5, 1.0), (1.0, 1.0))
-# A shape whose residuals spread over more than so many sigma is no shape.
+# Largest spread of the residuals, in units of the points' uncertainties.
 WORST_MISFIT = 1e3
-# Other starts are tried where so many points are set aside, and taken where the weights add up to so much more, at no
-# more than so many times the misfit.
+# Other starting values are tried if this number of points is rejected; the new fit is used if the sum of its weights is
+# larger by this factor, and its misfit at most this multiple.
 FEWEST_ASIDE, LEAST_GAIN, MORE_MISFIT = 3, 1.5, 1.3
-# Radii that such a fit begins at as well (shares of the finger's breadth).
+# Further starting radii (shares of the finger's width).
 OTHER_RADII = (0.1, 0.2, 0.35)
-# With more misfit than this the outline is of another shape, whatever the radii.
+# Misfit above which the outline has another shape for any radii.
 NO_SHAPE = 4.0
-# Rounding leaves no less of a pivot than this.
+# Least relative pivot of the linear solution; a smaller pivot is rounding.
 SMALLEST_PIVOT = 1e-15
 
 _fit = loop("finger_end_fit")

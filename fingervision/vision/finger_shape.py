@@ -11,15 +11,16 @@ Flags = NDArray[np.bool_]
 # Order of the parameters. A line is across = c + m (along - y0), or along = c + m (across - x0) for the top.
 INNER_C, OUTER_C, INNER_M, OUTER_M, INNER_R, OUTER_R, TOP_C, TOP_M = range(8)
 PARAMETERS = 8
-# Fillets below so many sigma are sharp corners in the picture, which say nothing within so many sigma.
+# Radius (in sigma) below which a fillet looks like a sharp corner, and distance from this corner (in sigma) within
+# which points carry no information.
 SHARP_IN_BLURS, SHARP_REACH = 1.5, 2.0
-# Beyond so many sigma of a fillet's end nothing of its curvature is felt.
+# Distance beyond the end of a fillet (in sigma) from which its curvature has no effect.
 FELT_SIGMAS = 6.0
-# From so many sigma inside a fillet on all of it is felt, to the last digit.
+# Distance inside the end of a fillet (in sigma) from which its curvature has its full effect.
 WHOLLY_FELT_SIGMAS = 9.0
-# A line that runs along an edge still sees it at this slant.
+# Least cosine between a line of pixels and the edge's normal that is used.
 LEAST_SLANT = 0.3
-# A top that is flatter than this crosses no height.
+# Least slope of a top whose crossing with a height is computed.
 LEAST_STEEPNESS = 1e-3
 
 _compared = loop("finger_shape_compared")

@@ -25,33 +25,35 @@ from fingervision.vision.way_between import Place, inner_crossing, is_free
 
 __all__ = ["MORE_THAN_TWO", "UNLIKE", "CoarseFinger", "CoarseFingers", "find_fingers", "is_hidden"]
 
-# Two tops with a notch between them are touching fingers where the notch has so much of the measuring height, and the
-# fingers so many times of it.
+# Two local maxima are the tips of touching fingers if the notch between them is this share of the measuring height
+# deep, and the fingers are this multiple of it long.
 SMALLEST_NOTCH_SHARE, LEAST_LENGTH_SHARE = 0.3, 4.0
-# Fingers come in from the picture's border; things that lie in view are less likely to be fingers.
+# Factor on the score of objects that extend from the picture's border, as fingers usually do.
 ROOTED_BONUS = 2.0
-# Things that lie in view and are shorter than so many times the measuring height are letters or dirt.
+# Least length of an object that lies completely in view, as a multiple of the measuring height; shorter objects are
+# letters or dirt.
 LYING_HEIGHTS = 6.0
-# Of things that lie in view only those that are so many times as long as wide may be fingers: coins are not.
+# Least ratio of length to width of an object that lies completely in view, which excludes coins.
 LYING_SLENDER = 1.5
-# Fingers are longer than their gap is wide, or a little shorter: two things that lie in view and are farther apart than
-# so many times the length of the shorter one are two things.
+# Largest distance of two objects that lie completely in view, as a multiple of the length of the shorter object; the
+# gap of real fingers is smaller.
 LYING_APART = 2.0
-# A gripper that lies in view is the only thing of its size: no third outline has this share of its length.
+# Share of the fingers' outline length above which a third outline excludes that two objects in view are fingers.
 COMPANY_SHARE = 0.4
-# A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
+# Length, as a multiple of the measuring height, above which an object that extends from the border is a finger; objects
+# that lie completely in view are then no fingers.
 ROOTED_HEIGHTS = 2.0
-# What stands beside the two, has so much of their height and leans by no more than this may be meant as well as they.
+# Share of the fingers' height, and largest inclination, at which a third object beside the two may be a finger as well.
 THIRD_SHARE, THIRD_STEEPEST = 0.5, 1.0
 
 MORE_THAN_TWO = NoGap(
     Status.NO_FINGERS,
-    "More than two objects in the picture look like fingers: give the region (--roi) that contains the two fingers.",
+    "More than two objects in the picture look like fingers: give the region of the two fingers (--roi).",
 )
 UNLIKE = NoGap(
     Status.ONE_FINGER,
-    "Of two objects side by side, one is far wider than the other: give the region (--roi) that contains the two "
-    "fingers.",
+    "The two objects in the picture differ too much in width to be fingers of one gripper: give the region of the two "
+    "fingers (--roi).",
 )
 
 
@@ -79,11 +81,11 @@ def find_fingers(
     outlines = find_outlines(mask)
     best: CoarseFingers | None = None
     alone: NoGap | None = None
-    worst_reason = NoGap(Status.NO_FINGERS, "Nothing in the picture looks like a finger.")
+    worst_reason = NoGap(Status.NO_FINGERS, "No object in the picture looks like a finger.")
     is_unlike = False
     for direction, longest_px in longest_first(outlines, directions):
         if best is not None and best.is_rooted and ROOTED_BONUS * longest_px <= best.score:
-            break  # nothing goes on for so long that it could be a better pair
+            break  # no object is long enough for a better pair
         orientation = Orientation(direction, *mask.shape)
         found = _best_pair(mask, outlines, orientation, below_tip_px, reach_px)
         if isinstance(found, NoGap):
@@ -101,7 +103,7 @@ def find_fingers(
     return best or (UNLIKE if is_unlike else worst_reason)
 
 
-# Which reason says most, where several directions were tried.
+# Order of the reasons by their relevance, if several directions were tried.
 _SEVERITY = (Status.NO_FINGERS, Status.ONE_FINGER, Status.TIP_OUT_OF_VIEW, Status.TOUCHING)
 
 
@@ -126,7 +128,7 @@ def _best_pair(
         if best is not None and score <= best.score:
             continue
         if left.is_rooted != right.is_rooted and left.outline is not right.outline:
-            continue  # one comes in from the border and one lies in view: a finger and a thing
+            continue  # one object extends from the border, the other lies in view: a finger and another object
         if not is_rooted and prominence < LYING_HEIGHTS * below_tip_px:
             continue
         if not is_rooted and _has_company(left.outline, outlines):
@@ -140,7 +142,7 @@ def _best_pair(
             continue
         pair = (_follow(left, 1, below_tip_px, reach_px), _follow(right, -1, below_tip_px, reach_px))
         if pair[0] is None or pair[1] is None or pair[0].outline[0, 0] > pair[1].outline[0, 0]:
-            continue  # the inner sides, in this order
+            continue  # inner sides of the left and of the right finger
         builds = (build(left, 1, orientation.across_size), build(right, -1, orientation.across_size))
         if not are_alike(*builds):
             unlike = unlike or (is_rooted and all(has_straight_flanks(top, below_tip_px) for top in (left, right)))
@@ -241,7 +243,7 @@ def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
     alone = [top for top in tops if top.along_px > 0]
     if len(standing) == 1 or (len(alone) == 1 and has_straight_flanks(alone[0], below_tip_px)):
         return NoGap(Status.ONE_FINGER, "Only one finger is in view.")
-    return NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
+    return NoGap(Status.NO_FINGERS, "No two objects in the picture look like two fingers.")
 
 
 def _end_alike(first: Top, second: Top, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
@@ -264,7 +266,7 @@ def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> 
     if inner_sign * (piece[0, 0] - piece[-1, 0]) < 0:
         piece = piece[::-1]
     if min(piece[0, 1], piece[-1, 1]) < top.along_px + below_tip_px:
-        return None  # what begins here is not a finger, but a speck on one
+        return None  # the object that begins here is a speck on a finger
     return CoarseFinger(np.ascontiguousarray(piece), inner_sign, top)
 
 

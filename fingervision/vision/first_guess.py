@@ -11,21 +11,23 @@ from fingervision.vision.outline_points import OutlinePoints
 
 Floats = NDArray[np.float64]
 
-# A line needs so many points.
+# Least number of points of a line.
 FEWEST_POINTS = 4
-# Flanks that differ more in slope are not both flanks; one that is not in view is parallel to the other within this.
+# Largest difference in slope of two flanks; standard uncertainty with which an invisible flank is assumed to be
+# parallel to the visible flank.
 MOST_TAPER, TAPER_PRIOR = 0.15, 0.03
-# Where only one corner is in view, its sides are square to each other within this.
+# Standard uncertainty (slope) with which the sides of a single visible corner are assumed to be perpendicular.
 SQUARE_PRIOR = 0.01
-# A side's slope is not far from what its points say at first sight.
+# Standard uncertainty of the prior of a side's slope about its initial estimate.
 SLOPE_PRIOR = 0.3
-# A flank that no point speaks of lies so far beyond the outermost column, give or take a pixel.
+# Assumed distance (pixels) of an invisible flank beyond the outermost column, with a standard uncertainty of one pixel.
 BEYOND_BORDER_PX = 3.0
-# A fillet that is blurred into its corner has its radius from the corner alone, to so many sigma.
+# Standard uncertainty (in sigma) of the radius of a fillet that is too small to be resolved.
 SHARP_PRIOR_IN_BLURS = 1.0
-# A sharp corner's half-level stays away by so many sigma; points that lie so far inside both sides are on a fillet.
+# Distance of a sharp corner's half-level from the vertex (in sigma); distance (pixels) inside both sides at which
+# points belong to a fillet.
 SHARP_CORNER, INSIDE_CORNER_PX = 0.7706, 0.5
-# Distance of a fillet of radius one from its corner.
+# Distance of a fillet of radius 1 from the vertex of a right-angled corner.
 CORNER_RETREAT = 2.0**0.5 - 1.0
 
 _guess = loop("first_guess_guess")

@@ -7,15 +7,17 @@ from fingervision.vision.mean_profile import MeanProfile
 from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 
 Floats = NDArray[np.float64]
-# A mean profile, the inverse of the variance of one of its pixels, and the blur of its single step (pixels).
+# Mean profile, inverse variance of one pixel, and blur of the single step (pixels).
 Flank = tuple[MeanProfile, float, float]
 
-# A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
-# step does with half of that, or with so many times what the best model leaves.
+# A model explains a profile if the mean squared residual is below this multiple of the noise's variance, or below this
+# fraction of the step's; a step explains it with half of this limit, or with this multiple of the best model's
+# residual.
 MODEL_LEAVES, MODEL_TIMES, STEP_TIMES = 4.0, 10.0, 3.0
-# A model that leaves so many times what one may leave is none, however long it is fitted.
+# Multiple of the permitted residual above which a fit is stopped.
 HOPELESS_TIMES = 2.0
-# What a step takes for blur is partly what stands beside it: the search begins at this share of it as well.
+# Share of the step's blur from which the search also starts, because a structure beside the edge increases the blur of
+# a fitted step.
 OWN_BLUR = 0.55
 RIVALS = (WALL, SHADOW, GLARE)
 
@@ -39,7 +41,7 @@ class FlankFits:
         self.enough = max(MODEL_LEAVES * self.bins, step / MODEL_TIMES)
         """Weighted sum of squared residuals, of both flanks, below which a model explains the profiles."""
         self._too_many = HOPELESS_TIMES * self.enough
-        # A step explains both, whatever the others would: only how wide it is is still to be asked.
+        # If a step explains both flanks, no other model is needed; only the blur remains to be checked.
         self._is_explained = step < 0.5 * MODEL_LEAVES * self.bins
 
     def of(self, kind: int) -> list[ProfileFit]:

@@ -7,14 +7,16 @@ from fingervision.domain.loops import loop
 from fingervision.vision.outlines import Outline
 from fingervision.vision.tops import Top
 
-# An outline that comes back up by more than this has passed the bottom of a notch; dust on a finger makes smaller ones.
+# Rise of an outline (pixels) above which it has passed the bottom of a notch; dust on a finger causes a smaller rise.
 TURNED_PX = 5
-# A finger's flank is straight over so many times the measuring height and so much of its length.
+# Least straight length of a finger's flank, as a multiple of the measuring height and as a share of the finger's
+# length.
 LEAST_HEIGHTS, LEAST_SHARE = 3.0, 0.25
-# A straight flank leans by no more than this (10 degrees of tilt and a taper), has so many of its rows within so many
-# pixels of a line, and its middle third off that line by no more than so much: binary outlines are good to this.
+# Limits of a straight flank: inclination (10 degrees of tilt and a taper); share of rows that may be farther than this
+# distance (pixels) from a line; distance of the middle third from the line, relative to the accuracy of binary
+# outlines.
 STEEPEST, MOST_OFF, OFF_PX, BOW_PX = 0.3, 0.25, 1.5, 0.25
-# A stretch is looked at in so many rows, and the next one begins so much of its length below.
+# Number of rows in each third of a stretch, and number of stretches.
 ROWS_IN_A_THIRD, STRETCHES = 16, 8
 
 _follow_down = loop("flanks_follow_down")

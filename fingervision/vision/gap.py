@@ -39,36 +39,38 @@ from fingervision.vision.third_tone import THIRD_TONE
 
 Floats = NDArray[np.float64]
 
-# Above this blur (sigma_e, pixels) an edge is no longer an edge.
+# Largest blur of an edge (sigma_e, pixels).
 BLUR_LIMIT_PX = 5.0
-# A line and its scatter need so many points.
+# Least number of points for a line and its scatter.
 FEWEST_ROWS = 4
-# A finger's end has eight parameters: it needs this many lines across its outline.
+# Least number of lines across a finger's outline, twice the number of the shape's parameters.
 FEWEST_LINES = 2 * PARAMETERS
-# A flank of which more than this share lies beyond the end of the scale is cut off.
+# Largest share of a flank that may lie beyond the end of the scale.
 CUT_OFF_LIMIT = 0.08
-# A tip has at least this share of the flanks' contrast.
+# Least contrast of a tip as a share of the flanks' contrast.
 TIP_CONTRAST = 0.2
-# Pixels that are counted in the binary picture are off by at most half a pixel an edge: a gap that is less sure than
-# this (pixels) is no measurement, but of what is no finger, or was not seen. A codec that shares errors over so many
-# points makes it less sure by the root of their number.
+# Largest standard uncertainty of a gap (pixels): counting pixels in the binary picture would be as accurate. For a
+# codec with errors common to several points, the limit is multiplied by the root of their number.
 LEAST_SURE_PX = 0.5
-# Rough flanks are measured again over a longer stretch before that is asked of them; until then so much will do.
+# Largest standard uncertainty of a gap (pixels) between rough flanks, before they are measured again over a longer
+# stretch.
 LEAST_SURE_AT_FIRST_PX = 5.0
-# What may have moved both edges is stated up to here (pixels): more is a strip as broad as the window that was fitted.
+# Largest possible displacement of the edges by structures beside them (pixels); a larger displacement means a strip as
+# wide as the window.
 LEAST_SURE_SHIFT_PX = 5.0
-BROKEN = "The outline near the measuring height is neither smooth nor straight"
-# A lossy codec leaves steps of its blocks on an outline, which look like dirt.
+BROKEN = "The outline of a finger near the measuring height is neither smooth nor straight"
+# A lossy codec causes steps at its blocks' borders, which look like dirt on an outline.
 BROKEN_BY = {
     Coding.LOSSLESS: f"{BROKEN}: clean the fingers, or change the light.",
     Coding.INTRAFRAME: f"{BROKEN}: clean the fingers, change the light, or record losslessly.",
 }
 BROKEN_BY[Coding.INTERFRAME] = BROKEN_BY[Coding.INTRAFRAME]
-TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to locate a finger's tip and edge.")
+TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to determine the tip and the edge of a finger.")
 SMEARED = "The fingers moved while the shutter was open"
-# Motion by so many pixels (a box as broad has the variance of its square over 12) smears a rounded tip beyond use.
+# Motion during the exposure (pixels) above which a rounded tip cannot be measured; a motion w adds w^2 / 12 to the
+# squared blur.
 SMEARED_PX = 4.0
-# Below this ratio of contrast to noise nothing is measured.
+# Least ratio of contrast to noise.
 CONTRAST_TO_NOISE = 3.0
 
 _lines_within = loop("gap_lines_within")
@@ -97,8 +99,8 @@ def measure_gap(
     Returns
     -------
     GapMeasurement or NoGap
-        The measured gap, or the reason why there is none. Its `roughness_px` is NaN where the flanks are too short to
-        tell whether they are rough.
+        The measured gap, or the reason why there is none. Its `roughness_px` is NaN if the flanks are too short to
+        determine their roughness.
     """
     refusal = _refuse(edges, full_scale, light_gap)
     if refusal is not None:
@@ -106,7 +108,7 @@ def measure_gap(
     points = outline_points(fingers, edges)
     behind = _gripping(fingers, below_tip_px)
     if min(len(p.x) for p in points) < FEWEST_LINES:
-        return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
+        return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view for a measurement.")
     guesses = [first_guess(p, below_tip_px) for p in points]
     fits = [fit_from_any_radius(p, *guess) for p, guess in zip(points, guesses, strict=True)]
     noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
@@ -115,7 +117,7 @@ def measure_gap(
     rough = None if is_untold else rough
     chains: list[MeasuringPoint] = []
     if rough is not None:
-        # Corners that the three-sided shape does not know leave as much as roughness does.
+        # Corners that are not part of the three-sided shape cause residuals like those of roughness.
         chains = _polygonal(points, below_tip_px, noise_shared)
         rough = None if chains else rough
     if rough is not None:
@@ -149,14 +151,15 @@ def measure_gap(
     ]
     if not chains and (not all(holds) or any(aside)):
         chains = _polygonal(points, below_tip_px, noise_shared)
-    if chains and all(holds):  # what knows its points better
+    if chains and all(holds):  # the shape with the smaller uncertainty is used
         variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]
         chains = chains if sum(own.covariance[1, 1] for own in chains) < sum(variances) else []
     measured = list(chains)
     if not measured:
         for p, end, found, does_hold, beyond in zip(points, (left, right), fitted, holds, aside, strict=True):
             own = None if all(holds) else local_measuring_point(p, below_tip_px, noise_shared)
-            # Where there is no other outline, what errors that neighbours share can leave does not reject the shape.
+            # If there is no other description of the outline, residuals that common errors of neighbouring points may
+            # cause do not reject the shape.
             if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, noise_shared)):
                 if found.apex < p.x.min() - 1.0:
                     return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
@@ -169,16 +172,18 @@ def measure_gap(
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
     largest_variance = least_px**2 * SHARED_POINTS[coding]
-    roughness_px = nan if is_untold and not chains else 0.0  # straight sides that fit need no roughness
+    roughness_px = nan if is_untold and not chains else 0.0  # fitting straight sides have no roughness
     roughness_px = roughness_px if rough is None else rough.deviation_px
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
     if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
-        words = f"{SMEARED}, by about {way_px:.0f} px: expose shorter, or move slower while frames are taken."
+        words = (
+            f"{SMEARED}, by about {way_px:.0f} px: shorten the exposure, or move more slowly while frames are taken."
+        )
         outcome = NoGap(Status.BLURRED, words)
     elif outcome is TOO_ROUGH and max(abs(m.slope) for m in measured) > FLATTEST:
         outcome = NoGap(
             Status.NO_FINGERS,
-            "The measuring height crosses the end face of a finger and not its inner edge: turn the camera until the "
+            "The measuring height crosses the top of a finger instead of its inner side: rotate the camera until the "
             "tips are level, or measure farther below the tips (--below-tip-mm).",
         )
     if has_part and outcome is TOO_ROUGH:
@@ -217,22 +222,24 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     seen = (edges.lines.weight, edges.contrast, edges.is_clipped)
     left, right, contrast, clipped = _lines_within(*seen, 0, INNER)
     left_tip, right_tip, tip_contrast, tip_clipped = _lines_within(*seen, ROWS, PLACES)
-    if left + right < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
+    if left + right < FEWEST_ROWS:  # on a slanted or touching tip, the side towards the gap is measured in columns
         left, right, contrast, clipped = left_tip, right_tip, tip_contrast, tip_clipped
     if left + right < FEWEST_ROWS:
-        return NoGap(Status.NO_FINGERS, "The inner edges are too short to be measured.")
+        return NoGap(Status.NO_FINGERS, "The visible inner edges of the fingers are too short to be measured.")
     if min(left, right) == 0 and max(left, right) >= FEWEST_ROWS:
-        return NoGap(Status.NO_FINGERS, "Only one of the two inner edges can be seen.")
+        return NoGap(Status.NO_FINGERS, "Only one of the fingers' two inner edges is visible.")
     contrast *= 1.0 if light_gap else -1.0
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
-        return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from the background.")
+        return NoGap(Status.LOW_CONTRAST, "The contrast between fingers and background is too low.")
     if left_tip + right_tip and abs(tip_contrast) < TIP_CONTRAST * abs(contrast):
-        return NoGap(Status.NO_FINGERS, "The objects in view have no sharp end where a finger has its tip.")
+        return NoGap(Status.NO_FINGERS, "The objects in view have no sharp end where the tip of a finger would be.")
     if 2 * clipped > left + right or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT:
-        return NoGap(Status.SATURATED, "The flanks of the edges are clipped at the end of the grey scale.")
+        return NoGap(Status.SATURATED, "The flank of the edges is clipped at the end of the grey scale.")
     blur = sqrt(max(edges.blur_px[:, 0].tolist()) ** 2 + PIXEL_VARIANCE)
     if blur > BLUR_LIMIT_PX:
-        return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
+        return NoGap(
+            Status.BLURRED, f"The blur of the edges is {blur:.1f} px (standard deviation), which is too large."
+        )
     return None
 
 
@@ -260,14 +267,14 @@ def _no_fingers(
     if abs(turn) > FARTHEST_TURNED and any(are_fingers):
         return NoGap(
             Status.NO_FINGERS,
-            f"The fingers are turned by {degrees(atan(abs(turn))):.0f} degrees in the picture, but only fingers "
-            f"turned by at most 25 degrees can be measured: turn the camera.",
+            f"The fingers are rotated by {degrees(atan(abs(turn))):.0f} degrees in the picture, but at most 25 "
+            "degrees are permitted: rotate the camera.",
         )
     if all(are_fingers):
         return None
     if any(are_fingers):
-        return NoGap(Status.ONE_FINGER, "Only one of the two objects in view has the straight flanks of a finger.")
-    return NoGap(Status.NO_FINGERS, "The objects in view have no straight flanks and are therefore not fingers.")
+        return NoGap(Status.ONE_FINGER, "Only one of two objects in view has the straight flanks of a finger.")
+    return NoGap(Status.NO_FINGERS, "The objects in view do not have the straight flanks of fingers.")
 
 
 def _assemble(
@@ -295,13 +302,14 @@ def _assemble(
     gap = hypot(dx, dy)
     variance = 0.0
     for m, end in zip(measured, (-1.0, 1.0), strict=True):
-        # Either edge closes the gap as it grows, each seen from its own finger; the tips move the points' heights.
+        # In its finger's axes, each edge reduces the gap as its position increases; a tip changes the height of its
+        # measuring point.
         by_tip, by_edge = end * dy / gap, -dx / gap
         (tip_tip, tip_edge), (_, edge_edge) = m.covariance.tolist()
         variance += by_tip**2 * tip_tip + 2.0 * by_tip * by_edge * tip_edge + by_edge**2 * edge_edge
     if not variance < largest_variance:
         return TOO_ROUGH
-    # A rim or too much light does the same to both edges.
+    # A rim or clipping displaces both edges in the same way, so that the displacements are added.
     u_shift = float(abs(sum(mark.shift_px for mark in edges.marks)))
     if u_shift > LEAST_SURE_SHIFT_PX:
         return THIRD_TONE

@@ -14,14 +14,14 @@ from fingervision.domain.status import Status
 from fingervision.vision.coarse_fingers import CoarseFingers
 from fingervision.vision.way_between import inner_crossing
 
-# Other objects are of one size with that in the gap where they are no shorter and no longer than by this factor. A
-# mechanism that encloses its gap has a few windows of this size; a text has more letters.
+# Largest ratio of lengths of objects of the same size, and least number of such objects that indicates a text; a
+# mechanism around its gap has only a few openings of this size.
 SAME_SIZE, FEWEST_OTHERS = 2.5, 5
 
 LETTERS = NoGap(
     Status.NO_FINGERS,
-    "The picture contains several similar objects at similar distances, as in a printed text: give the region (--roi) "
-    "that contains the two fingers.",
+    "The object between the two supposed fingers is one of several objects of the same size, as in a text: give the "
+    "region of the two fingers (--roi).",
 )
 
 

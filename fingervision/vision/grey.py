@@ -8,7 +8,7 @@ from fingervision.domain.frame import Pixels
 
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Depths of sensors whose levels are stored in 16 bits.
+# Bit depths of sensors whose levels are stored in 16 bits.
 SENSOR_BITS = (10, 12, 14, 16)
 
 

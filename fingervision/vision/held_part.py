@@ -9,11 +9,11 @@ from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.outline_points import finger_origin
 from fingervision.vision.profile_lines import INNER, ROWS, ProfileLines
 
-# A part that stands beside a tip spoils the columns within so many pixels of the inner edge.
+# Distance from the inner edge (pixels) within which a part beside a tip affects columns.
 BESIDE_TIP_PX = 5
-# A width that is less sure is not given (pixels).
+# Largest standard uncertainty of a stated width (pixels).
 LEAST_SURE_PX = 2.0
-# The middle of the part along the fingers (standard uncertainty, pixels).
+# Standard uncertainty of the part's position along the fingers (pixels).
 U_ALONG_PX = 1.0
 
 
@@ -77,7 +77,7 @@ def held_part(
         across.append(across0 + finger.inner_sign * edge)
         variance += edge_variance * factor
         opening += float(end.parameters[INNER_M])
-    # Where between the fingers it is held is known to a pixel.
+    # The position along the fingers at which the part is held has an uncertainty of one pixel.
     variance += U_ALONG_PX**2 * opening**2
     width = across[1] - across[0]
     if width <= 0.0 or not variance < LEAST_SURE_PX**2:

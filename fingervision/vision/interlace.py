@@ -19,13 +19,15 @@ from fingervision.vision.profile_lines import ROWS
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# Fields differ where their difference is so many times its uncertainty, and at least this (pixels).
+# Least significant displacement between the fields, as a multiple of its uncertainty, and absolutely (pixels).
 SURE, LEAST_PX = 5.0, 0.05
-# Rows that are compared: at least so many, each with a row of the other field within so many pixels to either side.
+# Least number of compared rows, and largest distance of the rows of the other field on either side (pixels).
 FEWEST_ROWS, NEAR_PX = 8, 4
-# Robust standard deviation; rows farther than so many of them are dust. Their scatter is shared by neighbours in part.
+# Factor from median deviation to standard deviation, number of standard deviations beyond which a row is dust, and
+# factor for the correlation of neighbouring rows.
 SIGMAS_IN_MEDIAN, DUST, SHARED = 1.4826, 4.0, 1.2
-# Where the tip is round, the two fields' mean lies beside the middle by up to half their variance over the radius.
+# Radius of a round tip: the mean of both fields deviates from the mean time's outline by up to half the variance of the
+# displacement divided by this radius.
 TIP_RADIUS_PX = 15.0
 
 _apart = loop("interlace_apart")

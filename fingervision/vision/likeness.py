@@ -16,20 +16,23 @@ from fingervision.vision.tops import Top
 
 Floats = NDArray[np.float64]
 
-# Fingers of one gripper are at most so many times as wide as each other (printed jaws and their counterparts); one that
-# the picture's border cuts off may be wider than is seen, but what is seen is not much wider than the other.
+# Largest ratio of the widths of two fingers of one gripper (printed jaws and their counterparts). A finger at the
+# picture's border may be wider than its visible part, so that only a larger visible part is limited, by the second
+# ratio.
 MOST_TIMES_WIDER, MOST_TIMES_CUT = 2.5, 1.2
-# The tips of one gripper differ in height by no more than so many times the measuring height, seen by a camera that is
-# turned by no more than this (slope; 14 degrees).
+# Largest difference in height of the two tips, as a multiple of the measuring height, and largest rotation of the
+# camera (slope; 14 degrees).
 STEP_HEIGHTS, MOST_TURNED = 4.0, 0.25
-# Where the border cuts off one of the two alone, their heights are all that shows them to belong together.
+# The same multiple if the border cuts off one finger only, so that only the heights show that the fingers belong
+# together.
 STEP_HEIGHTS_CUT = 1.0
-# Where both fingers lean as the line through their tips does, to this slope, the camera may be turned as far as 25
-# degrees and a little more (slope); beyond, rows no longer cross the flanks well.
+# If the tilt of both fingers agrees with the line through their tips within the first slope, the camera may be rotated
+# by up to the second slope, a little more than 25 degrees; beyond it, rows cross the flanks at too small an angle.
 LEANS_ALIKE, FARTHEST_TURNED = 0.2, 0.49
-# Fingers that lean by less are not turned in any way that matters (slope).
+# Tilt (slope) below which the rotation is negligible.
 LEAST_TURN = 0.05
-# Widths and leans are taken in so many rows, in this part of the finger's height, without the top and the root.
+# Number of rows in which width and tilt are measured, range of these rows as shares of the finger's height (without tip
+# and root), and least number of rows.
 ROWS, FROM_SHARE, TO_SHARE, FEWEST_ROWS = 24, 0.4, 0.9, 4
 
 _build = loop("likeness_build")
@@ -75,12 +78,12 @@ def are_alike(first: Build, second: Build) -> bool:
 
 
 def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are at about the same height, as those of one gripper are; a turned camera is allowed for.
+    """Whether two tips are at about the same height, as those of one gripper, even if the camera is rotated.
 
     Parameters
     ----------
     step_px : float
-        Height of the right tip minus that of the left one, along the axis towards the roots.
+        Height of the right tip minus that of the left tip, along the axis towards the roots.
     apart_px : float
         Distance between the tips across the fingers, positive.
     below_tip_px : float

@@ -12,10 +12,10 @@ from fingervision.vision.profile_lines import INNER, IS_ROW, ProfileLines
 
 Floats = NDArray[np.float64]
 
-# Half-length of the first look at an edge (pixels), enough for the strongest blur that is still measured; at one line
-# in so many.
+# Half-length of the first window about an edge (pixels), which suffices for the largest blur that can be measured;
+# spacing of the lines used; distance of the steepest slope from the middle.
 FIRST_REACH_PX, FIRST_LOOK, NEAR_MIDDLE_PX = 20, 6, 8
-# The window follows an edge so far (pixels), where its ends differ by so many grey levels at all.
+# Largest displacement of the window towards an edge (pixels), and least difference of the window's end levels.
 FIRST_MOVE_PX, LEAST_LEVELS = 2.0, 1e-3
 
 _gather = loop("line_levels_gather")

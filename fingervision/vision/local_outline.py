@@ -22,20 +22,20 @@ from fingervision.vision.residuals import SHAPE_REACH_PX, is_on_outline
 Floats = NDArray[np.float64]
 
 DEGREE = 4
-# Half-lengths tried, in pixels and in units of the blur.
+# Half-lengths of the window that are tried (pixels), and least half-length in units of the blur.
 REACHES_PX = (18.0, 27.0, 40.0)
 SHORTEST_IN_BLURS = 6.0
-# A longer window must not leave more than this times the spread of the shortest one.
+# Largest ratio of the residuals' spread in a longer window to that in the shortest window.
 SPREAD_LIMIT = 1.5
 FEWEST_POINTS = 12
-# An outline whose points scatter by more than so many of their own uncertainties about the shortest polynomial has a
-# corner or a step there.
+# Scatter of the points about the polynomial of the shortest window, in units of their uncertainties, above which the
+# outline has a corner or a step.
 ROUGHEST = 6.0
 # Spread (in units of the points' uncertainties) below which a residual is never an outlier.
 LEAST_SPREAD = 0.7
-# An outline that is less sure than this (pixels) is not smooth; one that is flatter (across over along) has no edge.
+# Largest standard uncertainty of a smooth outline (pixels), and largest slope of an inner edge (across / along).
 LEAST_SURE_PX, FLATTEST = 1.0, 3.0
-# The tip is looked for at these places about the last one (pixels across).
+# Positions about the last estimate (pixels across) at which the tip is searched.
 TIP_GRID = np.linspace(-6.0, 6.0, 241)
 
 _fit = loop("local_outline_polynomial")
@@ -101,7 +101,7 @@ def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> Loca
         if fit is None:
             return None
         c, u = fit
-        # s runs along +x for the normal (0, -1); the tip is where the normal distance is largest.
+        # For the normal (0, -1), s increases with x; the tip is the point with the largest normal distance.
         height = np.full(TIP_GRID.size, c[-1])
         for coefficient in c[-2::-1]:
             height = coefficient + height * TIP_GRID
@@ -124,7 +124,7 @@ def local_edge(
         if fit is None:
             return None
         c, u = fit
-        # The crossing of the curve n(s) with the horizontal through the centre, to second order.
+        # Crossing of the curve n(s) with the horizontal line through the centre, by Newton's method.
         s = 0.0
         for _newton in range(4):
             n, dn = _value_and_slope(c, s)

@@ -15,9 +15,9 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.flanks import follow_down
 
-# Lengths of a flank that is followed: the measuring height and so many pixels below the tip.
+# Length of the longer flank: the measuring height plus this number of pixels below the tip.
 LONG_PX = 180.0
-# Two results agree where their difference is no more than so many of its standard uncertainties.
+# Largest difference of two results that agree, in standard uncertainties of the difference.
 AGREES = 2.5
 
 
@@ -33,8 +33,8 @@ def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFin
 def is_surer(longer: GapMeasurement | NoGap, near: GapMeasurement) -> bool:
     """Whether the result from longer flanks agrees with that from the near part and has a smaller uncertainty.
 
-    Where the near part is too short to tell whether it is rough, its uncertainty lacks the roughness: longer flanks
-    that tell replace it.
+    If the near part is too short to determine its roughness, its uncertainty does not include roughness; it is then
+    replaced by longer flanks whose roughness is determined.
     """
     if isinstance(longer, GapMeasurement) and isnan(near.roughness_px):
         return longer.roughness_px > 0.0

@@ -14,16 +14,16 @@ from fingervision.vision.median import median
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# The mean profile reaches so far to either side (pixels), in bins of this breadth with so many pixels each.
+# Extent of the mean profile to either side (pixels), width of its bins, and least number of pixels in a bin.
 REACH_PX, BIN_PX, FEWEST_IN_BIN = 16, 0.5, 4
-# Rows are left out on purpose where their neighbours lie so many times as far apart as usual.
+# Ratio of the distance of neighbouring fitted rows to the usual distance above which rows were left out deliberately.
 LEFT_OUT = 4.0
-# A flank is known where its rows lie this near to a line (pixels, standard deviation), over so many of them; an inner
-# one also where they lie so near to a curve. The degrees that are tried:
+# Largest standard deviation of a flank's rows about a line (pixels), and least number of rows; for an inner flank, a
+# curve is permitted as well. Degrees of the polynomials:
 STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
 STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
-# It is fitted so many times, each time without the rows that lie farther from it than so many robust standard
-# deviations and a little more (pixels): dust.
+# Number of fits, factor from median deviation to standard deviation, and distance beyond which rows are excluded as
+# dust: this number of standard deviations plus a small distance (pixels).
 LOOKS, SIGMAS_IN_MEDIAN, DUST, LEAST_DUST_PX = 3, 1.4826, 3.0, 1e-3
 
 _bins, _robust_line = loop("mean_profile_bins"), loop("mean_profile_robust_line")

@@ -1,6 +1,7 @@
 """Step 7: locate the measuring point on the fitted finger end.
 
-Its height is measured from the tip, its lateral position is that of the inner edge below the tip.
+The height of the measuring point is measured from the tip; its lateral position is that of the inner edge at this
+height.
 """
 
 from dataclasses import dataclass
@@ -13,20 +14,22 @@ from fingervision.vision.finger_end import FingerEnd
 
 Floats = NDArray[np.float64]
 
-# A top is square to its flanks where it is so within this many sigma; it then is to this (slope).
+# Number of standard uncertainties within which a top is regarded as perpendicular to its flanks, and the standard
+# uncertainty (slope) that is then assumed.
 SQUARE_IN_SIGMAS, U_SQUARE = 2.5, 3e-4
-# A top whose two corners differ in height by less than so many sigma is level
-# (a corner that is not in view says nothing: never by more than this).
+# Number of standard uncertainties within which the two corners of a level top may differ in height, and largest
+# difference (pixels), because an invisible corner has a large uncertainty.
 LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
-# A corner that is blurred out, or nearly so, has its radius to so many sigma (standard uncertainty); nothing of it is
-# hidden from so many sigma on.
+# Standard uncertainty (in sigma) of the radius of a corner that blur hides, and radius (in sigma) from which blur hides
+# nothing.
 U_CORNER_IN_BLURS, HIDDEN_IN_BLURS = 0.8, 8.0
-# Where no point of the outline lies on a fillet, its covariance is that of the guess, beyond this radius (pixels). The
-# fillet is then no larger than was found, give or take so many sigma of blur: a larger one would reach the points.
+# Standard uncertainty of a radius (pixels) above which no point of the outline determines the fillet. The radius is
+# then not larger than the fitted one by more than this multiple of the blur, because a larger fillet would reach the
+# points.
 UNSEEN_PX, UNSEEN_IN_BLURS = 100.0, 2.0
-# Derivatives are taken over so much of each parameter to either side.
+# Step of the numerical derivatives, to either side.
 STEP = 1e-3
-# For a radius that is its own uncertainty, up to so many pixels.
+# For a radius, the step is its uncertainty, up to this number of pixels.
 LARGEST_STEP_PX = 2.0
 
 _squared = loop("measuring_point_squared")

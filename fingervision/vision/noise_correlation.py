@@ -17,16 +17,18 @@ from fingervision.vision.profile_lines import ProfileLines
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# Side of the squares that are looked at, how many along each flank, and how far beyond the window they begin (pixels).
+# Side of the squares in which noise is estimated, number of squares along each flank, and their distance from the
+# window (pixels).
 SIDE_PX, MOST_ALONG, BEYOND_PX = 16, 3, 1
-# Noise is shared over so many pixels: interpolation reaches two, median and bilateral filters three.
+# Largest lag at which noise is correlated: two pixels for interpolation, three for median and bilateral filters.
 LAGS = 3
-# The two sides of an edge, each with its own noise: a printed finger's texture is not its ground's.
+# The two sides of an edge are treated separately, because a printed finger has another texture than the background.
 GROUND, FINGER = 0, 1
-# A square whose noise is so many times that of the quietest of its side shows something: an edge, not texture.
+# Ratio of a square's noise to that of the quietest square on the same side above which the square contains an edge.
 QUIETEST_TIMES = 4.0
-# Correlations below this many standard uncertainties of their sum are none. The nearest pixels are looked at first:
-# where none of their correlations is so many times its own uncertainty, interpolation and filters have shared nothing.
+# Number of standard uncertainties below which the sum of the correlations is not significant. The nearest pixels are
+# examined first: if none of their correlations exceeds this multiple of its uncertainty, the noise is regarded as
+# uncorrelated.
 SIGNIFICANT, NEAREST, NEAR_SIGNIFICANT = 3.0, 1, 2.5
 
 _squares = loop("noise_correlation_squares")
@@ -80,7 +82,7 @@ def flat_noise(
             continue
         covariance, pixels = _autocovariance(upright, light, corners, side, LAGS)
         correlation = covariance / covariance[LAGS, LAGS]
-        # Each correlation of white noise is uncertain by the root of the number of pixels.
+        # The standard uncertainty of a correlation of white noise is the inverse root of the number of pixels.
         limit = 1.0 + SIGNIFICANT * float(np.sqrt(2.0 * LAGS / pixels))
         for ratio in (_shared(correlation, weight), _shared(correlation.T.copy(), weight)):
             shared = max(shared, ratio) if ratio > limit else shared

@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 SAME_LINE_PX = 0.5
 """Distance from a line within which chunks belong to one straight stretch; the rounding of a pose causes far less."""
 OPPOSITE = -0.94
-"""Cosine between the normals of two sides below which they count as opposite: at most 20 degrees from antiparallel,
-where motion blurs both alike to a tenth. Sides that are farther from parallel count as lying across each other."""
+"""Cosine between the normals of two sides below which they count as opposite: at most 20 degrees from antiparallel, so
+that motion blurs both equally within a tenth. Other sides that are not parallel count as crossing each other.
+"""
 SURE = 3.0
 """Difference in standard uncertainties above which a side counts as doubtful. One side in four hundred exceeds it by
 chance, and then only has a larger uncertainty in that picture; for a side of one chunk (noise 4 for a contrast of 150,
@@ -75,7 +76,8 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
     excess = _excess(mean, spread, normal)
     if not excess.any():
         return np.zeros((side.size, 0))
-    # Where there is a shadow, what the blur of the other sides leaves open of theirs is in doubt as well.
+    # If one side has a shadow, the positions of the other sides have an uncertainty as well, from the uncertainty of
+    # their blur.
     u_side = np.sqrt(np.where(excess > 0.0, excess, np.sqrt(spread)))
     return np.asarray(np.where(side[:, None] == numbers, u_side, 0.0))
 
@@ -99,14 +101,14 @@ def _excess(mean: Array, variance: Array, normal: Array) -> Array:
     for j in range(mean.size):
         facing = cosine[j] < OPPOSITE
         if facing.any():
-            # Motion blurs both alike, and the same shadow on both moves the body no way.
+            # Motion blurs opposite sides equally, and equal shadows on opposite sides do not move the body.
             if agree[j, facing].any():
                 continue
             is_usual, are_usual = (bool(agree[k][:, across[j]].any()) for k in ([j], np.flatnonzero(facing)))
             if not is_usual or are_usual:
                 found[j] = np.abs(apart[j, facing]).min()
         elif across[j].any():
-            # An edge with none opposite may also be blurred by motion, which nothing tells from a shadow.
+            # A side without an opposite side may be blurred by motion, which cannot be distinguished from a shadow.
             sharpest = int(np.flatnonzero(across[j])[np.argmin(mean[across[j]])])
             found[j] = apart[j, sharpest] if apart[j, sharpest] > limit[j, sharpest] else 0.0
     return found

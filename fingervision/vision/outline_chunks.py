@@ -16,7 +16,7 @@ from scipy.special import ndtr
 Array = NDArray[np.float64]
 
 REACH_PX = 6.0
-"""Half width of the window across an edge, in pixels: three times a blur of 1.5 px, and room for the search."""
+"""Half width of the window across an edge, in pixels: three times a blur of 1.5 px, plus a margin for the search."""
 LEAST_CONTRAST = 5.0
 """Least contrast of an edge, in standard deviations of a pixel's noise."""
 FARTHEST_PX = 3.5
@@ -27,8 +27,9 @@ px do not fit into the window."""
 OTHER_LEVEL, OTHER_CONTRAST, OTHER_BLUR, OTHER_BLUR_PX, OTHER_NOISE = 0.3, (0.4, 2.5), 1.25, 0.2, 4.0
 """Limits of the difference between a chunk and the other chunks of its body: level of the body (in contrasts), contrast
 (relative to the median), blur (a factor, and pixels added), noise (a factor; relative to the lower quartile). An edge
-beyond these limits is that of a shadow, or two edges fitted as one: the edge of a cast shadow has another level inside,
-and one with a shadow of 3 px twice the blur. Texture of a sixth of the contrast is within the limits."""
+outside these limits is that of a shadow, or two edges fitted as one: a cast shadow has another level inside, and an
+edge with a shadow of 3 px has twice the blur. Texture of a sixth of the contrast is within the limits.
+"""
 LEAST_WINDOW = 0.7
 """Least share of a chunk's window that must lie in the picture: an edge in the middle of the window then has background
 and body on its two sides."""
@@ -222,7 +223,7 @@ def _like_the_others(
 ) -> NDArray[np.bool_]:
     """Whether each chunk shows the body's own edge, judged by comparison with the other chunks of the body."""
     usual = float(np.median(contrast[used]))
-    # A shadow falls on up to half of a body's sides: the better half tells what an edge of its own looks like.
+    # A shadow affects at most half of a body's sides, so that the sharper half shows the body's own edges.
     sharp, quiet = float(np.quantile(blurs[used], 0.25)), float(np.quantile(noise[used], 0.25))
     low, high = OTHER_CONTRAST
     return np.asarray(
@@ -242,7 +243,7 @@ def _step(
     Return the offset, its variance, the blur of the optics and its standard uncertainty, the level of the body, the
     contrast to the background, and the standard deviation of the noise.
 
-    The width of a square pixel adds 1/12 px^2 to the squared blur (measuring.md).
+    The width of a square pixel adds 1/12 px^2 to the squared blur.
     """
     d, sigma = 0.0, float(np.hypot(blur, 12**-0.5))
     for _ in range(4):
@@ -269,6 +270,6 @@ def _step(
         return None
     variance = noise2 * float(inverse[2, 2]) / float(b) ** 2
     of_optics = float(np.sqrt(max(sigma**2 - 1.0 / 12.0, BLURS_PX[0] ** 2)))
-    # Of the square of the blur, the pixel's share is known.
+    # The pixel's contribution to the squared blur has no uncertainty.
     u_of_optics = float(np.sqrt(noise2 * inverse[3, 3])) / abs(float(b)) * sigma / of_optics
     return d, variance, of_optics, u_of_optics, float(a + b), float(b), float(np.sqrt(noise2))

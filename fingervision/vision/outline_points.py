@@ -13,9 +13,11 @@ from fingervision.vision.profile_lines import PLACES, SIDE, TIP_SIDE
 
 Floats = NDArray[np.float64]
 
-# Where the outline runs at 45 degrees, rows and columns look at the same pixels: each counts for less.
+# Slope above which rows and columns cross the same part of an outline, and factor by which the uncertainty of these
+# points is increased.
 SHARED_SLOPE, SHARED_FACTOR = 0.75, 1.25
-# A line whose contrast is below this share of the typical one meets the border of the picture, not of a finger.
+# Least contrast of a line as a share of the typical contrast; a line with less contrast crosses the border of the
+# picture instead of a finger's edge.
 LEAST_CONTRAST = 0.3
 
 _seen_from = loop("outline_points_seen_from")

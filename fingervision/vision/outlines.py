@@ -11,10 +11,10 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.loops import loop
 from fingervision.vision.orientation import Orientation
 
-# Points in order, shape (n, 2).
+# Points of an outline in order, shape (n, 2).
 Outline = NDArray[np.int32]
 
-# What has a shorter outline is a speck (pixels).
+# Length of outline (pixels) below which an object is a speck.
 SHORTEST_OUTLINE_PX = 20
 
 _from_lowest, _largest_extents = loop("outlines_from_lowest"), loop("outlines_largest_extents")

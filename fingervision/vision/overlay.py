@@ -13,7 +13,7 @@ from fingervision.vision.grey import top_level
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.profile_lines import IS_ROW
 
-# Red, green, blue.
+# Colours (red, green, blue) of the parts of the drawing.
 EDGE, TIP, POINT, DISTANCE, HELD, WORDS, FAILURE, BACKING = (
     (64, 200, 255),
     (255, 176, 32),
@@ -24,9 +24,9 @@ EDGE, TIP, POINT, DISTANCE, HELD, WORDS, FAILURE, BACKING = (
     (255, 96, 96),
     (0, 0, 0),
 )
-# OpenCV draws sub-pixel places as whole numbers of 1/16 px.
+# OpenCV draws sub-pixel positions as multiples of 1/16 px.
 FRACTION_BITS = 4
-# A frame of this height is drawn with lines one pixel wide and letters of the usual size.
+# Height of a frame for which lines are one pixel wide; line width and text size are proportional to the height.
 USUAL_HEIGHT_PX = 480.0
 EDGE_LENGTH_PX, TIP_LENGTH_PX, POINT_PX = 30.0, 26.0, 6.0
 

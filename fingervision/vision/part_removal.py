@@ -21,22 +21,23 @@ from fingervision.vision.way_between import inner_crossing
 Ints = NDArray[np.int64]
 Mask = NDArray[np.uint8]
 
-# A part within so many pixels of an inner edge spoils its profiles, and in so many rows beyond its own.
+# Distance from an inner edge (pixels) within which a part affects the edge's profiles, and number of further rows above
+# and below the part that are affected.
 NEAR_PX, BEYOND_PX = 8, 4
-# A part covers no more than so many times the length that it leaves open.
+# Largest ratio of the covered to the visible length of an inner edge.
 MOST_TIMES_COVERED = 4.0
-# So many rows of the flanks below a part are wanted.
+# Number of rows of the flanks below a part that are used.
 SEEN_BELOW_PX = 40
-# The finger that was found has the channel's side within so many pixels, where it is not hidden.
+# Largest distance (pixels) of a finger's visible inner side from the side of the channel.
 ON_SIDE_PX = 2.5
-# Less than this many pixels in a row is a speck, and in all (a fifth of the measuring height would not be seen) dust.
+# Least number of pixels of a part in a row, below which it is a speck, and in all, below which it is dust.
 SPECK_PX, SMALLEST_PART_PX = 2, 12
-# A run of pixels at a side that is no longer than this is what clearing left of a part, and no finger.
+# Largest length (pixels) of a run at a side that is a remainder of the removed part instead of a finger.
 SLIVER_PX = 8
-# The inner edge of a finger goes straight on under what steps out of it by so many pixels in so many rows.
+# Least step (pixels) of an inner side within this number of rows that suggests a part in front of a straight edge.
 STEP_PX, STEP_ROWS = 3.0, 3
-# A part closes the room between the fingers over so many pixels and this share of its breadth; fingers that touch
-# close it to a point.
+# Least width of a part across the space between the fingers, in pixels and as a share of this space; touching fingers
+# leave only a point.
 FLOOR_PX, FLOOR_SHARE = 6, 0.3
 
 _has_step = loop("part_removal_has_step")
@@ -120,7 +121,7 @@ def _found_without(
     tips = max(fingers.left.top_along_px, fingers.right.top_along_px)
     held_rows = held_rows[held_rows > tips]
     if held_rows.size and held_rows[-1] + SEEN_BELOW_PX > tips + reach_px:
-        # The flanks are followed to where they are seen again.
+        # The flanks are followed to a height at which they are visible again.
         deeper_px = float(held_rows[-1] + SEEN_BELOW_PX - tips)
         deeper = find_fingers(cleared, (orientation.direction,), below_tip_px, deeper_px)
         if isinstance(deeper, CoarseFingers):

@@ -4,9 +4,9 @@ Texture of a frequency f above the Nyquist frequency (half a cycle per pixel) ap
 to move in the opposite direction: relative to the rest of the patch its phase changes by 2 pi for every pixel of
 displacement. After a displacement d its residual is `2 sin(pi d)` times as large as the aliased texture itself. The
 part of this residual that looks like a displacement is a bias, which depends on the sub-pixel phase. The power above
-the Nyquist frequency is extrapolated from the power of the patch below it. The aliased power is assumed to be the same
-for every frequency along the other axis, so that an edge parallel to the pixels, whose phase is the same along its
-whole length, counts as a single edge.
+the Nyquist frequency is extrapolated from the power of the patch below it. The aliased power is assumed to be equal for
+all frequencies along the other axis, so that an edge parallel to the pixels, whose phase is constant along its length,
+counts as a single edge.
 """
 
 import cv2
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
-# Bands (cycles per pixel) from whose power that beyond 0.5 is extrapolated: as near to it as a patch of 9 px resolves,
-# and their middles.
+# Frequency bands (cycles per pixel) from which the power above 0.5 is extrapolated, as near to 0.5 as a patch of 9 px
+# resolves, and the centres of these bands.
 LOW_BAND, HIGH_BAND = (0.18, 0.32), (0.36, 0.5)
 LOW, HIGH = 0.25, 0.43
-# Pixels square over which the power of fine texture is averaged to tell where it lies: what smoothing and gradients
-# spread a line over.
+# Side (pixels) of the square over which the power of fine texture is averaged to locate the texture; smoothing and
+# gradients spread a line over this width.
 NEARBY_PX = 5
 
 
@@ -31,9 +31,9 @@ def aliasing_covariance(part: Floats, margin_px: int, jacobian: Doubles, smoothi
     Parameters
     ----------
     part : ndarray, shape (height + 2 margin, width + 2 margin)
-        Light of the patch and of what is about it.
+        Light of the patch and its surroundings.
     margin_px : int
-        Pixels of `part` beyond the patch on every side.
+        Number of pixels of `part` beyond the patch on every side.
     jacobian : ndarray, shape (3, height * width)
         Derivatives of the smoothed levels by x, y and angle.
     smoothing : ndarray, shape (m,)
@@ -42,7 +42,7 @@ def aliasing_covariance(part: Floats, margin_px: int, jacobian: Doubles, smoothi
     Returns
     -------
     ndarray, shape (2, 3)
-        Variances of x, y and angle: first row by what is folded along x, second row along y.
+        Variances of x, y and angle due to texture that is aliased along x (first row) and along y (second row).
     """
     inner = part[margin_px:-margin_px, margin_px:-margin_px].astype(np.float64)
     gradients = jacobian.reshape(3, *inner.shape)
@@ -53,13 +53,15 @@ def aliasing_covariance(part: Floats, margin_px: int, jacobian: Doubles, smoothi
     variance = np.empty((2, 3))
     for row, axis in enumerate((1, 0)):
         folded = _folded_power(inner, axis)
-        # Fine texture in a few places has no other places to average over: where it lies, the gradients lie too.
+        # Fine texture in a few places coincides with the gradients there, so that its effect does not average out over
+        # the patch.
         beside = 0.5 * (np.roll(part, 1, axis) + np.roll(part, -1, axis))
         fine = cv2.blur((part - beside).astype(np.float64) ** 2, (NEARBY_PX, NEARBY_PX))
         fine = fine[margin_px:-margin_px, margin_px:-margin_px]
         gathered = (gradients**2 * fine).sum(axis=(1, 2)) / (information * max(float(fine.mean()), 1e-30))
         variance[row] = (weight * folded).sum(axis=(1, 2)) / inner.size / information**2 * np.maximum(gathered, 1.0)
-    # What is folded is as large as the stronger gradients, and displaces the patch more along the weaker ones.
+    # Aliased texture is as strong as the stronger gradients, and displaces the patch more along the axis of the weaker
+    # gradients.
     ratio = information[1] / information[0]
     x, y = variance[:, 0].copy(), variance[:, 1].copy()
     variance[:, 0], variance[:, 1] = np.maximum(x, y * ratio), np.maximum(y, x / ratio)
@@ -78,9 +80,9 @@ def aliasing_at(
     aliasing : ndarray of float, shape (k, 2, 3)
         From `aliasing_covariance`.
     x_px, y_px, turn_rad : ndarray of float, shape (k,)
-        Displacement but for whole pixels, and rotation.
+        Displacement modulo one pixel, and rotation.
     half_size : (int, int)
-        Pixels on either side of the patch's middle across and down.
+        Number of pixels on either side of the patch's centre, across and down.
     """
     across, down = half_size
     along_x = 2.0 * (1.0 - np.cos(2.0 * np.pi * x_px) * np.sinc(2.0 * down * turn_rad))
@@ -101,7 +103,8 @@ def _folded_power(light: Doubles, axis: int) -> Doubles:
     frequency = np.abs(np.fft.fftfreq(n))
     low = power[:, (frequency > LOW_BAND[0]) & (frequency <= LOW_BAND[1])].mean(axis=1)
     high = power[:, (frequency > HIGH_BAND[0]) & (frequency <= HIGH_BAND[1])].mean(axis=1)
-    # A pixel's own area passes sinc^2; what the power falls by beyond that is optics and texture, and goes on beyond.
+    # Integration over a pixel reduces the power by sinc^2. Any further decrease is due to optics and texture, and is
+    # assumed to continue above 0.5.
     by_pixel = 2.0 * np.log(np.sinc(LOW) / np.sinc(HIGH)) / (HIGH - LOW)
     seen = np.log(max(float(low.sum()), 1e-30) / max(float(high.sum()), 1e-30)) / (HIGH - LOW)
     beyond = 1.0 - frequency

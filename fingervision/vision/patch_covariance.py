@@ -8,13 +8,13 @@ from fingervision.vision.spline_interpolation import derivative_power, phase_pow
 
 Doubles = NDArray[np.float64]
 
-# A Gram matrix whose smallest normalised eigenvalue is below this is that of noise, or of an edge that slides along
-# itself.
+# Least normalised eigenvalue of a Gram matrix; a smaller eigenvalue means noise, or an edge that does not determine the
+# position along itself.
 LEAST_INFORMATION = 0.02
-# Noise's own part of the Gram matrix scatters: smoothed, 31 px square hold some 150 independent gradients, and three
-# standard deviations of their power are a third of it. What is no more than this is that of noise.
+# Least ratio of the Gram matrix to its expectation for noise. A smoothed patch of 31 px has about 150 independent
+# gradients, so that three standard deviations of the noise's power are a third of it.
 NOISE_MARGIN = 1.4
-# Variance of rounding to whole grey levels: no noise is smaller.
+# Variance of rounding to whole grey levels, the least noise.
 ROUNDING = 1.0 / 12.0
 
 
@@ -60,13 +60,13 @@ def widened(covariance: Doubles, inverse: Doubles, scores: Doubles, aliasing: Do
     Parameters
     ----------
     covariance : ndarray of float, shape (k, 3, 3)
-        By the noise.
+        Covariance due to the noise.
     inverse : ndarray of float, shape (k, 3, 3)
-        Of the Gram matrices.
+        Inverse of the Gram matrices.
     scores : ndarray of float, shape (k, blocks, 3)
-        Products of gradients and residuals by block; their sum is zero where the registration settled.
+        Products of gradients and residuals by block; their sum is zero if the registration has converged.
     aliasing : ndarray of float, shape (k, 3)
-        Variances of x, y and rotation predicted at the phases found.
+        Variances of x, y and rotation due to aliasing, predicted for the sub-pixel phases found.
     """
     blocks = scores.shape[1]
     away = (scores - scores.mean(axis=1, keepdims=True)) @ inverse

@@ -19,17 +19,19 @@ from fingervision.vision.spline_interpolation import (
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
-# Pixels beyond a patch that interpolation and gradients need.
+# Number of pixels beyond a patch that interpolation and gradients need.
 MARGIN_PX = KERNEL_REACH + SPLINE_REACH
-# Both pictures are smoothed. Near the highest frequency that pixels hold a picture shows what is folded down from
-# beyond (aliasing), which seems to move the other way; it would decide, because the finest texture has the largest
-# gradients. A Gaussian of 0.7 px and the interpolation's own smoothing leave 2 % of that frequency and 50 % of half of
-# it. With 1 px and more, patches of 21 px hold too little for some textures.
+# Standard deviation of the Gaussian with which both pictures are smoothed. Without smoothing, aliased texture near the
+# Nyquist frequency would dominate the registration, because the finest texture has the largest gradients, and aliased
+# texture seems to move in the opposite direction. This Gaussian and the interpolation's own smoothing leave 2 % of the
+# Nyquist frequency and 50 % of half of this frequency. With 1 px or more, patches of 21 px have too little information
+# for some textures.
 SMOOTHING_PX = 0.7
-# The interpolating kernel `b + c b''` (`spline_interpolation`): with this c its spectrum is zero at 0.65 of the pixels'
-# frequency too, the middle of where the images of texture of 0.2 to 0.5 lie. The image of a texture of 0.3 is then
-# 0.7 % of it instead of 3.4 %, and the bias by the phase a fourth: 0.0008 instead of 0.0042 px of white texture behind
-# optics of 0.7 px, at the same cost.
+# Coefficient c of the interpolating kernel `b + c b''` (`spline_interpolation`), with which the kernel's spectrum has a
+# further zero at 0.65 of the sampling frequency, in the middle of the range of the images of texture of 0.2 to 0.5
+# cycles per pixel. The image of texture of 0.3 cycles per pixel then has 0.7 % of the texture's amplitude instead of
+# 3.4 %. The bias that depends on the sub-pixel phase decreases from 0.0042 to 0.0008 px, for white texture behind
+# optics of 0.7 px.
 CURVATURE = 0.06
 
 
@@ -51,10 +53,11 @@ class PatchReference:
     hessian : ndarray, shape (3, 3)
         Gram matrix of the jacobian.
     score : ndarray, shape (3, 3)
-        That of the jacobian smoothed once more: covariance of what smoothed noise of unit variance projects on it.
+        Gram matrix of the jacobian smoothed once more: covariance of the projections of smoothed noise of unit variance
+        on the jacobian.
     aliasing : ndarray, shape (2, 3)
-        Variance of x, y and angle by texture that is too fine for the columns (first row) and for the rows of pixels
-        (second row), over all sub-pixel phases (`patch_aliasing`).
+        Variance of x, y and angle due to texture that is too fine for the columns (first row) and for the rows of
+        pixels (second row), averaged over all sub-pixel phases (`patch_aliasing`).
     template : ndarray, shape (height, width)
         Light without smoothing, for the coarse search.
     """

@@ -21,11 +21,11 @@ from fingervision.vision.spline_interpolation import coefficients
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
-# Gauss-Newton ends after a step below this (pixels at the patch's rim); it converges faster than linearly, so less than
-# a thousandth of a pixel is left.
+# Step (pixels at the patch's rim) below which the Gauss-Newton iteration ends, with a remaining error below 0.001 px,
+# and largest number of steps.
 SETTLED_PX, ITERATIONS = 0.01, 12
-# The patch is divided into so many blocks across and down: each then holds several correlation lengths of smoothed
-# noise (2.5 px), and sixteen of them tell a variance to a third.
+# Number of blocks across and down into which a patch is divided. Each block contains several correlation lengths of
+# smoothed noise (2.5 px), and sixteen blocks determine a variance with a relative uncertainty of a third.
 BLOCKS = 4
 
 _settled = loop("patch_registration_settled")

@@ -48,16 +48,17 @@ from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
 __all__ = ["LINEAR", "SRGB", "Settings", "look_closely", "measure_frame", "steps"]
 
-# A picture whose two classes differ by less (share of full scale) shows nothing.
+# Least contrast between the two classes of a picture, as a share of full scale.
 CONTRAST_FLOOR = 0.03
 SATURATED_SHARE = 0.99
-# Two fingers and the edges between them need so many pixels.
+# Least side of a picture (pixels) that can contain two fingers and the edges between them.
 SMALLEST_SIDE_PX = 16
-# Where fingers were found and this was wrong with them, nothing else in the picture is taken for fingers.
+# Statuses after which no other objects are tried as fingers, because the fingers were found but cannot be measured.
 FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
-# Beside a shadow or a pad a gap that is less sure than this (pixels) may be that of something else.
+# Largest standard uncertainty (pixels) of a gap that is measured beside a shadow or pad with another threshold; a
+# larger uncertainty suggests that other edges were measured.
 LEAST_SURE_AGAIN_PX = 0.3
-UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: all its pixels have nearly the same grey level.")
+UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: no object differs from the background.")
 
 
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
@@ -159,13 +160,13 @@ def _coded(frame: Frame, settings: Settings) -> _Coded:
     quantiser, region = frame.quantiser, settings.region
     if quantiser is not None and region is not None:
         quantiser = quantiser.seen_from(region.x_px, region.y_px)
-    # Where the quantiser is known, the codec's part is worked out from it and not guessed from the codec's kind.
+    # If the quantiser is known, the codec's contribution is computed from the quantiser instead of the kind of codec.
     return _Coded(frame.coding if quantiser is None else Coding.LOSSLESS, quantiser)
 
 
 @dataclass(frozen=True, slots=True)
 class _Scale:
-    """Full scale of the light, and the level at which the picture is cut off."""
+    """Full scale of the light, and the level at which the picture is clipped."""
 
     top: int
     highest: int
@@ -183,12 +184,12 @@ class _Attempt:
 
 def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     if min(grey.shape) < SMALLEST_SIDE_PX:
-        return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to hold two fingers."))
+        return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to contain two fingers."))
     top = _top_level(grey, settings)
     scale = _Scale(top, settings.response.cut_off_at(grey, top))
     denoised = denoise(grey)
     binary = binarise(denoised, top)
-    # The grey picture itself is counted only where denoising has left it nearly white.
+    # The full-scale pixels of the original picture are counted only if the denoised picture is nearly white.
     is_bright = binary.full_scale_share > 0.9 or scale.highest < top
     if is_bright and np.count_nonzero(grey >= scale.highest) > SATURATED_SHARE * grey.size:
         words = "The picture is white: nearly every pixel is at full scale."
@@ -199,7 +200,9 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     for split, fingers, light_gap in candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
             if fingers.status is not Status.NO_FINGERS and not has_edges(denoised, split, binary.contrast):
-                fingers = NoGap(Status.NO_FINGERS, "The picture changes gradually from light to dark, without an edge.")
+                fingers = NoGap(
+                    Status.NO_FINGERS, "The picture shows only a gradual change of brightness without edges."
+                )
             attempt = _Attempt(fingers, split)
         else:
             attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)
@@ -255,7 +258,7 @@ def _edges_and_gap(
         alike_px = SHARED_SHIFTS[coded.coding] * shared_shift_px(flanks(upright, found, light))
         return alike_px, alike_px
 
-    with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
+    with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
         edges = with_profile(upright, edges, light, top, settings.is_outline, displaced_px)
     if edges.beside == STRIP:
         return edges, THIRD_TONE
@@ -266,7 +269,7 @@ def _edges_and_gap(
             outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, top)
         elif coded.coding is not Coding.LOSSLESS:
             outcome = with_shared_shift(outcome, shared_shift_px(flanks(upright, edges, light)), coded.coding)
-        elif not edges.beside:  # what stands beside an edge has its own price
+        elif not edges.beside:  # a structure beside an edge has its own contribution
             u_alike = sqrt(2.0) * EVEN_SHIFTS * even_shift_px(flanks(upright, edges, light))
             outcome = replace(outcome, u_shift_px=hypot(outcome.u_shift_px, u_alike))
     if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
@@ -283,7 +286,7 @@ def _with_two_tones(
     coded: _Coded,
     scale: _Scale,
 ) -> _Attempt:
-    """Return the attempt, or a new one with another threshold if a shadow or pad was put into the wrong class."""
+    """Return the attempt, or a new attempt with another threshold if a shadow or pad was put into the wrong class."""
     if not isinstance(attempt.outcome, GapMeasurement) or attempt.fingers is None or attempt.edges is None:
         return attempt
     upright = attempt.fingers.orientation.view(grey)

@@ -3,9 +3,9 @@
 from math import cos, pi, sin, sqrt, tan
 from typing import NamedTuple
 
-# Sides turn by at least this much from one to the next (radians), and by less than half a turn: a convex chain.
+# Least and largest change of direction between neighbouring sides (radians) of a convex chain.
 LEAST_TURN, MOST_TURN = 0.03, 2.6
-# A side's tangent points may overlap by so much before it is none (pixels): rounding of the radii.
+# Largest overlap of a side's two tangent points (pixels), which allows for errors of the radii.
 OVERLAP_PX = 0.5
 
 

@@ -22,39 +22,41 @@ from fingervision.vision.straight_runs import straight_runs
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# Sides are looked for down to so much below the measuring height (pixels).
+# Distance below the measuring height down to which sides are searched (pixels).
 BELOW_PX = 40.0
-# A top is what lies within so many pixels of the outermost point; this share of it, in the middle, is straight to this
-# mean square (in units of the points' own uncertainties; a curve of 150 px radius leaves more).
+# Distance from the outermost point (pixels) within which points belong to the top, share of the top's middle that is
+# tested, and largest mean squared residual of a straight top in units of the points' variances (a curve of 150 px
+# radius has more).
 TOP_PX, MIDDLE_SHARE, TOP_STRAIGHTEST = 2.0, 0.6, 4.0
-# A finger's end has two flanks, a top and at most two cut corners on either side; a curve would need more.
+# Least and largest number of sides: two flanks, a top and at most two chamfers on either side; a curve would need more.
 FEWEST_SIDES, MOST_SIDES = 3, 7
-# Blur bends a right corner's half-level by more than 0.01 sigma over so many sigma along its sides, and one that turns
-# by a quarter of that over half a sigma less: what it bends goes with the turn, and falls off as a normal tail does.
+# Length along the sides of a right-angled corner (in sigma) over which blur displaces the half-level by more than 0.01
+# sigma, and decrease of this length if the corner turns by a quarter of this angle.
 BENT_IN_BLURS, LESS_IN_BLURS = 2.4, 0.5
-# Sides, the corners' radii from them, and the sides without the corners: so many times.
+# Number of passes, each of which fits the sides without the corners' points, and then the radii of the corners.
 PASSES = 3
-# A corner rounder than this (pixels) is no corner: the three-sided shape with its fillets is for such fingers. What is
-# rounded may be a short cut as well, which differs from a fillet by this share of the radius (standard uncertainty).
+# Largest radius of a corner (pixels), above which the three-sided shape with fillets is used; standard uncertainty due
+# to the difference between a fillet and a short chamfer, as a share of the radius.
 ROUNDEST_PX, U_FILLET = 15.0, 0.3
-# Points farther from a vertex (pixels) are none of its corner.
+# Largest distance of a corner's points from its vertex (pixels).
 FARTHEST_PX = 15.0
-# What the fit of a straight step makes of a corner's half-level: so many sigma (standard uncertainty).
+# Standard uncertainty (in sigma) of a corner's half-level position that is found by the fit of a straight step.
 U_HALF_LEVEL_IN_BLURS = 0.05
-# Corners between straight sides are sharp, give or take so much of a radius (standard deviation, pixels), where their
-# half-level says no better.
+# Standard deviation (pixels) of the prior of a corner's radius about zero.
 USUAL_PX = 3.0
-# A line of pixels that runs along a side (sine of the angle between them) within so many sigma of it sees that side
-# more than the edge that it was laid across.
+# Sine of the angle between a line of pixels and a side, and distance between them (in sigma), below which the side
+# affects the line more than the edge that the line crosses.
 GRAZING, GRAZING_IN_BLURS = 0.64, 2.0
-# Radii that are tried (pixels).
+# Radii that are tried, and their spacing (pixels).
 RADII_STEP_PX = 0.125
 RADII_PX = np.arange(0.0, 20.0, RADII_STEP_PX)
-# A side needs so many points beside its corners, and its mean square (in units of the points' own) is below this.
+# Least number of points of a side without its corners, and largest mean squared residual in units of the points'
+# variances.
 FEWEST_POINTS, STRAIGHTEST = 4, 3.0
-# A top that leans by less than so many standard uncertainties, with ends that differ by less than so much, is level.
+# A top is level if its inclination is below this number of standard uncertainties, and its ends differ in height by
+# less than this distance (pixels).
 LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
-# A side that leans more crosses no height well (across over along).
+# Largest slope (across / along) of a side whose crossing with a height is used.
 FLATTEST = 3.0
 
 
@@ -179,7 +181,8 @@ def _fitted(
                     (vx, vy), _, turn = corners[j]
                     bent = radii[j] * tan(0.5 * turn) + _bent_in_blurs(turn) * blur
                     keep &= np.hypot(x[run] - vx, y[run] - vy) > bent
-            if np.count_nonzero(keep) < FEWEST_POINTS:  # too short to be told from its corners: nothing is read off it
+            # A side too short to be distinguished from its corners determines no point.
+            if np.count_nonzero(keep) < FEWEST_POINTS:
                 fits.append(_line(x[run], y[run], u[run])._replace(square=np.inf))
             else:
                 fits.append(_line(x[run[keep]], y[run[keep]], u[run[keep]]))
@@ -192,7 +195,8 @@ def _radius(x: Floats, y: Floats, u: Floats, corner: Corner, blur: float) -> tup
     dx, dy = x - vx, y - vy
     near = np.hypot(dx, dy) < FARTHEST_PX
     for side in (-0.5 * turn, 0.5 * turn):
-        # The bisector points into the finger; a side's direction is a quarter of a turn and half the corner's off it.
+        # The bisector points into the finger; the angle between a side and the bisector is 90 degrees plus half of the
+        # corner's turn.
         sx, sy = ny * cos(side) + nx * sin(side), -nx * cos(side) + ny * sin(side)
         runs_along = np.where(u > 0.0, abs(sy), abs(sx)) < GRAZING
         near &= ~(runs_along & (np.abs(dx * sy - dy * sx) < GRAZING_IN_BLURS * blur))
@@ -217,7 +221,8 @@ def _level(fits: list[_Fitted]) -> int | None:
     For a level side, noise would decide which of its ends is the higher.
     """
     for k in range(1, len(fits) - 1):
-        u_angle = fits[k].u_angle * sqrt(max(fits[k].square, 1.0))  # infinite: a top too short to lean
+        # Infinite for a top too short to have an inclination.
+        u_angle = fits[k].u_angle * sqrt(max(fits[k].square, 1.0))
         corners = Polygon([fit.side for fit in fits[k - 1 : k + 2]], [0.0, 0.0], None).corners()
         if corners is None:
             continue

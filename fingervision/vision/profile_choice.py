@@ -42,34 +42,37 @@ from fingervision.vision.wall_width import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# The flanks are looked at where a step leaves so many times the noise of the picture's flat parts.
+# Ratio of a step's residuals to the noise of the picture's flat parts above which other models are tried.
 UNEXPLAINED = 1.2
-# A wall improves what a step leaves by so much in chi-square.
+# Least reduction of chi-square by a wall, compared with a step.
 SIGNIFICANT = 30.0
-# One model is clearly better than another that leaves so much more chi-square, in units of what its own bins leave
-# (odds of e^8 to one).
+# Difference in chi-square above which one model is clearly better than another, in units of the residual per bin (odds
+# of e^8 to one).
 CLEARLY = 16.0
-# The integral of what a Gaussian step leaves of a disc of defocus, squared, is at most 0.0017 contrast^2 blur (of a box
-# 0.0038): what leaves more than this is two steps, or a line between them, even where it is alike to both sides.
+# Largest integral of the squared residual of a Gaussian step, in units of contrast^2 times blur, that symmetric optics
+# can cause: a disc of defocus causes at most 0.0017 (a box 0.0038). A larger residual means two steps, or a line
+# between them, even if it is symmetric.
 DISC_LEAVES = 0.002
-# Glare that is fitted to a disc of defocus lies 1.0 to 1.1 of its own blurs inside, however large the disc is.
+# Ratio of the distance of a fitted glare to its blur below which defocus explains the glare; a disc of defocus of any
+# size gives 1.0 to 1.1.
 DISC_BREADTH = 1.12
-# What stands beside an edge makes this share of the contrast: less is texture, more is no finger's edge.
+# Range of the strength of a structure beside an edge, as a share of the contrast; a weaker structure is texture, and
+# with a stronger one the edge is not that of a finger.
 SHARES = (0.05, 0.85)
-# Levels within so many standard deviations of the end of the scale are cut off now and then.
+# Distance from the end of the scale, in standard deviations of the noise, within which levels are sometimes clipped.
 CUT_OFF_SIGMAS = 2.0
-# Motion and focus widen both flanks of a finger, a wall the inner flanks of both fingers: one inner flank alone, wider
-# than the finger's outer one by this share (of variance) and by so many pixels, has a strip of a third tone beside it,
-# as a shadow makes. One of breadth w spreads a step by w / 2 at most: this one is broader than two pixels, and its own
-# edge may be the one that was found.
+# Motion and defocus widen both flanks of a finger, and a wall widens the inner flanks of both fingers. If only one
+# inner flank is wider than the finger's outer flank, by this share of the squared blur and by this number of pixels, a
+# strip of a third tone lies beside it, such as a shadow. A strip of width w adds at most w / 2 to the blur, so that
+# this strip is wider than two pixels, and its outer edge may have been measured.
 ONE_SIDED, ONE_SIDED_PX, STRIP = 0.5, 1.2, "strip"
-# A wall or glare narrower than so many blurs cannot be told from the blur itself.
+# Width of a wall or glare, as a multiple of the blur, below which it cannot be distinguished from blur.
 RESOLVED_BLURS = 1.6
-# Motion spreads a fillet of this radius like a box and not like a Gaussian: the half-level moves by up to half of the
-# variance that it adds over the radius.
+# Radius of a fillet (pixels) for the effect of motion: a uniform motion displaces the half-level by up to half of the
+# added squared blur divided by the radius.
 MOTION_RADIUS_PX = 15.0
-# Shadows are not quite ramps and walls not quite of one tone; glare lies elsewhere on a fillet than on the flank. This
-# share of a correction is its standard uncertainty.
+# Standard uncertainty of a correction, as a share of it, for shadow, wall and glare: real shadows are not exactly
+# ramps, real walls not exactly uniform, and glare on a fillet has another position than on the flank.
 U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 
 
@@ -105,13 +108,14 @@ def with_profile(
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
         return _unsure_of_width(edges, displaced_px)
     room = _room(edges)
-    # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
+    # Mean profiles of round flanks take ten times as long, and are computed only if no displacement of the edges is
+    # stated yet.
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
         return _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
-        return edges  # a flank that is cut off at the end of the scale is none of these
+        return edges  # the models do not describe a flank that is clipped at the end of the scale
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
         return sharp
     weight = 1.0 / edges.noise_flat**2
@@ -121,9 +125,9 @@ def with_profile(
     bins, enough, steps = fits.bins, fits.enough, fits.of(STEP)
     all_around = np.hypot(1.0, edges.lines.slope)
     is_step = fits.is_step()
-    # Optics of any shape that spread light alike to both sides (a disc of defocus, a halo) are no shadow and no glare.
+    # A profile that symmetric optics of any shape explain (a disc of defocus, a halo) is neither shadow nor glare.
     is_lopsided = not is_step and not _is_symmetric(profiles, steps)
-    # What a model leaves, on both flanks together, and what another must leave more to be clearly worse.
+    # Sum of squared residuals of each model over both flanks, and the difference by which a model is clearly worse.
     left = np.array([fits.squares(kind) for kind in range(4)]) if not is_step else np.full(4, fits.squares(STEP))
     margin = CLEARLY * np.maximum(left / bins, 1.0)
     if is_lopsided:
@@ -134,7 +138,7 @@ def with_profile(
         if left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
             moved = _moved(edges, glare, U_GLARE, all_around, "glare")
             return without_additions(upright, moved, light, GLARE, glare)
-    # Along the picture's border there are lines but no flank.
+    # Lines along the picture's border do not cross a flank.
     outer: list[MeanProfile | None] = [None, None]
     if are_outer_flanks_in_view(edges):
         outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
@@ -148,23 +152,24 @@ def with_profile(
         if is_strip[0] != is_strip[1]:
             return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
-            # Flanks that are broader than the tips: by a wall, or by motion, and nothing here tells which.
+            # The flanks are more blurred than the tips, because of a wall or of motion, which cannot be distinguished
+            # here.
             wall = [
                 best_fit(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
                 for seen, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
             ]
             is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and _are_of_size(wall, -1.0)
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
-        # A wall is there: the edge lies as far off as the fit says, give or take its own doubt.
+        # There is a wall; the edge lies at the fitted distance, within the uncertainty of the fit.
         farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
         unsure = _unsure_of_width(edges, displaced_px)
         if not is_wall:
             return unsure
-        # The shape of a wall that is narrower than the blur does not tell how dark it is: its width alone counts.
+        # The profile of a wall narrower than the blur does not determine its tone, so that only its width is used.
         is_narrow = any(fit.breadth < RESOLVED_BLURS * fit.blur for fit in wall)
         return _unsure(unsure if is_narrow else edges, farthest, "wall")
     if is_lopsided and left[SHADOW] < enough:
-        # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
+        # A shadow, which the inner flanks cannot distinguish from a wall, is also visible on the outer side.
         beyond = np.array(
             [[best_fit(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
         )
@@ -181,8 +186,8 @@ def with_profile(
     ]
     if is_one_sided[0] != is_one_sided[1]:
         return replace(edges, beside=STRIP)
-    # Light from one side casts a shadow beside one finger's inner flank and the other finger's outer one, and nothing
-    # else does. Up to two pixels broad it only widens them: a strip of two equal steps by half of its breadth.
+    # Only light from one side casts a shadow beside one finger's inner flank and the other finger's outer flank. A
+    # shadow up to two pixels wide only increases the blur: a strip of two equal steps by half of its width.
     wider = [step.blur**2 - width**2 for step, width in zip(steps, widths, strict=True)]
     if min(wider) < -ONE_SIDED * min(step.blur for step in steps) ** 2 and max(wider) > ONE_SIDED * min(widths) ** 2:
         return _unsure(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
@@ -202,13 +207,14 @@ def with_profile(
         return edges
     wall, glare = fits.of(WALL), fits.of(GLARE)
     if not is_lopsided and left[GLARE] < enough and _are_of_size(glare, 1.0):
-        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of light hides in such optics, or none
+        # With such optics, it is not known whether there is a bright line.
+        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:
             return _unsure(edges, [abs(fit.position) for fit in glare], "glare")
         return edges
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
     if not is_lopsided or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
         return edges
-    # Glare on the finger, or a bevel around it: the outline is in between.
+    # The bright line is glare on the finger, or a bevel around it; the outline lies between the two positions.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
     moved = _moved(edges, glare, U_GLARE, all_around, "glare")
     moved = without_additions(upright, moved, light, GLARE, glare)

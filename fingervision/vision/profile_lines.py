@@ -16,20 +16,20 @@ from fingervision.vision.fingers import CoarseFinger
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# Places for each side of a finger. A longer side is thinned out.
+# Number of array entries for each side of a finger; longer sides are thinned out.
 INNER, OUTER, TIP = 72, 20, 76
 ROWS = INNER + OUTER
 PLACES = ROWS + TIP
 IS_ROW = np.arange(PLACES) < ROWS
 IS_INNER = np.arange(PLACES) < INNER
-# The sides of a finger, and which one each place belongs to.
+# Sides of a finger, and the side to which each array entry belongs.
 INNER_SIDE, TIP_SIDE, OUTER_SIDE = range(3)
 SIDE = np.where(IS_ROW, np.where(IS_INNER, INNER_SIDE, OUTER_SIDE), TIP_SIDE)
-# Outline slopes are taken over so many rows or columns to either side.
+# Number of rows or columns on either side over which slopes of the outline are computed.
 SLOPE_REACH_PX = 4
-# Just below 45 degrees, so that no piece of the outline is seen both in rows and in columns.
+# Slope of a tip just below 45 degrees, so that no part of the outline is used both in rows and in columns.
 SLOPE_OF_A_TIP = 0.999
-# Beyond every picture (pixels).
+# Coordinate beyond every picture (pixels).
 FAR = 10**9
 
 _fill = loop("profile_lines_fill")

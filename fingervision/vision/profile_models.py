@@ -14,25 +14,27 @@ from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
-# What the profile is made of beside the step.
-# A shadow falls off along a straight line (SHADOW) or as an exponential (FADING): real penumbras lie between the two.
+# Models of the structure beside the step. A shadow decreases linearly (SHADOW) or exponentially (FADING); real
+# penumbras lie between the two.
 STEP, WALL, SHADOW, GLARE, FADING = range(5)
-# Where the search for the breadth of each begins (pixels), and the limits within which it stays.
+# Starting values and limits of the width in each model (pixels).
 STARTS_PX = ((0.0,), (1.5, 3.0, 5.0), (4.0, 8.0, 14.0), (1.0, 2.5, 4.5), (2.0, 4.0, 8.0))
 LIMITS_PX = ((0.0, 0.0), (0.8, 10.0), (2.0, 24.0), (0.5, 8.0), (1.0, 16.0))
-# Sharpening, and the tails of real optics, add an odd part: a step of this many times the blur less the step itself.
+# Sharpening and the tails of real optics add an antisymmetric part: a step with this multiple of the blur minus the
+# step itself.
 TAIL_BLURS = 2.2
-# Blur of the optics, the pixel included, stays within these limits (pixels).
+# Limits of the blur, including the pixel's width (pixels).
 LEAST_BLUR_PX, LARGEST_BLUR_PX = 0.3, 5.0
-# The edge is looked for so far from where the single step was found (pixels).
+# Largest distance of the edge from the fitted single step (pixels).
 FARTHEST_PX = 7.0
-# Level, contrast, tail, addition; position, blur and breadth.
+# Number of linear parameters (level, contrast, tail, added structure), and of all parameters (also position, blur and
+# width).
 LINEAR, PARAMETERS = 4, 7
 POSITION, BLUR, BREADTH = 4, 5, 6
 ITERATIONS, SETTLED = 40, 1e-7
-# A fit that leaves too many squares to be chosen goes on only while every step takes this share of them away.
+# Least relative reduction of the sum of squares per step, below which a fit that will not be chosen is stopped.
 SLOW = 0.01
-# Blur as the picture's other edges tell it (standard uncertainty, relative).
+# Relative standard uncertainty of the blur taken from the picture's other edges.
 U_BLUR = 0.1
 
 _addition = loop("profile_models_addition")
@@ -106,6 +108,6 @@ def fit_profile(
     limits = LIMITS_PX[kind]
     is_fitted, *fit = _fit_profile(kind, t, value, weight, blur, start, bool(is_blur_known), *limits, too_many)
     if not is_fitted:
-        msg = "the parts of the profile's model cannot be told apart"
+        msg = "the parts of the profile's model cannot be distinguished"
         raise np.linalg.LinAlgError(msg)
     return ProfileFit(*fit)

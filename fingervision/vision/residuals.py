@@ -13,31 +13,33 @@ from fingervision.vision.outline_points import OutlinePoints
 
 Floats = NDArray[np.float64]
 
-# Neighbouring points share what the model leaves unexplained, and a codec's blocks, over so many of them.
+# Largest lag (points) at which correlations of the residuals are used; neighbouring points have errors of the model and
+# of a codec's blocks in common.
 LAGS = 8
-# Points over which a codec shares its errors, beside what it does to a flank as a whole (`coding_error`): measured on
-# clips of a moving gripper at 1 to 8 Mbit/s and on JPEG of quality 70 to 95 (`tests/benchmarks/accuracy.py --only
-# jpeg`,
-# `python -m tests.benchmarks.compressed_video`).
+# Number of neighbouring points that have a codec error in common, in addition to the displacement of a whole flank
+# (`coding_error`). Measured on videos of a moving gripper at 1 to 8 Mbit/s and on JPEG of quality 70 to 95
+# (`tests/benchmarks/accuracy.py --only jpeg`, `python -m tests.benchmarks.compressed_video`).
 SHARED_POINTS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 4.0}
-# Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
+# Ratio of the weighted to the true variance of normal residuals under the biweight (mean of w r^2 / mean of w).
 BIWEIGHT_SPREAD = 0.828
-# The three-sided shape holds where its mean residual near the two points that matter is below so many of its own sigma.
+# Largest mean residual near the measuring point and near the tip, in its standard uncertainties, at which the
+# three-sided shape is accepted; largest misfit.
 SHAPE_LIMIT, MISFIT_LIMIT = 3.5, 2.5
-# So much of a finger's end, seen closely, are straight flanks; a round thing has next to nothing of them.
+# Least share of straight flanks in a fitted outline; a round object has almost none.
 FLANKS_SHARE = 0.05
-# Residuals within so many pixels of a point speak of the shape there.
+# Distance (pixels) from a point within which residuals are used to test the shape, and least number of points.
 SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
-# Dust covers less than this share of the outline near the measuring point: what is more is the finger's own shape. A
-# point counts that has at least this weight.
+# Share of rejected points near the measuring point above which they are not dust but the finger's shape; weight below
+# which a point counts as rejected.
 MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
-# Where most of the points within so many pixels above or below the measuring point are rejected, or half of them on
-# both sides, they may be the finger's own edge (a corner that is cut off, a bend) and not dust.
+# Distance above and below the measuring point (pixels) in which rejected points may be the finger's own edge (a
+# chamfer, a bend) instead of dust: most points on one side are rejected, or half of the points on both sides.
 BESIDE_PX = 4.0
-# Blur draws a sharp corner back from its vertex by 0.77 sigma, and 1.1 sigma at a turn of 120 degrees: a tip that lies
-# higher above every point than that and half a pixel is none.
+# Largest height of a tip above every point (in sigma, plus pixels). Blur moves the half-level of a sharp right-angled
+# corner away from the vertex by 0.77 sigma, and by 1.1 sigma at a turn of 120 degrees.
 TIP_BEYOND_IN_BLURS, TIP_BEYOND_PX = 1.5, 0.5
-# A measuring point farther from every point of the outline would be extrapolated (pixels).
+# Largest distance of the measuring point from the nearest point of the outline (pixels), beyond which it would be
+# extrapolated.
 FARTHEST_POINT_PX = 2.5
 
 _shared = loop("residuals_shared")

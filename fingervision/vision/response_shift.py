@@ -13,13 +13,13 @@ from fingervision.vision.edges import EdgePoints
 
 Floats = NDArray[np.float64]
 
-# The shift changes slowly: it is worked out for levels in steps of this share of full scale, and for blurs in steps of
-# this ratio, so that a steady recording asks once. Each step changes it by less than a twentieth.
+# Step of the levels (share of full scale) and ratio of the blurs for which shifts are computed and stored; one step
+# changes the shift by less than 5 %.
 LEVEL_STEP, BLUR_RATIO = 1.0 / 64.0, 1.05
-# Sub-pixel positions over which the shift is averaged, and looks of Gauss-Newton at each.
+# Sub-pixel positions over which the shift is averaged, and number of Gauss-Newton steps at each position.
 PHASES_PX = np.array([-0.375, -0.125, 0.125, 0.375])
 LOOKS = 8
-# Light and levels are compared in so many steps of full scale.
+# Number of steps in which light and levels are tabulated.
 STEPS = 4096
 
 
@@ -69,7 +69,8 @@ def _shift(assumed: str, other: str, inside: int, outside: int, blur: int) -> fl
         standard_response(name).table(STEPS - 1, STEPS) / (STEPS - 1) for name in (assumed, other)
     )
     plateaus = np.array([inside, outside]) * LEVEL_STEP
-    # From assumed light to the stored level, and on to the other response's light; and back.
+    # Conversion from the light under the assumed response to stored levels, and on to the light under the other
+    # response; and back.
     there = np.interp(np.interp(plateaus, assumed_light, shares), shares, other_light)
     reach = reach_for(float(np.sqrt(sigma**2 + PIXEL_VARIANCE)))
     borders = np.arange(-reach - 0.5, reach + 1.0) - PHASES_PX[:, None]

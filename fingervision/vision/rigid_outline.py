@@ -140,7 +140,7 @@ def capture_rigid(
     shift, angle = start
     for level in range(len(pyramid), 0, -1):
         scale = 0.5**level
-        # The middle of a pixel of the halved picture lies between those of two.
+        # The centre of a pixel of the halved picture lies between the centres of two original pixels.
         offset = 0.5 * scale - 0.5
         small = Chunks(chunks.middles * scale + offset, chunks.normals, max(chunks.half_length * scale, 2.0))
         coarse = replace(view, flat=None if view.flat is None else _Halved(view.flat, scale, offset), outward_px=0.0)
@@ -191,8 +191,8 @@ def _rigid(
     nx, ny = chunks.normals[:, used]
     rigid = np.stack([nx, ny, -nx * arm[1] + ny * arm[0]], axis=1)
     doubtful = doubtful_offsets(chunks.middles[:, used], chunks.normals[:, used], edges.blur[used], edges.u_blur[used])
-    # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance;
-    # a doubtful side has an offset of its own. Of each of these it is known how large it may be.
+    # Errors with a known standard uncertainty: an edge bias, which is a common offset of all chunks; a size error,
+    # which moves each chunk in proportion to its distance; and a separate offset of each doubtful side.
     shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
     columns = np.hstack([rigid, shared * (view.u_outward_px, view.u_size), doubtful])
     prior = np.diag([0.0] * 3 + [1.0] * (columns.shape[1] - 3))
@@ -216,7 +216,8 @@ def _rigid(
     kept = weight > 0.0
     if kept.sum() < max(FEWEST, LEAST_SHARE * edges.in_view.sum()):
         return None
-    # What errors of known size take up is none of the noise, and costs their own square.
+    # The part of the offsets that these errors explain does not count as noise; their normalised squares are added
+    # instead.
     left_over = float(np.sum(weight * rest**2)) + float(move[3:] @ move[3:])
     spread = max(1.0, left_over / max(float(weight.sum()) - 3.0, 1.0))
     inverse = np.linalg.inv(normal)

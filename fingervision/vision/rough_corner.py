@@ -1,4 +1,4 @@
-"""Corner of a rough finger: a fillet or a straight cut, which roughness may make indistinguishable.
+"""Corner of a rough finger: a fillet or a chamfer (a straight cut), which roughness may make indistinguishable.
 
 A fillet of radius R and a straight cut whose legs are 0.655 R remove the same area from a corner, and nowhere differ by
 more than 0.06 R. If roughness hides this difference, the measuring point is the mean over both shapes, each weighted by
@@ -20,16 +20,17 @@ from fingervision.vision.polygon import Polygon, Side
 
 Floats = NDArray[np.float64]
 
-# Legs of the cut that are tried, in radii of the fillet: about that of equal area, sqrt(2 - pi / 2), in steps that move
-# the edge by less than roughness does.
+# Legs of the chamfer that are tried, in radii of the fillet: values around sqrt(2 - pi / 2), which gives an equal area,
+# in steps that move the edge by less than roughness does.
 LEGS = tuple(np.linspace(0.5, 0.85, 15).tolist())
-# A fillet so small (pixels) lies above the measuring height, cut or not.
+# Radius (pixels) below which a fillet or chamfer lies above the measuring height.
 SMALLEST_PX = 3.0
-# Points within so many radii of a corner's vertex tell its shape; a stray point has no more say than this (sigma).
+# Distance from a corner's vertex (in radii) within which points are used to compare the shapes, and largest residual of
+# a point (in sigma), to limit the effect of outliers.
 NEAR_RADII, MOST_SIGMAS = 1.3, 3.0
-# A top that rises by less than this from end to end (pixels) is level.
+# Largest difference in height between the ends of a level top (pixels).
 LEVEL_PX = 0.5
-# Both fingers have corners of the same kind, so that their errors add up: twice the variance of either covers that.
+# Factor on the variance of each finger, because both fingers have corners of the same kind and hence equal errors.
 BOTH_ALIKE = 2.0
 LEVEL_TOP = 2
 
@@ -46,13 +47,13 @@ def with_corner_doubt(
     Parameters
     ----------
     points : list of OutlinePoints
-        Of both fingers, their uncertainties with the roughness.
+        Points of both fingers, with uncertainties that include the roughness.
     ends : list of FingerEnd
-        The shapes with fillets that were fitted to them.
+        Shapes with fillets that were fitted to the points.
     found : list of MeasuringPoint
-        Read off these.
+        Measuring points of these shapes.
     below_tip_px : float
-        Height of measuring below the tips.
+        Distance of the measuring points below the tips.
     shared_px : float
         Length of edge that counts as one independent point.
     """
@@ -60,7 +61,7 @@ def with_corner_doubt(
     for p, end in zip(points, ends, strict=True):
         tried = [_cut(p, end, leg, below_tip_px, shared_px) for leg in LEGS]
         cuts = np.array([each for each in tried if each is not None])
-        if not len(cuts):  # no corner that could be cut
+        if not len(cuts):  # no corner that could be chamfered
             return found
         least = float(cuts[:, 0].min())
         likely = np.exp(0.5 * (least - cuts[:, 0]))
@@ -72,7 +73,8 @@ def with_corner_doubt(
         fillet, mean = np.array((own.tip, own.edge)), likely @ cut
         way = mean - fillet
         among_legs = (cut - mean).T @ (likely[:, None] * (cut - mean))
-        step = (cut[-1] - cut[0]) / max(len(cut) - 1, 1)  # legs lie so far apart: a rectangular distribution
+        # Variance of a rectangular distribution over the spacing of the legs.
+        step = (cut[-1] - cut[0]) / max(len(cut) - 1, 1)
         among_legs += np.outer(step, step) / 12.0
         between = BOTH_ALIKE * share * (1.0 - share) * np.outer(way, way)
         tip, edge = fillet + share * way
@@ -84,7 +86,7 @@ def with_corner_doubt(
 def _cut(
     points: OutlinePoints, end: FingerEnd, leg: float, below_tip_px: float, shared_px: float
 ) -> tuple[float, float, float] | None:
-    """Chi-square of cut corners minus that of fillets, and tip and edge of the cut finger; None if not cut."""
+    """Chi-square of chamfers minus that of fillets, and tip and edge of the chamfered finger; None without chamfer."""
     p, (x0, y0) = end.parameters, end.origin
     if p[INNER_R] < SMALLEST_PX:
         return None
@@ -117,7 +119,7 @@ def _cut(
         near = np.hypot(points.x - x, points.y - y) < NEAR_RADII * max(radius, SMALLEST_PX)
         if not near.any():
             continue
-        # So many points of this stretch of outline share their errors.
+        # Number of points in this stretch of outline that have an error in common.
         stretch = (2.0 * NEAR_RADII - 0.43) * radius
         alike = max(shared_px * float(np.count_nonzero(near)) / max(stretch, 1.0), 1.0)
         cut, fillet = np.abs(away[near] / normal_u[near]), np.abs(end.residual[near])

@@ -25,23 +25,23 @@ from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE
 
 Floats = NDArray[np.float64]
 
-# Standard deviations (pixels, in steps of a fifth: as well as some thirty waves tell it) and lengths (pixels along the
-# edge) that are tried. Blur of 1 px makes whatever lies along an edge alike over 2 sqrt(pi) px, which is the integral
-# of the correlation for a length of 1.5: shorter ones look like white noise where points lie far apart, and would give
-# that too much weight. Longer waves than the longest are the finger's shape.
+# Standard deviations (pixels) and correlation lengths (pixels along the edge) that are tried. The standard deviations
+# differ by a fifth, the precision with which about thirty waves determine them. A blur of 1 px correlates an edge over
+# 2 sqrt(pi) px, the integral of the correlation for a length of 1.5; shorter lengths would be indistinguishable from
+# white noise. Waves longer than the largest length belong to the finger's shape.
 DEVIATIONS_PX = np.geomspace(0.03, 0.9, 18)
 LENGTHS_PX = np.array([1.5, 2.3, 3.5, 5.3, 8.0, 12.0])
-# Each flank has its own level, slope and curvature. It needs so many points, and of more than so many every second one
-# is looked at, or every third.
+# Number of parameters of each flank (level, slope and curvature), least number of its points, and number of points
+# above which only every second or third point is used.
 OWN, FEWEST_POINTS, MOST_POINTS = 3, 12, 40
-# Points whose residuals about a shape spread by more than this (in units of their own uncertainty) are looked at, and
-# roughness that is not this much likelier than none (logarithm; about four standard uncertainties) is none. It may yet
-# be, where it is likelier by more than its two parameters explain by chance (Akaike, doi:10.1109/TAC.1974.1100705).
+# Spread of the residuals (in units of the points' uncertainties) above which roughness is estimated; logarithm of the
+# likelihood ratio above which roughness is significant (about four standard uncertainties), and above which it is
+# possible (more than two parameters explain by chance; Akaike, doi:10.1109/TAC.1974.1100705).
 SUSPECT, SIGNIFICANT, POSSIBLE = 1.5, 8.0, 2.0
-# The covariance is tabulated for whole pixels of distance up to so many.
+# Largest distance (pixels) for which the covariance is tabulated.
 FARTHEST_PX = 64
 
-# Steps to the best linear estimate, from a robust fit near it, and the weight that stands for none.
+# Number of Gauss-Newton steps from the robust fit to the best linear estimate, and weight that is regarded as zero.
 STEPS, LEAST_WEIGHT = 5, 1e-4
 
 _likelihood = loop("roughness_likelihood")
@@ -58,7 +58,7 @@ class Roughness:
         Covariance of the normal deviations of two points of the edge, by their distance in whole pixels (pixels
         squared).
     is_told : bool
-        Whether the flanks tell that there is any; False where they are too short to tell.
+        Whether the flanks show the roughness significantly; False if they are too short to decide.
     """
 
     covariance: Floats
@@ -141,15 +141,15 @@ def best_linear(
     """The finger end of least variance under deviations correlated along the edge (generalised least squares).
 
     The best linear unbiased estimate (Aitken, Proc. R. Soc. Edinburgh 55, 1936, 42, doi:10.1017/S0370164600014346) by
-    Gauss-Newton steps from the robust fit. What that fit set aside (dust) stays aside, and a point of less weight has a
-    variance of its own that is larger in proportion.
+    Gauss-Newton steps from the robust fit. Points that the robust fit rejected (dust) stay rejected, and the own
+    variance of a point with a smaller weight is increased in proportion.
 
     Parameters
     ----------
     points, end : OutlinePoints, FingerEnd
         Points whose uncertainties include roughness, and the shape fitted to them.
     start, u_prior : ndarray of float, shape (8,)
-        Means and standard uncertainties of the weak priors of that fit.
+        Means and standard uncertainties of the weak priors of the robust fit.
     bare : OutlinePoints
         The same points with the uncertainty of their own noise only.
     found : Roughness
@@ -160,7 +160,8 @@ def best_linear(
     errors = np.empty((x.size, x.size))
     _errors(x, y, points.u * slant, bare.u * slant, found.covariance, errors)
     errors[np.diag_indices(x.size)] += 1.0 / np.maximum(end.robust, LEAST_WEIGHT) - 1.0
-    # No combination of points is surer than their own noise: rounding of the tabulated covariance may say so.
+    # The variance of a combination of points is at least that of their own noise; rounding of the tabulated covariance
+    # may give less.
     with _blas().limit(limits=1, user_api="blas"):
         values, vectors = np.linalg.eigh(errors)
     whitening = vectors / np.sqrt(np.maximum(values, float(np.min((bare.u / points.u) ** 2))))
@@ -177,7 +178,7 @@ def best_linear(
 
 @lru_cache(maxsize=1)
 def _blas() -> ThreadpoolController:
-    """Control of the linear algebra's threads: the others would wait busily, for four times the work of one."""
+    """Control of the linear algebra's threads; further threads would wait busily, with four times the work of one."""
     return ThreadpoolController()
 
 

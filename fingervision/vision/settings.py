@@ -6,7 +6,7 @@ from calib.camera_response import CameraResponse, standard_response
 from fingervision.domain.direction import Direction
 from fingervision.domain.region import Region
 
-# What is taken of a camera that says nothing, and what it may be as well.
+# Response assumed for a camera that does not state its response, and the other possible response.
 LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
 
 

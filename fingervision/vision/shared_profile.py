@@ -23,15 +23,16 @@ from fingervision.vision.profile_lines import INNER, ROWS
 Floats = NDArray[np.float64]
 
 FLANKS = (slice(0, INNER), slice(INNER, ROWS))
-# A flank has so many rows, which lean by less than this (change of the edge from row to row).
+# Least number of rows of a flank, and largest slope (change of the edge from row to row).
 FEWEST_ROWS, STEEPEST = 8, 0.3
-# Of a window's pixels so many are taken up by level, contrast, position and (shared by all rows) blur.
+# Number of degrees of freedom of a window that the fit absorbs: level, contrast, position and blur; and without the
+# blur, which is common to all rows.
 FITTED, FITTED_BY_ROW = 4, 3
-# Even profiles: variance of the mean over that of rows with noise of their own, beyond which it is no chance. In 99.9 %
-# of pictures without anything shared the mean over four flanks of four even profiles each is below this (chi-square of
-# 16), and the whole profile's below the first.
+# Ratios of the mean profile's variance to that expected for rows with independent noise, above which the mean profile
+# is significant: for the whole profile, and for its even part. In 99.9 % of pictures without common errors, the mean
+# over four flanks is below these limits (for four even profiles each: chi-square of 16).
 LEAST_WHOLE, LEAST_EVEN = 1.5, 2.45
-# Profiles that the fit takes up but for this share of their power say nothing.
+# Least share of a profile's power that the fit does not absorb; profiles with less are not used.
 LEAST_OWN = 1e-3
 
 _mean = loop("shared_profile_mean")

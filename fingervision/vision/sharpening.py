@@ -19,21 +19,22 @@ from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
-# A response is curved where half-way in levels lies so far from half-way in light (share of the range).
+# Least curvature of a response: distance between the light at half of the levels' range and half of the light, as a
+# share of the range.
 CURVED = 0.02
-# The profile is modelled on a grid of so many pixels' spacing, so far to either side.
+# Spacing and extent to either side of the grid on which the profile is modelled (pixels).
 GRID_PX, REACH_PX = 0.25, 20.0
-# Starts: amount of the mask and its radius (pixels). Cameras use radii near one pixel: the logarithm is that of one
-# pixel within so much (standard deviation), the amount is moderate within so much, because one profile tells blur,
-# amount and radius apart but badly. Limits of position (pixels), blur, amount and logarithm of the radius.
+# Starting value of the mask's amount; standard deviations of the priors of the radius's logarithm (about one pixel, as
+# in usual cameras) and of the amount. The priors are needed because a single profile hardly distinguishes blur, amount
+# and radius. Limits of the two positions (pixels), blur, amount and logarithm of the radius.
 START_AMOUNT, U_LOG_RADIUS, U_AMOUNT = 0.4, 0.2, 0.5
 LEAST = np.array([-5.0, -5.0, 0.3, -0.2, -0.7])
 MOST = np.array([5.0, 5.0, 5.0, 3.0, 1.4])
 BLUR, AMOUNT, LOG_RADIUS = 2, 3, 4
 ITERATIONS, STEP, SETTLED = 12, 1e-3, 1e-4
-# A mask is there where it explains so many times the variance that is left, and adds so much to a step.
+# A mask is significant if it explains this multiple of the remaining variance and has this least amount.
 SIGNIFICANT, LEAST_AMOUNT = 12.0, 0.1
-# Cameras' masks are not quite Gaussian: this share of the shift is its standard uncertainty.
+# Relative standard uncertainty of the shift, because real masks are not exactly Gaussian.
 U_SHIFT = 0.4
 
 _soften = loop("sharpening_softened")

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
-# The spline's kernel z^|k|, z = sqrt(3) - 2, has fallen to 4e-5 after eight pixels.
+# Number of pixels after which the spline's kernel z^|k|, z = sqrt(3) - 2, has decreased to 4e-5; number of pixels on
+# either side that a spline uses.
 KERNEL_REACH, SPLINE_REACH = 8, 2
 
 

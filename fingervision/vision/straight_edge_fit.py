@@ -16,35 +16,37 @@ from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
-# The band reaches so many standard deviations of the blur, and so many pixels more, to either side of an edge, as in
-# `calib.edge_spread`: the wider it is, the less the unknown levels cost.
+# Extent of the band on either side of an edge: this multiple of the blur plus these pixels, as in `calib.edge_spread`.
+# In a wider band, the unknown levels contribute less to the uncertainty.
 REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 4.0
-# Blur is looked for within these limits (pixels), as there; edges beyond 5 px are refused by whoever asks.
+# Limits of the fitted blur (pixels); the calling functions refuse edges with a blur above 5 px.
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
-# Gauss-Newton: steps are limited to where the model is nearly linear. They shrink quadratically: after one of 0.005 px
-# less than 1e-4 px is left.
+# Largest steps of the Gauss-Newton iteration (pixels, slope), within which the model is nearly linear; step at which
+# the iteration ends (pixels), with a remaining error below 1e-4 px; largest number of steps.
 LARGEST_STEP_PX, LARGEST_TURN, SETTLED_PX, ITERATIONS = 1.0, 0.1, 5e-3, 25
-# No edge has less contrast (grey levels); columns that are alike to rounding are told apart by this share.
+# Least contrast of an edge (grey levels), and relative regularisation for columns that are equal within rounding.
 LEAST_CONTRAST, RIDGE = 1e-3, 1e-9
-# What is cut off a step is looked for by the bend that the loss of its upper tenth makes.
+# Lost share of a step whose effect on the profile is used to detect clipping.
 CUT = 0.1
-# Variance of rounding to whole grey levels: no noise is smaller.
+# Variance of rounding to whole grey levels, the least noise.
 ROUNDING = 1.0 / 12.0
-# Residuals are looked at in so many pieces along the edge; a scatter of the pieces' own shifts beyond the 99.9 %
-# quantile of its chi-square is roughness or a bend, and widens the uncertainty.
+# Number of pieces along the edge in which residuals are examined; a scatter of the pieces' shifts beyond the 99.9 %
+# quantile of chi-square means roughness or a bend, and increases the uncertainty.
 PIECES = 8
 CHI_SQUARE_999 = (0.0, 10.83, 13.82, 16.27, 18.47, 20.52, 22.46, 24.32, 26.12)
-# A core window of so many sigma sees another position where the profile is not a blurred step; a difference beyond so
-# many of its own standard deviations (Hausman, Econometrica 46(6), 1978, doi:10.2307/1913827) is added in square.
+# Half width of a core window (in sigma), whose fitted position differs if the profile is not a blurred step; a
+# difference beyond this number of its standard deviations (Hausman, Econometrica 46(6), 1978, doi:10.2307/1913827) is
+# added to the uncertainty in quadrature.
 CORE_SIGMAS, HAUSMAN = 1.2, 3.0
-# Neighbouring pixels' residuals are correlated where this exceeds so many standard errors.
+# Number of standard errors above which the correlation of neighbouring pixels' residuals is significant.
 CORRELATED = 3.5
 LAGS = ((0, 1), (1, 0), (1, 1), (1, -1), (0, 2), (2, 0))
-# So many are fitted together: the two of a pair, and what may stand beside them, are four.
+# Largest number of edges that are fitted together; a pair with its neighbours has four.
 MOST_EDGES = 6
-# Why no edges were fitted, as `straight_edge_fit.c` counts it.
+# Reasons why no edges were fitted, by the return code of `straight_edge_fit.c`.
 WHY_NOT = (
-    "", "too few pixels", "there is no contrast", "the fit does not settle", "the pixels do not determine the edges"
+    "", "the zone has too few pixels", "the zone has no contrast", "the fit does not converge", "the pixels do not "
+    "determine the edges"
 )  # fmt: skip
 
 _edges = loop("straight_edge_fit_edges")
@@ -206,7 +208,7 @@ def fit_straight_edges(
     known = all(each.contrast is not None for each in starts)
     count = len(starts)
     if not 0 < count <= MOST_EDGES:
-        raise NoEdgeFitError(f"between 1 and {MOST_EDGES} edges can be fitted together, but {count} were asked for")
+        raise NoEdgeFitError(f"between 1 and {MOST_EDGES} edges can be fitted together, but {count} were requested")
     guesses = [(each.position_px, each.slope, each.contrast or 0.0) for each in starts]
     state = np.ascontiguousarray(np.array(guesses).T)
     covariance, told = np.empty((2 * count, 2 * count)), np.empty(7)

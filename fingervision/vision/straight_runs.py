@@ -13,13 +13,14 @@ from fingervision.domain.loops import loop
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# A run has so many points at least; the noise is that of as many points about lines of their own.
+# Least number of points of a run; the noise is estimated from lines through the same number of neighbouring points.
 FEWEST_POINTS = 5
-# A further run must explain this much chi-square more: odds of e^12 to one, less what its three parameters take up.
+# Least reduction of chi-square by a further run: odds of e^12 to one, plus the three parameters of the run.
 PRICE_OF_RUN = 27.0
-# A point that is left out costs so much: beyond 2.5 standard deviations it is better left out.
+# Penalty (chi-square) for a point that is left out; points beyond about 2.5 standard deviations are left out.
 PRICE_OF_POINT = 6.0
-# Median over mean of chi-square with three degrees of freedom, of the windows that the noise is taken from.
+# Ratio of the median to the mean of chi-square with three degrees of freedom, for the windows from which the noise is
+# estimated.
 MEDIAN_OF_CHI_SQUARE = 0.79
 
 

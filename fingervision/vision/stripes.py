@@ -19,12 +19,13 @@ from fingervision.vision.profile_lines import ROWS
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# A stripe is fitted as one where its edges are nearer than so many sigma of the blur.
+# Distance of the two edges (in sigma of the blur) below which they are fitted together as a stripe.
 NEAR_SIGMAS = 7.0
 ITERATIONS = 6
-# The ground between the fingers and that beyond the tips are lit alike to this (standard uncertainty, relative).
+# Relative standard uncertainty with which the background between the fingers is as light as the background beyond the
+# tips.
 U_CONTRAST = 0.015
-# A notch whose sides close in at this slope is left out where it is narrower than so many sigma.
+# Slope of a notch's sides, and width (in sigma) below which such a notch is left out.
 CLOSING_SLOPE, NOTCH_SIGMAS = 0.1, 3.0
 
 
@@ -78,14 +79,14 @@ def with_stripes(upright: GreyImage, edges: EdgePoints, light: Floats) -> EdgePo
     )
     position, u_position = edges.position.copy(), edges.u_position.copy()
     position[0, left], position[1, right] = stripes.left, stripes.right
-    # What all rows share must not average out over them.
+    # The uncertainty that is common to all rows must not average out over the rows.
     u_row = np.hypot(stripes.u_noise, stripes.u_shared * np.sqrt(len(left)))
     u_position[0, left] = u_position[1, right] = u_row
     contrasts = edges.contrast.copy()
     contrasts[0, left] = contrasts[1, right] = contrast
     gain = edges.curvature_gain.copy()
     gain[0, left] = gain[1, right] = curvature_gain(slope, (reach + 0.5 * gap[near]) / sigma)
-    # Where a notch closes, the fingers overlap just below: what blur brings up from there belongs to neither edge.
+    # Near the end of a notch, blur mixes in light from the overlapping fingers below, which belongs to neither edge.
     weight = lines.weight.copy()
     closes = (slope > CLOSING_SLOPE) & (stripes.right - stripes.left < NOTCH_SIGMAS * sigma)
     weight[0, left[closes]] = weight[1, right[closes]] = 0.0

@@ -10,12 +10,12 @@ from scipy.special import ndtr
 
 Floats = NDArray[np.float64]
 
-# The odd part is free in steps of half a blur (and no less than half a pixel, which is what a bin holds), out to
-# five blurs on either side.
+# Steps of the free antisymmetric part: half a blur, at least half a pixel (the width of a bin), and their number on
+# either side, up to five blurs.
 STEP_IN_BLURS, LEAST_STEP_PX, STEPS = 0.5, 0.5, 10
-# Gauss-Newton over the edge's place, which a symmetric profile has near its half-level.
+# Number of Gauss-Newton steps for the position of the edge, starting from the half-level.
 LOOKS = 4
-# The edge's place is looked for within so much of the single step's (pixels).
+# Largest distance of the edge from the fitted single step (pixels).
 FARTHEST_PX = 1.0
 
 

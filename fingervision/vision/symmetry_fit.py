@@ -19,9 +19,9 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
 ITERATIONS, SETTLED_PX, LARGEST_STEP_PX = 20, 2e-3, 1.0
-# Derivatives by the five-point formula, right to the fourth order: the three-point one takes a tenth off the gradients
-# of an edge that is spread by a pixel, and the uncertainty would be as much too large. Pixels that it needs beyond the
-# window, and its variance for unit noise.
+# Number of pixels beyond the window that the five-point formula for derivatives needs, and its variance for unit noise.
+# The three-point formula would underestimate the gradients of an edge with a blur of one pixel by a tenth, and
+# overestimate the uncertainty accordingly.
 RIM, DIFFERENCE_POWER = 2, 130.0 / 144.0
 
 
@@ -91,7 +91,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
         across, down = (-y, x) if turned else (x, y)
         px, py = (across + np.float32(at_x)).reshape(1, -1), (down + np.float32(at_y)).reshape(1, -1)
         if px.min() < 2 or py.min() < 2 or px.max() >= width - 3 or py.max() >= height - 3:
-            raise NoSymmetryError("the marker is partly outside its search region")
+            raise NoSymmetryError("the mark lies partly outside its search zone")
         return sampled(flat, begin, width, px, py).reshape(size + 2 * RIM, size + 2 * RIM)
 
     for _iteration in range(ITERATIONS):
@@ -103,7 +103,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
         odd -= (odd @ basis.T) @ basis
         normal = odd @ odd.T
         if np.linalg.det(normal) <= 0.0:
-            raise NoSymmetryError("there is no contrast")
+            raise NoSymmetryError("the mark has no contrast")
         step = -np.linalg.solve(normal, odd @ difference)
         length = float(np.hypot(*step))
         step *= min(1.0, LARGEST_STEP_PX / max(length, 1e-12))
@@ -126,7 +126,7 @@ def _judged(
     normal, difference = solved
     inner = (slice(RIM, -RIM), slice(RIM, -RIM))
     y, x = np.mgrid[-half_px : half_px + 1, -half_px : half_px + 1]
-    # Square windows show a round thing's corners: only the disc within is compared.
+    # The corners of a square window are not compared, only the disc inside it.
     disc = np.hypot(x, y) <= half_px
     basis = np.stack((np.ones(disc.sum()), x[disc], y[disc]))
     levels = _plane_off(seen[inner][disc].astype(np.float64), basis)
@@ -136,7 +136,7 @@ def _judged(
     mean = (np.bincount(ring, levels) / np.maximum(np.bincount(ring), 1))[ring]
     power = max(float(levels @ levels), 1e-12)
     phases = interpolated_power(at[0]) * interpolated_power(at[1])
-    # The difference and its reflection are one and the same: half of the pixels are free.
+    # The difference is antisymmetric about the centre, so that only half of the pixels are independent.
     variance = max(float(np.mean(difference**2)) / 2.0 / phases * difference.size / (difference.size - 8), ROUNDING)
     noisy = np.eye(2) * 2.0 * variance * phases * DIFFERENCE_POWER * difference.size
     true = normal - noisy
@@ -144,7 +144,8 @@ def _judged(
     covariance = np.diag([np.inf, np.inf])
     if np.linalg.eigvalsh(true / np.outer(size, size))[0] > LEAST_INFORMATION:
         own = np.linalg.inv(true)
-        # `normal` sums over all pixels, each pair twice, (2 g)^2 each; the noise of a pair's difference is 2 sigma^2.
+        # `normal` is a sum over all pixels, which counts each pair twice with (2 g)^2, g being the gradient; the noise
+        # variance of a pair's difference is 2 sigma^2.
         covariance = 4.0 * variance * shared_pixels * own @ normal @ own
     return Symmetric(
         at[0], at[1], covariance, float(levels @ reflected) / power,
@@ -163,5 +164,5 @@ def _plane_off(levels: Doubles, basis: Doubles) -> Doubles:
     return np.asarray(levels - np.linalg.lstsq(basis.T, levels, rcond=None)[0] @ basis)
 
 
-# What beyond a mark's window is needed of the picture.
+# Number of pixels beyond a mark's window that the fit needs.
 BEYOND_PX = MARGIN_PX + 2

@@ -10,13 +10,14 @@ from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float32]
 
-# A second place that is so much like the template, as a share of the best one's correlation, may be the thing too.
+# Correlation at a second position, relative to the best match, above which the match is not unique.
 ALIKE_SHARE = 0.8
-# Fisher's z = artanh(r) of a chance correlation of n independent pixels has the standard deviation 1 / sqrt(n - 3)
-# (Fisher, Metron 1, 1921); the largest of a few hundred places stays below 4.5 of these.
+# Number of standard deviations of a chance correlation, which the largest of a few hundred positions does not exceed,
+# and least number of independent pixels. For n independent pixels, Fisher's z = artanh(r) has the standard deviation 1
+# / sqrt(n - 3) (Fisher, Metron 1, 1921).
 CHANCE_SIGMAS, FEWEST_INDEPENDENT = 4.5, 4.0
-# How far beyond the search its surroundings are looked at, to see that the best place's lobe ends: wider than the lobe
-# of a texture of 4 px.
+# Width (pixels) of the border around the searched area in which the correlation must decrease from the best match; it
+# is wider than the correlation peak of a texture of 4 px.
 BEYOND_PX = 5
 
 _best = loop("template_search_best")

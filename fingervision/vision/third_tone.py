@@ -19,17 +19,17 @@ from fingervision.vision.profile_lines import INNER, ROWS
 
 Floats = NDArray[np.float64]
 
-# The profile of a side reaches so far inwards and outwards (pixels), is the median of so many rows, and ends where
-# fewer than so many of them are in the picture and short of the middle of the gap.
+# Extent of a side's profile inwards and outwards (pixels), and largest number of rows whose median it is; it ends where
+# fewer than the last number of rows lie in the picture and in this finger's half of the gap.
 REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
-# A strip ends in a step of at least this share of the edge's contrast within so many pixels; it is not looked for
-# nearer to the edge than the blur reaches.
+# Least step at the end of a strip, as a share of the edge's contrast, within this number of pixels; strips are only
+# searched outside the blur of the edge.
 LEAST_STEP, STEP_PX = 0.12, 6
 
 THIRD_TONE = NoGap(
     Status.NO_FINGERS,
-    "A strip of a third grey level lies along the fingers, such as a shadow or a pad: light the fingers from behind "
-    "or from all sides, so that fingers and background each have a uniform grey level.",
+    "A strip of a third tone (a shadow or a pad) lies along the fingers: light the fingers from behind or from all "
+    "sides, so that fingers and background each have a uniform tone.",
 )
 
 _strips = loop("third_tone_strips")
@@ -55,7 +55,7 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX) for k in range(2)]
     if is_in[0] != is_in[1]:
         k = 0 if is_in[0] else 1
-        # The same shadow falls outside the other finger, if that side is in view.
+        # The same shadow must lie outside the other finger, if this side is in view.
         if outer[1 - k][0] > 0 or not (lines.weight[1 - k, INNER:ROWS] > 0).any():
             return float(inner[k][0])
     if all(is_out) and not any(strip[1] > 0 for strip in outer):

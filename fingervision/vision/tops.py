@@ -9,9 +9,9 @@ from fingervision.domain.loops import loop
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.outlines import Outline, Outlines, in_axes
 
-# A top that is lower than this is noise or dust on an outline, whatever the scale (pixels).
+# Least prominence of a local maximum (pixels); smaller maxima are noise or dust on an outline.
 SMALLEST_PROMINENCE_PX = 5.0
-# Tops beyond this number are texture; the fingers are among the most prominent.
+# Largest number of local maxima; the fingers are among the most prominent maxima.
 MOST_TOPS = 8
 
 _find_tops = loop("tops_find")

@@ -18,16 +18,17 @@ from fingervision.vision.profile_lines import INNER, ROWS
 
 Floats = NDArray[np.float64]
 
-# The inner flank is wider than the outer one, or than the tip, where its variance is larger by this share.
+# Relative excess of the inner flank's squared blur over that of the outer flank, or of the tip, above which the inner
+# flank is wider.
 WIDER = 0.15
-# The same for the flanks of both fingers together, whose noise is less: walls of 1 px add as much.
+# The same excess for the flanks of both fingers together, which have less noise; walls of 1 px cause such an excess.
 BOTH_WIDER = 0.08
-# It is broader by at least so many standard uncertainties as well. 3 in 1000 normal differences are larger; a codec
-# widens a flank now and then by 20 % at the steps of ordinary streams, and no wall is there.
+# Least excess in standard uncertainties, which 3 of 1000 normal differences exceed; without a wall, a codec with usual
+# quantiser steps occasionally widens a flank by 20 %.
 SURE = 3.0
-# A wall that nothing shows but the flank's width has at least this share of the step's light: darker ones are resolved.
+# Least light of a wall, as a share of the step, that is only visible by the flank's width; a darker wall is resolved.
 DARKEST_WALL = 0.2
-# An outer flank has at least this share of the inner one's contrast; along the picture's border there is no step.
+# Least contrast of an outer flank as a share of the inner flank's; the picture's border has no step.
 EDGE_SHARE = 0.3
 
 
@@ -46,7 +47,7 @@ def wall_limits_px(edges: EdgePoints, displaced_px: Displacement) -> list[float]
     Returns
     -------
     list of float or None
-        Of the left and of the right finger (pixels).
+        Largest displacement for the left and for the right finger (pixels).
     """
     if are_outer_flanks_in_view(edges) or not np.any(edges.lines.weight[:, :INNER] > 0):
         return None

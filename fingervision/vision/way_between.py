@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 from fingervision.domain.loops import loop
 from fingervision.vision.outlines import Outline
 
-# (x, y) in the picture.
+# Position (x, y) in the picture.
 Place = tuple[float, float]
 
-# Dust covers no more than so much of the way from one finger to the other.
+# Largest share of the path from one finger to the other that dust may cover.
 DUST_SHARE = 0.25
-# The way begins so many pixels away from each finger.
+# Distance from each finger at which the path begins (pixels).
 END_PX = 3
 
 _inner_crossing = loop("way_between_inner_crossing")

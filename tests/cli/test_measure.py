@@ -112,7 +112,7 @@ def test_a_lossy_clip_is_advised_to_be_lossless(run: Run, tmp_path: Path) -> Non
     write_clip(tmp_path / "lossy.mp4", frames(2), H264())
     code, out, _ = run(tmp_path / "lossy.mp4", *SCALE)
     assert code == 0
-    assert "The recording is lossy (h264)" in out
+    assert "The recording is compressed with loss (h264)" in out
 
 
 def test_images_without_times_leave_them_empty_and_a_rate_gives_them(run: Run, tmp_path: Path) -> None:

@@ -201,7 +201,7 @@ def test_a_frame_without_a_number_says_why() -> None:
     measured = fv.measure(np.full((480, 640), 128, np.uint8), px_per_mm=SCALE)
     assert measured.counts == {"low_contrast": 1}
     assert measured[0].gap_mm is None
-    assert "no number" in repr(measured)
+    assert "no gap" in repr(measured)
     assert "<img" in measured._repr_html_()
 
 

@@ -92,7 +92,7 @@ def test_a_single_ramp_leaves_the_offset_open():
     inside = (ramp.time_s > 8.0) & (ramp.time_s < 20.0)
     refused = find_clock_offset(ramp.time_s[inside], ramp.gap_mm[inside], ramp.drive)
     if isinstance(refused, ClockOffset):  # else it is refused with a reason
-        assert any("no better than" in note for note in refused.notes)
+        assert any("more than one frame" in note for note in refused.notes)
 
 
 @pytest.mark.slow
@@ -160,7 +160,7 @@ def test_a_coarse_encoder_is_said():
     rounded = np.round(one.drive.input_mm / 0.03) * 0.03
     clock = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.drive.time_s, rounded))
     notes = clock.notes if isinstance(clock, ClockOffset) else (clock.words,)
-    assert any("more than a frame" in note or "no better than" in note for note in notes)
+    assert any("more than one frame" in note or "exceed one frame" in note for note in notes)
 
 
 def test_wrong_gaps_here_and_there_do_not_move_it():

@@ -178,7 +178,11 @@ def test_a_stop_keeps_what_was_measured(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_results_of_somebody_else_are_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "gaps.csv").write_text("mine\n")
-    with pytest.raises(OutputError, match=r"already holds gaps\.csv, and no earlier measurement"):
+    with pytest.raises(
+        OutputError,
+        match=r"already contains gaps\.csv, which was not written by an earlier "
+        "measurement",
+    ):
         measure(rendered(opening(1)), Task(BareScale(PX_PER_MM)), tmp_path)
     assert (tmp_path / "gaps.csv").read_text() == "mine\n"
 

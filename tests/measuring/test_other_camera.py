@@ -32,7 +32,7 @@ def video(tmp_path: Path) -> Path:
         ({"video": "video.mkv", "device": {"camera": SETTINGS}}, ""),
         (
             {"video": "video.mkv", "device": {"camera": {**SETTINGS, "focus": "45"}}},
-            "The calibration was made with the camera's focus = 30, but it is 45 now",
+            "The calibration was made with the camera's focus = 30, but now focus is 45",
         ),
         ({"video": "video.mkv", "device": {"camera": {"zoom": "100"}}}, ""),
         ({"video": "another.mkv", "device": {"camera": {"focus": "45"}}}, ""),

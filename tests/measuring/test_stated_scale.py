@@ -87,7 +87,7 @@ def test_an_impossible_uncertainty_is_refused(u: float) -> None:
 
 
 def test_an_uncertainty_without_its_scale_is_refused(clip: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="needs the scale"):
+    with pytest.raises(UsageError, match="no scale is given"):
         fv.measure(clip, u_px_per_mm=0.3)
     with pytest.raises(UsageError, match="belongs to px_per_mm"):
         fv.measure(clip, calibration=tmp_path / "calibration.json", u_px_per_mm=0.3)

@@ -90,7 +90,7 @@ NONSENSE: list[tuple[dict[str, Any], str]] = [
     ({"plane": {"homography": [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}}, "plane.homography must be invertible"),
     ({"budget": []}, "budget must be an object, but is"),
     ({"budget": {"limits": {"plane_mm": {"value": -1.0}}}}, "The limit plane_mm must be a number of zero or more"),
-    ({"budget": {"limits": {"glare": {"value": 1.0}}}}, "budget.limits knows no glare"),
+    ({"budget": {"limits": {"glare": {"value": 1.0}}}}, "budget.limits has an unknown limit, glare"),
     ({"budget": {"parts": []}}, "the covariances of budget.parts must add up to covariance"),
     ({"reference": [{"what": "bar", "size_mm": 0, "u_size_mm": 0}]}, "size_mm must be a positive number, but is 0"),
 ]

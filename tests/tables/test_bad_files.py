@@ -208,7 +208,7 @@ def test_prose_given_as_a_model_is_said_to_be_none(tmp_path: Path) -> None:
     prose = tmp_path / "README.md"
     lines = [f"* part {k}, " + "which has, " * (k % 4) + "a hinge" for k in range(12)]
     prose.write_text("# A gripper\n\n" + "\n".join(lines), encoding="utf-8")
-    with pytest.raises(DataError, match="is no model") as caught:
+    with pytest.raises(DataError, match="is not a model") as caught:
         read_model(prose)
     assert "simulation table" in str(caught.value)
     assert "FMU" in str(caught.value)

@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+from scipy.stats import f as fisher
+
 from fingervision.diagnosis.inference.hypothesis import Explanation
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.independent_values import independent_values
 
 NEEDED = 1.1
 """Factor by which dropping an effect may increase the residual (RMS); an effect that reduces the residual by more is
@@ -15,6 +18,9 @@ kept."""
 AS_MUCH = 2.0**0.5
 """Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
 power, because a richer formula also fits part of that structure."""
+BY_STRUCTURE = 1e-3
+"""Probability with which remaining structure may let one more effect fit as well, above which the effect is dropped:
+that of `verdict.LACK_OF_FIT`."""
 
 
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
@@ -31,6 +37,25 @@ def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
         if less.score - best.score > best.score - rows or needed:
             break
         found = fewer
+    return found
+
+
+def without_fits_to_structure(data: Observations, found: Findings) -> Findings:
+    """Drop effects beyond two that the remaining structure could imitate by chance; the verdict is then *unknown*.
+
+    Beside structure, the noise is no measure of what an effect may gain. The residual without the effect is, and it
+    consists of a few bumps, each many rows long: an F test with as many degrees of freedom as these bumps decides.
+    On one turn of a rotary table, a warming within two seconds and an arc fitted such bumps beside the friction.
+    """
+    while len(found.best.names) > 2 and found.left_over is not None and found.unknown is None:
+        fewer = [_without(found, name) for name in found.best.names]
+        less = min(fewer, key=lambda explanation: explanation.score)
+        power = (_stands(data, found, less) / max(_stands(data, found, found.best), 1e-300)) ** 2
+        freed = _freedom(found.best) - _freedom(less)
+        left = _independent_values(data, less) - _freedom(found.best)
+        if left > 0.0 and fisher.sf((power - 1.0) / freed * left, freed, left) < BY_STRUCTURE:
+            break
+        found = replace(found, best=less, alternatives=(less,), unknown=found.left_over, left_over=None)
     return found
 
 
@@ -68,8 +93,18 @@ def _with_a_line(found: Findings) -> list[Explanation]:
     return out
 
 
+def _independent_values(data: Observations, explanation: Explanation) -> float:
+    history = data.chain.history
+    residual = (data.stacked_mm - data.chain.stacked(explanation.values))[: history.input_mm.size]
+    return independent_values(residual, history.runs)
+
+
 def _stands(data: Observations, found: Findings, explanation: Explanation) -> float:
     return standing_of(data, replace(found, best=explanation, alternatives=(explanation,))).after_mm
+
+
+def _freedom(explanation: Explanation) -> int:
+    return sum(len(values) for values in explanation.values.values())
 
 
 def _without(found: Findings, name: str) -> Explanation:

@@ -8,7 +8,11 @@ from scipy.stats import t as student
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.needed_effects import with_simpler_parts, without_unneeded_effects
+from fingervision.diagnosis.inference.needed_effects import (
+    with_simpler_parts,
+    without_fits_to_structure,
+    without_unneeded_effects,
+)
 from fingervision.diagnosis.inference.position_map import (
     NAME,
 )
@@ -139,7 +143,7 @@ def _beside_drawing(state: Searched, look: Look) -> Searched:
 def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
     """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, without_unneeded_effects(state.data, state.found)
-    found = with_simpler_parts(data, found)
+    found = with_simpler_parts(data, without_fits_to_structure(data, found))
     best, posterior = settled(found.problem, found.best, rng)
     found = _with_best(found, best)
     if data.position_map is not None:

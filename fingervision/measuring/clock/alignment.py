@@ -28,11 +28,12 @@ from fingervision.measuring.clock.rivals import QUICK_PLAYS, fitted, only, unref
 from fingervision.measuring.clock.stated_offset import stated
 
 OUTLIER_SIGMAS = 6.0
-"""Robust standard deviations beyond which a frame's gap counts as wrong and is left out of the fit."""
+"""Number of robust standard deviations beyond which a frame's gap is regarded as wrong and is left out of the fit."""
 CREEP_GAIN = 18.5
-"""Chi-square of four more parameters that chance reaches once in a thousand recordings, a stretch of the recording
-being one datum (`corner_rounding.STRETCHES`): what is wrong about a log is common to the frames of a move, and by
-frames it was taken for creep in 7 of 29 drawn recordings that had none."""
+"""Chi-square of four additional parameters that chance exceeds in one of a thousand recordings. A stretch of the
+recording counts as one datum (`corner_rounding.STRETCHES`), because errors of a log are common to the frames of a move;
+with one datum per frame, creep was found in 7 of 29 simulated recordings without creep.
+"""
 REFINEMENTS = 3
 """Rounds in which noise and fit are estimated alternately; the third round changes an uncertainty by less than a
 tenth."""
@@ -58,8 +59,8 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     found = candidates(time_s, gap_mm, drive)
     if not found:
         return NoClockOffset(
-            "at no offset do the recording and the drive share half of their time and motion: record and log the same "
-            "moves, or state --drive-offset-s."
+            "there is no offset at which the recording and the drive have half of their time and motion in common: "
+            "record and log the same moves, or state --drive-offset-s."
         )
     path = LogPath.of(drive)
     frame_s = float(np.median(np.diff(time_s)))
@@ -96,8 +97,8 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
     """Include creep of the gap in the model if it improves the fit by more than noise would.
 
-    The autoregression takes up what a creep leaves in the residuals, and hides it. The fit is therefore compared with
-    white noise as well, and the noise is estimated again beside the creep.
+    The autoregression would reproduce the residuals that creep causes, and would thus hide the creep. The fits are
+    therefore also compared with white noise, and the noise is estimated again together with the creep.
     """
     for noise in (motion.noise, WHITE):
         without = replace(motion, noise=noise)

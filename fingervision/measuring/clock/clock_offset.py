@@ -28,7 +28,8 @@ class ClockOffset:
     notes : tuple of str
         Remarks that a reader must know, one sentence each.
     runner_up_s : float or None
-        Next best offset, at the middle of the recording, that was rejected; None if no other one explains the motion.
+        Next best offset, at the middle of the recording, that was rejected; None if no other offset explains the
+        motion.
     """
 
     offset_s: float
@@ -59,7 +60,7 @@ class NoClockOffset:
     Parameters
     ----------
     words : str
-        Sentence that says what was found and what to do.
+        Sentence that states the reason, and what to do.
     candidates_s : tuple of float
         Offsets between which the motion does not decide; empty if there is another reason.
     """

@@ -20,7 +20,8 @@ def clock_of(series: GapSeries, drive: DriveHistory) -> ClockOffset | NoClockOff
     times = series.times_s()
     if times is None:
         return NoClockOffset("the recording has no times: give --rate-hz, or a times.csv beside the images.")
-    from fingervision.measuring.clock.alignment import find_clock_offset  # slow to import, needed with a drive only
+    # Imported here, because the import is slow and only needed with a drive.
+    from fingervision.measuring.clock.alignment import find_clock_offset
 
     return find_clock_offset(times[0], series.gap_mm, drive)
 
@@ -31,7 +32,7 @@ def join_drive(table: Path, drive: DriveHistory, clock: ClockOffset) -> bool:
     Raises
     ------
     OutputError
-        If the table cannot be rewritten; the old one is then still there.
+        If the table cannot be rewritten; the old table is then unchanged.
     """
     joined: list[bool] = []
 
@@ -75,14 +76,14 @@ def sentence(clock: ClockOffset) -> str:
     """Sentence that states the clock offset and its expanded uncertainty."""
     return (
         f"Clock offset: {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion; "
-        "it was added to the drive's times. A constant lag is part of the offset. This U is valid at the "
-        f"drive's first row; over the frames, with the clocks' rates, U = {2.0 * clock.u_time_s:.2g} s."
+        "the offset was added to the drive's times. The offset includes a constant lag of the gap. This U applies to "
+        f"the drive's first row; over all frames, with the clocks' rates, U = {2.0 * clock.u_time_s:.2g} s."
     )
 
 
 def refusal(found: NoClockOffset, where: str) -> DataError:
-    """Error that says why the rows have no input; `where` names the table of gaps (`in measured/run/gaps.csv`)."""
+    """Error that states why the rows have no input; `where` names the table of gaps (`in measured/run/gaps.csv`)."""
     return DataError(
-        f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are "
-        f"{where}, without an input; --drive-offset-s S states the offset (0 where both share a clock)."
+        f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are {where}, "
+        "without an input; state the offset by --drive-offset-s S (0 if both have the same clock)."
     )

@@ -11,27 +11,31 @@ from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.play_posterior import most_likely
 
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
-"""Durations of a corner that are tried, over the time between two rows: a longer one would show in the rows."""
+"""Durations of a corner that are tried, relative to the time between two rows; a longer duration would be visible in
+the rows.
+"""
 HALF_WAY = 0.125
-"""Step to the durations beside the best one that are tried as well: frames that follow one another faster than the rows
-tell durations apart that differ by less than those in `SHARES`."""
+"""Step from the best duration to its neighbours, which are tried as well: if frames follow faster than rows, they
+distinguish durations that differ by less than those in `SHARES`.
+"""
 STRETCHES = 24
-"""Independent stretches of a recording: what is wrong about a corner is common to the frames of a move, so that a
-likelihood by frames would be far too sure (as `offset_covariance.CLUSTERS`)."""
+"""Number of stretches of a recording that count as independent data. The error of a corner is common to the frames of a
+move, so that a likelihood with one datum per frame would be much too narrow (as `offset_covariance.CLUSTERS`).
+"""
 NEAR_PLAYS = (0.02, 0.08)
-"""Plays from which each is fitted besides, over the largest: the play takes the place of a wrong corner."""
+"""Further initial values of the play, relative to the largest play, because the play may compensate a wrong corner."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spread:
-    """Spread of the clock fit over several possible answers.
+    """Spread of the clock fit over several possible solutions.
 
     Parameters
     ----------
     shift : ndarray of float, shape (3,)
-        Mean of offset, rate and play over them, from the best one.
+        Mean of offset, rate and play over the solutions, minus the best solution.
     covariance : ndarray of float, shape (3, 3)
-        Of the three, about that mean.
+        Covariance of offset, rate and play about this mean.
     """
 
     shift: Array
@@ -39,14 +43,14 @@ class Spread:
 
     @classmethod
     def over(cls, at: Array, weights: Array, best: Array) -> "Spread":
-        """Mean and covariance of `at`, shape (n, 3), with weights of shape (n,), as seen from the best."""
+        """Mean and covariance of solutions `at`, shape (n, 3), with weights, shape (n,), relative to the best one."""
         weights = weights / weights.sum()
         shift = weights @ at - best
         away = at - best - shift
         return cls(shift, np.einsum("k,ki,kj->ij", weights, away, away))
 
     def __add__(self, other: "Spread") -> "Spread":
-        """Spread over both, as independent of each other."""
+        """Sum of two independent spreads."""
         return Spread(self.shift + other.shift, self.covariance + other.covariance)
 
 
@@ -82,9 +86,10 @@ def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Spread]:
     fits = [tried[share][1] for share in shares]
     squares = np.array([one.squares for one in fits])
     best = int(np.argmin(squares))
-    # What a creep makes of a turn looks like a slow turn: the frames do not tell these durations apart.
+    # Creep changes a reversal in the same way as a longer duration, so that the frames do not distinguish the
+    # durations.
     data = 0 if motion.creeps else min(STRETCHES, found.degrees)
-    # Every duration stands for those about it.
+    # Every duration represents the interval around it.
     widths = np.gradient(shares) if shares.size > 1 else np.ones(1)
     weights = widths * (squares / squares[best]) ** (-0.5 * data)
     at = np.array([[one.at.offset_s, one.at.rate, one.at.play_mm] for one in fits])

@@ -10,16 +10,20 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 
 MOST_POINTS = 16_384
-"""Largest number of points of the common time grid: nine minutes at 30 frames a second; longer recordings get a coarser
-grid."""
+"""Largest number of points of the common time grid: nine minutes at 30 frames per second; longer recordings get a
+coarser grid.
+"""
 LARGEST_RATE = 1.5e-3
-"""Largest relative difference of the clocks that is searched: clocks seldom differ by 0.1 %, crystals by a tenth of
-that."""
+"""Largest relative difference of the clock rates that is searched: clocks rarely differ by 0.1 %, and crystal clocks by
+0.01 %.
+"""
 LEAST_SHARE = 0.5
 """Least share of the motion of either record that must lie in the overlap."""
 LEAST_OVERLAP = 0.5
 """Least share of the shorter record's duration that must lie in the overlap. With a play almost as wide as the stroke,
-the gap's motion is so unlike the log that a short stretch at the records' ends may fit better than the true overlap."""
+the gap's motion is so different from the log that a short stretch at the records' ends may fit better than the true
+overlap.
+"""
 MOST_CANDIDATES = 12
 """Largest number of correlation peaks that are fitted; for a periodic motion this includes the neighbours of the
 highest peak."""
@@ -70,7 +74,7 @@ def candidates(time_s: Array, gap_mm: Array, drive: DriveHistory) -> list[Candid
     count = max(1, int(np.ceil(LARGEST_RATE * 0.5 * span_s / step_s)))
     found: list[Candidate] = []
     for rate in np.linspace(-LARGEST_RATE, LARGEST_RATE, 2 * count + 1):
-        # The log is stretched to the recording's clock about its own first sample.
+        # The log's times are stretched about its first sample to the rate of the recording's clock.
         first_s = float(drive.time_s[0])
         stretched_s: Array = (drive.time_s - first_s) / (1.0 - rate)
         log_grid_s = step_s * np.arange(int(stretched_s[-1] / step_s) + 1)
@@ -86,7 +90,8 @@ def candidates(time_s: Array, gap_mm: Array, drive: DriveHistory) -> list[Candid
             # recording = at + (log - first) / (1 - rate), hence the offset at the recording's middle:
             offset_s = middle_s - (first_s + (middle_s - at_s) * (1.0 - rate))
             found.append(Candidate(float(offset_s), float(rate), float(correlation[peak])))
-    # A motion that repeats looks reversed half a period off: the reversed sign counts only where nothing else does.
+    # A periodic motion looks reversed at an offset of half a period, so that a negative correlation is only used if
+    # there is no good positive correlation.
     upright = [one for one in found if one.correlation > 0.0]
     best = max((abs(one.correlation) for one in found), default=0.0)
     if any(one.correlation**2 > NEAR_BEST * best**2 for one in upright):

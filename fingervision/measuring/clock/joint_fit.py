@@ -21,7 +21,7 @@ CREEP_PRIOR = 0.02
 """Prior standard deviation of the creep's share of the motion at each time constant: metals creep by 0.1 % of a strain,
 printed polymers by one to five per cent per decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
 STEPS = 12
-"""Gauss-Newton steps at most; from the correlation's peak three to five suffice."""
+"""Largest number of Gauss-Newton steps; three to five steps suffice from the peak of the correlation."""
 SETTLED = 1e-3
 """Step, in standard uncertainties, below which the iteration has converged."""
 OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
@@ -109,12 +109,12 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
 
 
 def squares_at(motion: Motion, at: Alignment) -> float:
-    """Sum of squares (mm^2) that scale, bend and creep leave at given clock offset, rate and play."""
+    """Sum of squared residuals (mm^2) after fitting scale, bends and creep at given clock offset, rate and play."""
     return solve(motion, at).squares
 
 
 def allowance_for_creep(motion: Motion, found: Fit) -> tuple[Array, Array]:
-    """Change of offset, rate and play if creep is added to the model, and by how much their variances grow; shape (3,).
+    """Changes of offset, rate and play, and of their variances, if creep is added to the model; each of shape (3,).
 
     Both are zero if creep is already included. In slow motion, creep too small to be detected acts as a delay equal to
     (creep fraction x time constant), and can also be mistaken for play. The change is that of the most probable creep;
@@ -152,15 +152,15 @@ class Solved:
     Parameters
     ----------
     weights : ndarray of float, shape (k,)
-        Of the columns of `Motion.design`.
+        Weights of the columns of `Motion.design`.
     white : ndarray of float, shape (m + k - 2,)
-        Whitened residual of the frames, then one row for each bend's prior.
+        Whitened residuals of the frames, followed by one row for each bend's prior.
     residual_mm : ndarray of float, shape (n,)
         Gap minus prediction.
     basis : ndarray of float, shape (m + k - 2, k)
         Orthonormal basis of the whitened columns.
     squares : float
-        Of `white`, in mm^2.
+        Sum of squares of `white`, in mm^2.
     degrees : int
         Degrees of freedom.
     """
@@ -180,7 +180,7 @@ def solve(motion: Motion, at: Alignment) -> Solved:
     straight = np.linalg.lstsq(white_design[:, :2], white_gap, rcond=None)[0]
     left = white_gap - white_design[:, :2] @ straight
     spread = float(np.sqrt(left @ left / max(left.size - 2, 1)))
-    # A row more for each bend: it is zero with a standard deviation of a share of the straight part.
+    # One additional row per bend states its prior: zero, with a standard deviation relative to the straight part.
     bends = design.shape[1] - 2
     priors = np.full(bends, BEND_PRIOR)
     if motion.creeps:

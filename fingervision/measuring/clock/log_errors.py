@@ -9,17 +9,21 @@ from fingervision.domain.effect import Array
 from fingervision.measuring.clock.log_path import LogPath
 
 DRAWS = 48
-"""Draws: a variance is then known to a fifth, and an uncertainty to a tenth."""
+"""Number of draws; a variance then has a relative standard uncertainty of a fifth, and a standard deviation of a tenth.
+"""
 SEED = 16
-"""The same log gives the same uncertainty."""
+"""Seed of the draws, so that the same log gives the same uncertainty."""
 ALIKE = 0.5
-"""Share of the variance between rows that all bends have in common. A corner that lies anywhere between two rows is cut
-by 0.0725 of its change of step on average and by 0.105 as RMS (the integrals of x^2 (1 - x)^2 and of its square root),
-so that the mean's square is half of the variance."""
+"""Share of the variance between rows that all bends have in common. If a corner lies anywhere between two rows,
+interpolation cuts it by 0.0725 of its change of step on average, and by 0.105 as RMS, so that the squared mean is half
+of the mean square.
+"""
 
 TURNS_ALIKE = 1.0
-"""Error that all reversals without a halt have in common, outwards or inwards, over the rounding of an encoder: a stage
-that slows down unseen, within half a step of a line, is drawn to turn half a step too far: 1.7 roundings at most."""
+"""Error that all reversals without a halt have in common, relative to the standard uncertainty of an encoder's
+rounding. If a stage slows down within half a step of an encoder line, the smoothed path turns up to half a step too
+far, which is 1.7 times the rounding's standard uncertainty.
+"""
 
 
 def drawn_paths(path: LogPath) -> Iterator[LogPath]:

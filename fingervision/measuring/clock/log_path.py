@@ -14,13 +14,14 @@ from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
 CORNER_ROWS = 3
-"""Rows on either side of a corner that smoothing distorts."""
+"""Number of rows on either side of a corner that smoothing distorts."""
 LONG_ROWS = 4 * CORNER_ROWS
-"""Number of rows from which on the ends of a stretch are left out when its rounding errors are examined."""
+"""Number of rows above which the ends of a stretch are left out when its rounding errors are examined."""
 AVERAGED = 0.5
-"""Leverage below which a row is the mean of several, and shares its error with its neighbours."""
+"""Leverage below which a smoothed row is mainly a mean of several rows, and has an error in common with its neighbours.
+"""
 LEAST_LEVERAGE = 1.0 / 241.0
-"""That of the widest window of the smoothing."""
+"""Leverage of a row in the widest window of the smoothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,9 +55,9 @@ class ErrorParts:
     rows_mm : ndarray of float, shape (rows,)
         Standard uncertainty of each row by its own noise or rounding.
     span : ndarray of float, shape (rows,)
-        Rows over which the noise was averaged.
+        Number of rows over which the noise was averaged.
     between_mm : ndarray of float, shape (n,)
-        Standard uncertainty of the curve at each point of the path, zero at a row; towards the outside of its bend.
+        Standard uncertainty of the curve at each point of the path, towards the outside of its bend; zero at a row.
     interval : ndarray of int, shape (n,)
         Interval between two rows in which each point lies.
     corner_s, turn_mm_s : ndarray of float, shape (c,)
@@ -82,13 +83,13 @@ class LogPath:
     u_mm : ndarray of float, shape (n,)
         Standard uncertainty of the input at each point: random error, and interpolation between rows.
     shared : SharedErrors
-        What neighbours are off by alike.
+        Errors that neighbouring rows have in common.
     rows : DriveHistory
         The log itself.
     step_mm : float
-        Its encoder's step; 0 where none is seen.
+        Step of the log's encoder; 0 if no step is found.
     parts : ErrorParts
-        Where the uncertainty comes from.
+        Contributions to the uncertainty.
     """
 
     drive: DriveHistory
@@ -161,7 +162,7 @@ def _shared_errors(
     ends = np.append(np.flatnonzero(np.diff(direction)) + 1, time_s.size - 1)
     stretches: list[tuple[int, int]] = []
     for begin, end in zip(np.insert(ends[:-1], 0, 0), ends, strict=True):
-        # A halt that smoothing broke into several is one: it has one place.
+        # Halts at the same position that smoothing has separated are one halt.
         if stretches and np.ptp(input_mm[stretches[-1][0] : end + 1]) == 0.0:
             stretches[-1] = (stretches[-1][0], int(end))
         else:
@@ -169,7 +170,7 @@ def _shared_errors(
     away = input_mm - smooth_mm
     scatter_mm = np.where(leverage < AVERAGED, 0.0, u_mm)
     moved_mm = [abs(float(smooth_mm[end] - smooth_mm[begin])) for begin, end in stretches]
-    # Rows beside the end of a stroke in which an encoder's line may pass unseen; none of a halt.
+    # Number of rows near the end of a stroke in which the crossing of an encoder line may be missed; zero for a halt.
     near = [
         max(CORNER_ROWS, round(step_mm * (end - begin) / moved)) if moved > step_mm else 0
         for (begin, end), moved in zip(stretches, moved_mm, strict=True)
@@ -196,7 +197,7 @@ def _shared_errors(
         if last > first:
             count = max(1, round((last - first) * averaged))
             found += [(int(row), error_mm, False, 0.0) for row in np.linspace(first, last, count + 1)[:-1]]
-        if last < end:  # a turn without a halt: its place is known to a step
+        if last < end:  # a reversal without a halt, whose position is known to one encoder step
             turn = min(max(last, first), end)
             found.append((turn, rounding_mm, True, float(np.sign(smooth_mm[end] - smooth_mm[begin]))))
     for begin, end in unseen:
@@ -229,7 +230,7 @@ def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
         return input_mm
     out = input_mm.copy()
     stands = np.flatnonzero(np.diff(np.r_[0, (np.abs(np.diff(input_mm)) < still).astype(int), 0]))
-    for begin, end in stands.reshape(-1, 2):  # rows begin to end inclusive
+    for begin, end in stands.reshape(-1, 2):  # rows `begin` to `end`, both included
         inner = input_mm[begin : end + 1]
         if end - begin < 2 * CORNER_ROWS or np.ptp(inner[CORNER_ROWS:-CORNER_ROWS]) > 3.0 * sigma_mm:
             continue

@@ -12,13 +12,15 @@ from fingervision.effects.play_operator import play
 from fingervision.measuring.clock.log_path import LogPath
 
 CREEP_S = (0.5, 5.0)
-"""Time constants of creep, a decade apart: faster creep looks like a delay and is included in it; slower creep hardly
-follows the motion."""
+"""Time constants of creep (s), a decade apart: faster creep acts as a delay and becomes part of the offset; slower
+creep hardly depends on the motion.
+"""
 CREEP_STEP = 0.1
 """Step of the time grid for creep, as a share of the shortest time constant: the error is 1e-3 of the lag."""
 MOST_KNOTS, FRAMES_A_KNOT = 11, 20
-"""Most knots of gap against input, and least number of frames per knot: the kink of a contact distorts a twelfth of the
-range, where frames are then left out as outliers."""
+"""Largest number of knots of gap against input, and least number of frames per knot; between two knots, a twelfth of
+the range, the kink of a contact is not resolved, and its frames are left out as outliers.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +56,13 @@ class Noise:
     weights : ndarray of float, shape (n - p,)
         Weights of the whitened rows: below 1 for rows with an uncertain input; empty if all are equal.
     starts : ndarray of int, shape (g,)
-        First whitened row of each stretch in which all inputs share an error; empty if there is none.
+        First whitened row of each stretch in which all inputs have an error in common; empty without such stretches.
     unit : ndarray of float, shape (n - p,)
         Effect of the shared error on the whitened rows, normalised to length 1 within each stretch.
     shrink : ndarray of float, shape (g,)
-        Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
+        Share of a stretch's projection on `unit` that is subtracted, 1 - 1 / sqrt(1 + variance ratio).
     variance_mm2 : float
-        Of the frames' own noise, after the autoregression is taken out.
+        Variance of the frames' own noise after the autoregression.
     """
 
     terms: Array
@@ -153,7 +155,7 @@ class Motion:
         grid_s = times_s[0] + step_s * np.arange(int((times_s[-1] - times_s[0]) / step_s) + 2)
         past = np.interp(grid_s, times_s, states)
         share = 1.0 - float(np.exp(-step_s / tau_s))
-        # From one grid point to the next a straight line: its mean value's lag is half a step shorter.
+        # Between grid points the path is a straight line, so that its mean is used for each step.
         middle = np.append(past[:1], 0.5 * (past[1:] + past[:-1]))
         mean = lfilter([share], [1.0, share - 1.0], middle - past[0]) + past[0]
         return np.asarray(np.interp(self.log_time_s(at), grid_s, mean))

@@ -9,12 +9,13 @@ from fingervision.measuring.clock.joint_fit import Fit
 from fingervision.measuring.clock.motion_model import Motion, Noise
 
 MOST_ORDER = 4
-"""Highest order: an autoregression plus white noise is approximated well enough by four terms."""
+"""Largest order; four terms approximate an autoregression plus white noise sufficiently."""
 FRAMES_AN_ORDER = 25
 """Least number of frames per term."""
 LARGEST_ROOT = 0.98
-"""Limit of the sum of the terms' absolute values: above it a residual is practically a random walk, and the terms are
-scaled down."""
+"""Largest sum of the terms' absolute values; above it, the residual is practically a random walk, and the terms are
+scaled down.
+"""
 
 
 def autoregression(residual_mm: Array) -> Array:
@@ -54,15 +55,15 @@ def autoregression(residual_mm: Array) -> Array:
 MEDIAN_CHI_SQUARE = 0.4549
 """Median of chi-square with one degree of freedom."""
 TRIED = 60
-"""Number of variances tried, over five decades: neighbours differ by a fifth, the uncertainty of a variance from a
-hundred frames."""
+"""Number of variances that are tried, over five decades; neighbouring values differ by a fifth, which is about the
+uncertainty of a variance from a hundred frames.
+"""
 CORRELATED = 0.15
 """Lower bound of the ratio of the variance in second differences to 6 times the noise variance: for noise with
 correlation rho from frame to frame, second differences have 6 - 8 rho + 2 rho^2 times the noise variance, which is 1.4
 of 6 for rho = 0.7 and 0.8 of 6 for rho = 0.8."""
 WRONG, WIDER = 0.01, 100.0
-"""Share of frames that may be wrong, and the variance of these, relative to the residuals' own: ten standard
-deviations."""
+"""Share of frames that may be wrong, and ratio of their variance to that of the others (ten standard deviations)."""
 
 
 def noise_of(motion: Motion, found: Fit) -> Noise:
@@ -100,8 +101,9 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
 
 
 SEEN_SHARED = 0.5
-"""Least shared error, relative to the residual's spread: smaller ones cannot be detected, and subtracting means would
-whiten the noise."""
+"""Least shared error relative to the residuals' standard deviation; smaller errors cannot be detected, and subtracting
+means would whiten the noise.
+"""
 
 
 def _stretch_of(motion: Motion, found: Fit, log_s: Array) -> NDArray[np.intp]:
@@ -126,8 +128,9 @@ def _stretch_of(motion: Motion, found: Fit, log_s: Array) -> NDArray[np.intp]:
 
 
 FEWEST_SHARED = 8
-"""Least number of frames in a stretch whose mean is subtracted before the noise is estimated; fewer would lose their
-scatter."""
+"""Least number of frames in a stretch whose mean is subtracted before the noise is estimated; with fewer frames, much
+of the scatter would be subtracted too.
+"""
 
 
 def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Array) -> tuple[Array, float]:

@@ -10,8 +10,9 @@ from fingervision.measuring.clock.log_errors import DRAWS, drawn_paths
 from fingervision.measuring.clock.motion_model import Alignment, Motion
 
 CLUSTERS = 24
-"""Stretches of the recording whose pulls are taken for independent: their scatter is known to a fifth, and a stretch of
-an ordinary recording holds a move or two."""
+"""Number of stretches of the recording whose contributions are regarded as independent: the uncertainty of their
+scatter is then a fifth, and a stretch of an ordinary recording contains one or two moves.
+"""
 
 
 def inflation(motion: Motion, at: Alignment) -> Array:

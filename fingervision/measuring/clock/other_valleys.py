@@ -1,4 +1,4 @@
-"""Other minima of the clock fit beside the best one: those that the log's own errors leave open."""
+"""Further minima of the clock fit that are compatible with the errors of the log."""
 
 from dataclasses import replace
 
@@ -10,31 +10,34 @@ from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.play_posterior import BESIDE_S, BESIDE_STEP_S, VALLEYS, longest_play_mm
 
 NEAR_FRAMES, NEAR_STEP = 4.0, 0.5
-"""Frames on either side of the best offset within which other minima are searched more finely, and the step there: an
-encoder's line that is crossed a frame earlier or later makes a minimum of its own."""
+"""Range in frames on either side of the best offset in which minima are searched with a finer step, and this step,
+because an encoder line that is crossed a frame earlier or later causes a separate minimum.
+"""
 SAME = 0.25
-"""Distance in frames within which two minima are one."""
+"""Distance in frames within which two minima count as the same."""
 FAR = 2.0
-"""Distance in frames from which on two minima are two answers; nearer ones are one answer with a larger
-uncertainty."""
+"""Distance in frames above which two minima are different solutions; nearer minima are one solution with a larger
+uncertainty.
+"""
 POSSIBLE = 0.037
-"""Likelihood relative to the best one above which a far minimum is possible: chi-square of 6.6, which chance exceeds
-once in a hundred recordings."""
+"""Likelihood, relative to that of the best minimum, above which a far minimum is possible: chi-square of 6.6, which
+chance exceeds in one of a hundred recordings.
+"""
 
 
 def other_valleys(motion: Motion, found: Fit, plays: tuple[float, ...], frame_s: float) -> tuple[list[float], Spread]:
     """Find the far offsets that remain possible, and the spread of the fit over the minima nearby.
 
-    The errors of a log's path between its rows are common to the frames of a move. A likelihood by frames would reject
-    the true minimum for them; therefore a stretch of the recording counts as one datum. If the frames' own noise
-    decides, the minima differ so much that this makes no difference.
+    The errors of a log's path between its rows are common to the frames of a move. A likelihood with one datum per
+    frame could therefore reject the true minimum; instead, a stretch of the recording counts as one datum. If the
+    frames' own noise determines the minimum, the minima differ so much that this choice has no effect.
 
     Returns
     -------
     far_s : list of float
         Offsets, at the middle of the recording, that fit nearly as well.
     spread : Spread
-        Of offset, rate and play.
+        Spread of offset, rate and play.
     """
     fits = [found]
     for start in _lowest(motion, found, plays, frame_s):

@@ -10,31 +10,35 @@ from fingervision.domain.effect import Array
 from fingervision.stage_record.differences import differences
 
 FINER = 6
-"""Points that a row becomes: the sag of a chord falls with its square, to a thirtieth."""
+"""Number of path points per row; the deviation of a chord from the curve decreases with its square, to a thirtieth."""
 REACH, ABOUT_CORNER = 0.625, 15
-"""Time about a corner, in rows, within which the path has more points, and their number on either side. A corner that
-takes up to 1.25 rows is rounded there (`corner_rounding`); a chord over a 24th of a row cuts a turn that takes a
-quarter of a row by a 50th of the rounding, and one over a sixth of a row cut it by a fifth, which the fitted play took
-up."""
+"""Time before and after a corner, in rows, within which the path has more points, and number of these points on each
+side. `corner_rounding` rounds corners there, over up to 1.25 rows. A chord over a 24th of a row reduces the rounding of
+a reversal over a quarter of a row by 2 %; a chord over a sixth of a row reduced it by 20 %, which biased the fitted
+play.
+"""
 FEWEST = 5
-"""Rows that draw a curve, and of which fourth differences are taken."""
+"""Least number of rows for a curve, and for fourth differences."""
 CORNER = 0.07
-"""Standard deviation of an interpolated input over the fourth differences at both ends of its interval. A corner of the
-motion anywhere between two rows leaves 0.105 of the change of step as RMS (integral of x^2 (1 - x)^2, times 1/3), which
-is 0.07 of the fourth differences that it makes; noise of the rows comes out within a tenth of itself."""
+"""Ratio of the standard deviation of an interpolated input to the fourth differences at both ends of its interval. A
+corner of the motion anywhere between two rows causes an error of 0.105 of the change of step (RMS), which is 0.07 of
+the fourth differences that it causes; the noise of the rows is then estimated within a tenth.
+"""
 
 SHARP = 5.0
-"""Change of the step in an interval over that beside it, and over a row's uncertainty, from which on it is a corner."""
+"""Ratio of the change of step in an interval to those in the neighbouring intervals, and to a row's uncertainty, above
+which there is a corner.
+"""
 BUMP = float(np.sqrt(30.0))
-"""A parabola that is zero at both rows and has an RMS of 1 between them."""
+"""Factor of the parabola x (1 - x), which is zero at both rows, that gives an RMS of 1 between them."""
 STANDS = 0.1
-"""Step over its neighbour's below which the stage stands: noise of a log is seldom more."""
+"""Ratio of a step to its neighbour below which the stage is at rest; the noise of a log is rarely larger."""
 
 
 def piece(
     time_s: Array, input_mm: Array, u_mm: Array
 ) -> tuple[Array, Array, Array, Array, NDArray[np.intp], Array, Array]:
-    """Points of one run (times, inputs, uncertainties, the curve's part of these, intervals), and its corners."""
+    """Points of one run (times, inputs, uncertainties, their part due to the curve, intervals), and its corners."""
     if time_s.size < FEWEST:
         none = np.zeros(0)
         return time_s, input_mm, u_mm, np.zeros(time_s.size), np.arange(time_s.size), none, none
@@ -78,13 +82,13 @@ class Corner:
     Parameters
     ----------
     first, last : int
-        Rows on either line, before and after it.
+        Rows on the two lines, before and after the corner.
     at_s, at_mm : float
-        Where the lines meet.
+        Time and position at which the lines meet.
     before, after : float
-        Speeds, in mm/s.
+        Speeds before and after the corner, in mm/s.
     u_mm : float
-        Standard uncertainty of the place.
+        Standard uncertainty of the corner's position.
     """
 
     first: int

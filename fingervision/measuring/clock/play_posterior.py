@@ -9,11 +9,12 @@ from fingervision.measuring.clock.joint_fit import Fit, fit, squares_at
 from fingervision.measuring.clock.motion_model import Alignment, Motion
 
 PLAY_PRIOR_MM = 0.1
-"""Scale of the half-Cauchy prior of the play: that of worn or geared stages; ten times as much remains possible."""
+"""Scale (mm) of the half-Cauchy prior of the play, typical of worn or geared stages; a tenfold play remains possible.
+"""
 MOST_PLAY_MM = 0.5
 """Largest play, as in the catalogue of effects."""
 MOST_OF_STROKE = 0.9
-"""Largest play relative to the stroke: with a wider play the gap hardly moves."""
+"""Largest play relative to the stroke; with a larger play the gap hardly moves."""
 FIRST_PLAYS = (0.0, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Initial values of the play relative to the largest play: a factor of two apart, so that each fit converges to the
 nearest minimum."""
@@ -131,7 +132,7 @@ def posterior(motion: Motion, best: Fit) -> Posterior:
                 if excess < 1.5 * OUT_OF_REACH:
                     break
         ends.append(outside)
-    # Towards the top one after the other, each from its neighbour's place.
+    # The nodes are computed from the maximum outwards, each starting from its neighbour's solution.
     nodes = np.linspace(ends[0], ends[1], NODES)
     order = np.argsort(np.abs(nodes - top.at.play_mm))
     fits: dict[int, Fit] = {}

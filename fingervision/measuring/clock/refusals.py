@@ -15,10 +15,13 @@ from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
 """Least number of frames with a gap, and of log rows: the fit has eight parameters."""
 LEAST_GAIN = 40.0
-"""Gain in chi-square of the motion over a gap that stands: by chance 20 come once in 10^4 recordings (four parameters),
-as much again for the offsets among which was chosen."""
+"""Least reduction of chi-square by the motion, compared with a constant gap. By chance, 20 is exceeded in one of 10^4
+recordings (four parameters); the limit is doubled because the best of many offsets was chosen.
+"""
 MOST_LEFT_OUT = 0.15
-"""Share of the frames that may be taken for wrong: a contact's kink spoils a twelfth, a few are wrong besides."""
+"""Largest share of the frames that may be left out as wrong: the kink of a contact affects a twelfth of the frames, and
+a few further frames may be wrong.
+"""
 LEAST_SHARE = 0.5
 """Least share of the gap's variance that a log must explain to belong to this recording."""
 
@@ -28,21 +31,21 @@ def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffs
     if time_s.size < FEWEST_FRAMES or float(np.ptp(time_s)) == 0.0:
         return NoClockOffset(f"only {time_s.size} frames have a time and a gap, and {FEWEST_FRAMES} are needed.")
     if drive.time_s.size < FEWEST_ROWS or float(np.ptp(drive.input_mm)) == 0.0:
-        return NoClockOffset("the drive does not move: log a run that does.")
+        return NoClockOffset("the drive does not move: log a run in which the drive moves.")
     if float(np.ptp(gap_mm)) == 0.0:
-        return NoClockOffset("the gap does not move: record a run that does.")
+        return NoClockOffset("the gap does not move: record a run in which the gap moves.")
     return None
 
 
 def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse an offset that explains the frames only if many are left out, as at a wrong step of a staircase."""
+    """Refuse an offset that explains the frames only without many of them, as a wrong step of a staircase does."""
     left_out = within_log - motion.time_s.size
     if left_out <= MOST_LEFT_OUT * within_log:
         return None
     return NoClockOffset(
         f"at the best offset, {found.at.offset_s:.3f} s, {left_out} of {within_log} frames do not follow the drive: "
-        f"if the play is as wide as the steps of the motion, another step may fit as well; or something other than "
-        f"the drive moves the gap. Record a run with longer strokes, or state --drive-offset-s."
+        "if the play is as wide as the steps of the motion, another step may fit as well, or something other than the "
+        "drive moves the gap. Record a run with longer strokes, or state --drive-offset-s."
     )
 
 
@@ -61,9 +64,9 @@ def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
     if share >= ARRIVED:
         return None
     return NoClockOffset(
-        "the drive's rows jump from one position to the next, but at the time of a jump the gap moves by a share of "
-        f"only {max(share, 0.0):.2f} of it: the rows are set-points, which do not show when the stage arrived. Log the "
-        "stage's positions, or state --drive-offset-s."
+        f"the drive's rows jump from one position to the next, and the gap completes only a share of "
+        f"{max(share, 0.0):.2f} of these jumps in the same time: the rows are set-points, which do not state when the "
+        "stage arrived. Log the stage's measured positions, or state --drive-offset-s."
     )
 
 
@@ -76,19 +79,21 @@ def unlike(motion: Motion, found: Fit) -> NoClockOffset | None:
     if gain < LEAST_GAIN:
         moved_um, noise_um = 1e3 * float(np.ptp(motion.gap_mm)), 1e3 * float(np.std(found.residual_mm))
         return NoClockOffset(
-            f"there is too little motion to find the offset: the gap changes by {moved_um:.3g} µm in all, of which "
-            f"the drive "
-            f"explains a share of {max(share, 0.0):.2f} and {noise_um:.3g} µm RMS are noise. Record a run that moves."
+            f"there is too little motion to find the offset: the gap changes by {moved_um:.3g} µm in all, the drive "
+            f"explains a share of {max(share, 0.0):.2f} of its variance, and the noise is {noise_um:.3g} µm RMS. "
+            "Record a run with more motion."
         )
     if found.scale < 0.0:
         return NoClockOffset(
-            "the gap follows the drive best with its sign reversed, closing as the input grows. A periodic motion can "
-            "also cause this if the offset is wrong by half a period. Check the drive's sign (positive opens)."
+            "the gap follows the drive best with the sign reversed, so that the gap closes as the input increases; a "
+            "periodic motion can look like this at an offset of half a period: check the sign of the drive (positive "
+            "opens)."
         )
     if share < LEAST_SHARE:
         return NoClockOffset(
-            f"the gap does not follow the drive at any offset: at the best, {found.at.offset_s:.3f} s, it explains a "
-            f"share of {max(share, 0.0):.2f} of the gap's variance. Is this the log of this recording?"
+            f"the gap does not follow the drive at any offset: at the best offset, {found.at.offset_s:.3f} s, the "
+            f"drive explains a share of {max(share, 0.0):.2f} of the gap's variance. Check whether this is the log of "
+            "this recording."
         )
     return None
 
@@ -104,7 +109,7 @@ def ambiguous(offsets_s: list[float]) -> NoClockOffset:
     said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
     apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""
     return NoClockOffset(
-        f"the motion repeats and fits at {nearest.size} offsets{apart} equally well ({said} s): give --drive-offset-s, "
-        "or record a run that starts, stops or turns once where it does not repeat.",
+        f"the motion is periodic and fits equally well at {nearest.size} offsets{apart} ({said} s): give "
+        "--drive-offset-s, or record a run with a start, a stop or a reversal that is not repeated.",
         tuple(float(one) for one in nearest),
     )

@@ -16,10 +16,11 @@ from fingervision.measuring.clock.play_posterior import most_likely
 from fingervision.measuring.clock.refusals import FEWEST_FRAMES, LEAST_SHARE, explained
 
 CHANCE_SIGMAS = 3.0
-"""Standard deviations by which the log's own noise may enlarge the chi-square of another offset: one valid offset in
-700 is then missed."""
+"""Number of standard deviations by which the log's own noise may increase the chi-square of another offset; one of 700
+valid offsets is then missed.
+"""
 UNREFUTED = 25.0
-"""Increase of chi-square, over common frames, from which on another offset is rejected: 5 standard deviations."""
+"""Increase of chi-square, over common frames, above which another offset is rejected: 5 standard deviations."""
 SHARED = 0.5
 """Least share of the motion of either record that must lie in the overlap."""
 ONE_PEAK = 0.25
@@ -52,13 +53,13 @@ def _between_runs(log_s: Array, drive: DriveHistory) -> NDArray[np.bool_]:
 
 
 def only(motion: Motion, kept: NDArray[np.bool_]) -> Motion:
-    """Keep the selected frames only; their noise is assumed to be white until it is estimated again."""
+    """Keep only the selected frames; their noise is assumed to be white until the noise is estimated again."""
     return replace(motion, time_s=motion.time_s[kept], gap_mm=motion.gap_mm[kept], noise=WHITE)
 
 
 @dataclass(frozen=True, slots=True)
 class RunnerUp:
-    """The most likely one of the offsets that are rejected.
+    """The most likely of the rejected offsets.
 
     Parameters
     ----------
@@ -77,15 +78,15 @@ class RunnerUp:
     def words(self) -> str:
         """Sentence that names the offset."""
         return (
-            f"The next best offset, {self.offset_s:.3f} s, is rejected: the drive explains a share of {self.share:.3f} "
-            f"of the gap's variance at that offset, and a share of {self.best_share:.5f} at the chosen offset."
+            f"The next best offset, {self.offset_s:.3f} s, is rejected: the drive explains a share of "
+            f"{self.share:.3f} of the gap's variance at this offset, and of {self.best_share:.5f} at the chosen offset."
         )
 
 
 def unrefuted(
     motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float
 ) -> tuple[list[float], RunnerUp | None]:
-    """Find offsets that fit the frames shared with the best offset as well as that one, and the best rejected offset.
+    """Find offsets that fit as well as the best offset in the frames that both cover, and the best rejected offset.
 
     A rejected offset is reported only if it would have been accepted in the absence of all others.
     """
@@ -96,7 +97,7 @@ def unrefuted(
         shared, first = fitted(motion.time_s, motion.gap_mm, motion.path, candidate, QUICK_PLAYS)
         if shared.time_s.size < FEWEST_FRAMES or abs(first.at.offset_s - best.at.offset_s) < ONE_PEAK * frame_s:
             continue
-        # Of the same frames, with the noise that the best one leaves there.
+        # Both offsets are compared for the same frames, with the noise of the best fit in these frames.
         own = replace(shared, noise=Noise(motion.noise.terms, np.empty(0)))
         own = replace(own, noise=noise_of(own, replace(best, residual_mm=_residual(own, best))))
         ours, rival = most_likely(own, best.at, QUICK_PLAYS), most_likely(own, first.at, QUICK_PLAYS)
@@ -118,7 +119,8 @@ def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:
     sums of n squared normalised errors differ with a standard deviation of 2 n^(1/2). The reduction of the log's noise
     by smoothing is ignored, so that rather too many candidates are kept than too few.
     """
-    # Second differences of white noise have six times its variance; turns of the motion are few.
+    # Second differences of white noise have six times its variance; the few reversals of the motion do not affect the
+    # median.
     log_mm2 = (1.4826 * float(np.median(np.abs(np.diff(drive.input_mm, 2))))) ** 2 / 6.0
     gain = float(np.ptp(motion.gap_mm) / np.ptp(drive.input_mm))
     share = min(1.0, gain**2 * log_mm2 / max(best.variance_mm2, 1e-30))

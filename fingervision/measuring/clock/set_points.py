@@ -11,10 +11,11 @@ STANDS = 0.1
 """Change in a neighbouring interval, relative to that of a jump, below which the log counts as constant on that
 side."""
 JUMPING = 0.7
-"""Share of a log's travel that lies in such jumps, from which on the log may contain set-points: a stage that is read
-out fast enough is seen while it moves; one that is read out slowly shows jumps as well."""
+"""Share of a log's travel in such jumps above which the log may contain set-points. A stage that is read fast enough
+shows intermediate positions, but a stage that is read slowly shows jumps as well.
+"""
 FEWEST_JUMPS = 3
-"""Least number of jumps for a decision; with so many, a gap that takes longer than the log is no accident."""
+"""Least number of jumps for a decision, because a gap may be slower than the log in one jump by chance."""
 FRAMES_MORE = 1.0
 """Frames before and after a jump within which the gap must start and arrive, if it jumps as the log does."""
 ARRIVED = 0.85
@@ -37,7 +38,8 @@ def gap_arrives(motion: Motion, found: Fit) -> float | None:
     before, after = np.insert(steps[:-1], 0, 0.0), np.append(steps[1:], 0.0)
     least = STANDS * float(np.ptp(rows.input_mm))
     jumps = np.flatnonzero((steps > least) & (np.maximum(before, after) < STANDS * steps))
-    # Over many rows the noise of a log adds up to more than its motion; an encoder's rows at rest have none.
+    # The expected travel due to noise is subtracted, because it can exceed the motion over many rows; an encoder has
+    # none at rest.
     noise_mm, encoder_mm = input_sigma(rows.input_mm, (slice(0, rows.time_s.size),), rows.time_s)
     noise_steps_mm = 0.0 if encoder_mm > 0.0 else steps.size * noise_mm * 2.0 / np.sqrt(np.pi)
     if jumps.size < FEWEST_JUMPS or steps[jumps].sum() < JUMPING * (steps.sum() - noise_steps_mm):
@@ -49,7 +51,8 @@ def gap_arrives(motion: Motion, found: Fit) -> float | None:
     def at(log_s: Array, signal: Array) -> Array:
         return np.asarray(np.interp(log_s + float(np.median(offset_s)), motion.time_s, signal))
 
-    # The fit puts a slow motion's middle at the jump: both ends lie half a window away from that.
+    # The fit aligns the middle of a slow motion with the jump; start and end are compared half a window before and
+    # after it.
     half_s = 0.5 * np.diff(rows.time_s)[jumps] + FRAMES_MORE * frame_s
     middle_s = 0.5 * (rows.time_s[jumps] + rows.time_s[jumps + 1])
     inside = (at(middle_s - half_s, motion.time_s) > motion.time_s[0]) & (

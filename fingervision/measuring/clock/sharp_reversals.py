@@ -8,14 +8,17 @@ from numpy.typing import NDArray
 from fingervision.domain.effect import Array
 
 LINES = (12.0, 6.0, 3.0)
-"""Encoder lines through which a stroke is drawn: as many of these as are straight; through three, the stroke is known
-to a fifth of a step at the reversal."""
+"""Numbers of encoder lines to which a stroke is fitted; the largest number for which the stroke is straight is used.
+With three lines, the stroke's position at the reversal has an uncertainty of a fifth of a step.
+"""
 LEAST_ROWS = 6
-"""Rows on each side of a reversal through which a line is drawn, at least."""
+"""Least number of rows on each side of a reversal to which a line is fitted."""
 STRAIGHT = 1.3
-"""Scatter of the readings about a straight stroke, over that of rounding, above which the stroke is curved."""
+"""Ratio of the readings' scatter about a straight stroke to that of rounding, above which the stroke is curved."""
 ALLOWED = 0.55
-"""Distance of a reading from a path that it allows, in steps: half a step, and a tenth of it for the line's error."""
+"""Largest distance between a reading and a possible path, in steps: half a step, plus a tenth of this for the line's
+error.
+"""
 
 
 def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: float) -> Array:

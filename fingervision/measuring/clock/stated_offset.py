@@ -20,14 +20,16 @@ SYSTEMATIC = 0.004
 """Systematic standard uncertainty, as a share of the time between two frames and two rows: error of the curve between
 rows at a reversal, which does not average out over frames (`python -m tests.benchmarks.clock`)."""
 MOST_PLAY_SHARE = 0.5
-"""Largest share of the stroke that may be lost in play: with more, an error of the log's reversals shifts the whole
-motion, and the fit of `python -m tests.benchmarks.clock --seed 404` was off by a frame."""
+"""Largest share of the stroke that may be lost in play. With more play, an error of the log's reversals shifts the
+whole motion: the fit in `python -m tests.benchmarks.clock --seed 404` had an error of one frame.
+"""
 SURE_RATE, ORDINARY_RATE = 3.0, 1e-4
-"""Standard uncertainties, and relative rate, from which on a clock is reported as fast or slow: crystals differ by up
-to 100 parts in a million, and video compression distorts a motion by as much."""
+"""Number of standard uncertainties, and relative rate, above which a clock is reported as fast or slow: crystal clocks
+differ by up to 100 parts per million, and video compression distorts a motion by as much.
+"""
 
 COARSE = 2.0
-"""Frames per encoder step from which on an offset error of one frame corresponds to less than half a step."""
+"""Number of frames per encoder step above which an offset error of one frame corresponds to less than half a step."""
 
 
 def crossed_in_s(path: LogPath) -> float:
@@ -46,66 +48,69 @@ def stated(
     offset_s, rate = at.offset_s + float(spread.shift[0]), at.rate + float(spread.shift[1])
     covariance = at.covariance * np.outer(more[:2], more[:2])
     shift, growth = allowance_for_creep(motion, best)
-    # Without its correlation: by chance it would cancel at one instant what is off at all others.
+    # The correlation of the creep's contribution is ignored, because it could cancel other errors at one instant by
+    # chance.
     covariance = covariance + np.diag(shift[:2] ** 2 + growth[:2] * more[:2] ** 2) + spread.covariance[:2, :2]
-    # Recording's time at which the log begins; there the offset is middle's plus the rate times the way to it.
+    # Recording's time at which the log begins; the offset at this time is the offset at the middle plus the rate times
+    # the difference in time.
     begins_s = (first_s + offset_s - rate * motion.middle_s) / (1.0 - rate)
     away_s = np.append(motion.time_s, begins_s) - motion.middle_s
     variance = covariance[0, 0] + 2.0 * away_s * covariance[0, 1] + away_s**2 * covariance[1, 1]
     row_s = float(np.median(np.diff(motion.path.rows.time_s)))
     variance += (SYSTEMATIC * np.hypot(frame_s, row_s)) ** 2
-    # The frames see at what time within its interval the stage jumped, and the log does not. A programme that drives
-    # and logs by one cycle jumps at the same place in each, so that many jumps do not average.
+    # Frames show at which time between two rows the stage jumped, but the log does not. A program that moves and logs
+    # in one cycle jumps at the same phase of each cycle, so that the error does not average out over jumps.
     jumps = gap_arrives(motion, best) is not None
     variance += row_s**2 / 12.0 if jumps else 0.0
     u_time_s = float(np.sqrt(np.mean(variance[:-1])))
     u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
     if not np.isfinite(u_time_s) or u_time_s > 0.1 * float(np.ptp(motion.time_s)):
         return NoClockOffset(
-            f"the motion determines the offset only to +-{2.0 * u_time_s:.3g} s (k = 2): a motion at one speed, or a "
-            "motion that is over between two frames, looks the same at all similar offsets. Record a run that starts, "
-            "stops or turns."
+            f"the motion determines the offset only to +-{2.0 * u_time_s:.3g} s (k = 2): a move at constant speed, or "
+            "a move that ends between two frames, fits equally well at neighbouring offsets. Record a run with "
+            "starts, stops or reversals."
         )
     stroke_mm = float(np.ptp(motion.drive.input_mm))
     if at.play_mm > MOST_PLAY_SHARE * stroke_mm:
         return NoClockOffset(
-            f"a play of {1e3 * at.play_mm:.3g} µm takes up most of the stroke of {1e3 * stroke_mm:.3g} µm, and the "
-            f"rest of the motion does not determine the offset. Record a run with a longer stroke."
+            f"a play of {1e3 * at.play_mm:.3g} µm uses up most of the stroke of {1e3 * stroke_mm:.3g} µm, and the "
+            "remaining motion does not determine the offset. Record a run with a longer stroke."
         )
     if abs(rate) > LARGEST_RATE:
         return NoClockOffset(
-            f"at the best offset, {offset_s:.3f} s, the rates of the clocks would differ by {1e2 * abs(rate):.2f} "
-            "%, but clocks differ by at most 0.1 %: is this the log of this recording, and are its times in seconds?"
+            f"at the best offset, {offset_s:.3f} s, the clocks would differ by {1e2 * abs(rate):.2f} %, but real "
+            "clocks differ by at most 0.1 %: check whether this is the log of this recording, and whether its times "
+            "are in seconds."
         )
     notes = []
     share = explained(motion, best)
     if jumps:
         notes.append(
-            "The drive's rows jump from one position to the next: if the rows are set-points and not measured "
-            "positions, the delay of the stage is part of the offset."
+            "The drive's rows jump from one position to the next: if they are set-points instead of measured "
+            "positions, the offset includes the time that the stage takes to follow."
         )
     if abs(rate) > max(SURE_RATE * u_rate, ORDINARY_RATE):
         runs = "fast" if rate > 0.0 else "slow"
         notes.append(
             f"The recording's clock runs {runs} against the drive's by {1e2 * abs(rate):.3f} % "
-            f"(U = {2e2 * u_rate:.3f} %, k = 2); this difference was corrected."
+            f"(U = {2e2 * u_rate:.3f} %, k = 2); this difference is corrected."
         )
     crossing_s = crossed_in_s(motion.path)
     if crossing_s > COARSE * frame_s:
         notes.append(
             f"The drive's encoder has steps of {1e3 * motion.path.step_mm:.3g} µm, and the stage takes "
-            f"{crossing_s:.2g} s from one to the next: it is unknown where within a step the stage stopped and "
-            f"reversed, so that the offset may be wrong by more than a frame."
+            f"{crossing_s:.2g} s for one step: the unknown position within a step affects the offset, whose error may "
+            "exceed one frame."
         )
     if motion.creeps:
         notes.append(
-            "The gap seems to creep after the drive. In a slow motion creep looks like a delay, so that the offset "
-            "may be wrong by more than a frame."
+            "The gap seems to creep after motions of the drive: in a slow motion, creep looks like a delay, so that "
+            "creep may change the offset by more than one frame."
         )
     if u_time_s > 0.5 * frame_s:
         notes.append(
-            f"The clock offset is known only with U = {2.0 * u_time_s:.3g} s (k = 2), more than one frame of "
-            f"{frame_s:.3g} s: there is little motion that starts, stops or turns."
+            f"The clock offset has an uncertainty of U = {2.0 * u_time_s:.3g} s (k = 2), more than one frame of "
+            f"{frame_s:.3g} s, because the motion has few starts, stops or reversals."
         )
     if share < FOLLOWED:
         notes.append(

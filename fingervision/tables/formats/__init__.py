@@ -59,7 +59,7 @@ def read_raw(path: Path, given: Entry) -> RawTable:
     Raises
     ------
     DataError, InputFileError
-        The file cannot be read, or holds no table.
+        The file cannot be read, or contains no table.
     """
     if path.exists() and not path.is_file():
         raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")

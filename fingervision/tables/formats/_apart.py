@@ -36,9 +36,9 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
     DataError
         The file cannot be read, or its reader crashed.
     OpenQuestionError
-        As the format's reader.
+        The table can be interpreted in more than one way.
     """
-    # What comes back is from our own program over a pipe of its own; nothing of the file is unpickled.
+    # Only the result of this program's own reader is unpickled, from a private pipe; content of the file never is.
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(path=sys.path)],
         input=pickle.dumps((name, path, given)),

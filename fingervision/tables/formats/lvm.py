@@ -118,7 +118,7 @@ def _segment(
         cells = [cell.strip() for cell in lines[at].split(separator)]
         if not any(cells):
             continue
-        if len(cells) < wide - 1:  # the last, the comment, may be left out
+        if len(cells) < wide - 1:  # the last column, the comment, may be missing
             odd += 1
             continue
         rows.append(cells)

@@ -81,7 +81,7 @@ def _older(path: Path, passed: list[str]) -> dict[str, Any]:
                     passed.append(f"{name} ({kind})")
                 else:
                     wanted.append(name)
-            # The sizes in a damaged or made-up file may be anything: nothing is read that was not looked at.
+            # The sizes stated in a damaged or malicious file may be wrong: every variable is checked before it is read.
             content = loadmat(str(path), variable_names=wanted, simplify_cells=True) if wanted else {}
     except FingervisionError:
         raise
@@ -99,7 +99,7 @@ def _plain(value: Any, name: str, passed: list[str], deep: int = 0) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
         return value
     if isinstance(value, int | float | np.number):
-        return None  # a scalar: a rate, a date; no column
+        return None  # a scalar (such as a rate or a date) is not a column
     passed.append(f"{name} ({'complex numbers' if np.iscomplexobj(value) else type(value).__name__})")
     return None
 
@@ -121,7 +121,7 @@ def _hdf5(path: Path, passed: list[str]) -> dict[str, Any]:
 def _group(library: Any, group: Any, prefix: str, passed: list[str], deep: int) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in group:
-        if name.startswith("#"):  # MATLAB's own store of what cells refer to
+        if name.startswith("#"):  # group in which MATLAB stores the content of cell arrays
             continue
         full = f"{prefix}{name}"
         link = group.get(name, getlink=True)
@@ -140,7 +140,7 @@ def _group(library: Any, group: Any, prefix: str, passed: list[str], deep: int) 
             passed.append(f"{full} ({kind.decode(errors='replace') if isinstance(kind, bytes) else kind})")
         else:
             _check_size(group.file.filename, full, item.size)
-            # MATLAB writes by columns, HDF5 reads by rows.
+            # MATLAB stores arrays column by column, but h5py reads them row by row.
             value = np.asarray(item[()]).T
             if is_numeric(value):
                 found[name] = value

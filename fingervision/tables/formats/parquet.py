@@ -73,7 +73,7 @@ def _column(field: Any, values: Any) -> RawColumn | None:
         present = np.asarray(values.is_valid())
         ticks = whole.fill_null(0).to_numpy(zero_copy_only=False)
         first = ticks[present][0] if present.any() else 0
-        # Nanoseconds since 1970 are more than a float holds: the difference is taken in whole numbers.
+        # A float cannot hold nanoseconds since 1970 exactly: the first time is subtracted in whole numbers.
         zero = first if types.is_timestamp(kind) else 0
         seconds = np.where(present, (ticks - zero) / PER_SECOND[kind.unit], 0.0)
         stamped = types.is_timestamp(kind) and present.any()

@@ -62,7 +62,7 @@ def read(path: Path, given: Entry) -> RawTable:
 @contextmanager
 def _warnings(into: list[str]) -> Iterator[None]:
     """Collect damage that npTDMS logs, instead of printing it to the terminal."""
-    # It gives each of its modules a logger with a handler of its own.
+    # npTDMS gives each of its modules a separate logger and handler.
     loggers = [log for name, log in logging.root.manager.loggerDict.items() if name.startswith("nptdms.")]
     kept = [(log, log.handlers, log.propagate) for log in loggers if isinstance(log, logging.Logger)]
     handler = logging.Handler(logging.WARNING)

@@ -20,7 +20,7 @@ from fingervision.tables.units import is_unit
 ORDER = 20
 MOST_UNPACKED_BYTES = 600_000_000
 """Largest unpacked size: a full sheet (1 048 576 rows) of six columns has about 250 MB of XML, and a much larger
-archive is no measured table or an archive bomb."""
+archive is not a measured table but perhaps an archive bomb."""
 MOST_SHARED_BYTES = 100_000_000
 """Largest total size of the texts of cells, all of which are kept in memory."""
 HEADER_ROWS = 60

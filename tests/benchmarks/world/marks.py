@@ -15,10 +15,12 @@ LEFT_SHARE, LEFT_NOISES = 0.05, 3.0
 """The issue: no name may leave more than 5 % of the disagreement or 3 times the noise, whichever is larger."""
 SIGN_WORDS = (
     "swapped",
+    "exchanged",
     "mirrored",
     "wrong sign",
     "turned round",
     "reversed sign",
+    "is reversed",
     "opposite sign",
     "opposite direction",
 )
