@@ -20,7 +20,8 @@ Examples:
 \b
 Files written to --out:
   compare.html   plots to zoom and read    compare.json  the same as data
-  gap_against_input, gap_over_time, residuals: plots as .svg and .pdf; compare.png
+  compare_gap_against_input, compare_gap_over_time, compare_residuals: plots as .svg and .pdf
+  compare.png    the residuals
 """
 
 

@@ -35,6 +35,12 @@ class Quantiser:
         top, bottom = (self._block(y_px + way - self.first_px[1], rows) for way in (-along_px, along_px))
         return float(self.step[top : bottom + 1, left : right + 1].max())
 
+    def at(self, x_px: NDArray[np.float64], y_px: NDArray[np.float64]) -> float:
+        """Largest step of the blocks in which any of the given points lies."""
+        rows, columns = self.step.shape
+        x, y = ((p - first + 0.5) // BLOCK_PX for p, first in zip((x_px, y_px), self.first_px, strict=True))
+        return float(self.step[np.clip(y, 0, rows - 1).astype(int), np.clip(x, 0, columns - 1).astype(int)].max())
+
     def seen_from(self, x_px: int, y_px: int) -> "Quantiser":
         """Return the quantiser steps of the part of the picture that begins at this column and row."""
         return Quantiser(self.step, (self.first_px[0] - x_px, self.first_px[1] - y_px))

@@ -49,7 +49,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     trail = DamageTrail()
     packets, last_end_s, at_end = 0, None, ""
     losses = StreamLosses(container.format.name, stream)
-    codec = stream.codec_context.name
+    codec, tick_s = stream.codec_context.name, stream.time_base
     is_judged = container.metadata.get("comment") == OWN_RECORDING
     unfollowed = {} if is_judged else missing_references(path, stream, container.format.name)
     is_unchecked = stream.codec.canonical_name in UNCHECKED_CODECS and "matroska" in container.format.name
@@ -70,8 +70,9 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
                 if checksums is not None and checksums.is_broken(packet.pos):
                     trail.breaks(BROKEN)
                 losses.behind(packet, trail)
-                if packet.pts is not None and packet.time_base is not None:
-                    last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+                if packet.pts is not None and tick_s is not None:
+                    end_tick = packet.pts + (packet.duration or 0)
+                    last_end_s = max(last_end_s or 0.0, end_tick * tick_s.numerator / tick_s.denominator)
             at_end = at_end or read.at_end
             if read.hole:
                 trail.breaks(f"{MISSING} after this frame ({read.hole}).")

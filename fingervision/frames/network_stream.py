@@ -15,7 +15,7 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
-from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
+from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.source import Description, Wish
@@ -118,6 +118,7 @@ class NetworkStream:
                 "format in the camera's own settings."
             )
         self._jpegs = SoundJpeg(codec.name)
+        self._steps = StepTrail()
         self.has_own_clock = self._container.format.name not in WITHOUT_TIMES
         self._closed = Event()
         coding = Coding.INTRAFRAME if codec.name in INTRAFRAME_CODECS else Coding.INTERFRAME
@@ -211,13 +212,14 @@ class NetworkStream:
         size_px = (self.description.width_px, self.description.height_px)
         if isinstance(found, str):
             return LostFrame(index, time_s, Status.DAMAGED, found)
+        steps = self._steps.of(found)
         if (found.width, found.height) != size_px:
             words = f"The frame has {found.width}x{found.height} pixels, but the stream has {size_px[0]}x{size_px[1]}."
             return LostFrame(index, time_s, Status.DAMAGED, words)
         if time_s == last_s:
             return LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the previous frame.")
         coding = self.description.coding
-        return Frame(luma(found), index, time_s, coding, not found.key_frame, quantiser_steps(found))
+        return Frame(luma(found), index, time_s, coding, not found.key_frame, steps)
 
     def _own(self, packet: "av.Packet[av.VideoStream]", arrived_s: float, sent_s: float | None) -> OwnPacket:
         shown_s = self._time_s(packet.pts, arrived_s, sent_s)

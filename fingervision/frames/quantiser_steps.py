@@ -5,12 +5,15 @@ and the MPEG family up to MPEG-4 part 2; for other codecs it is unknown.
 """
 
 import struct
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import av
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.loops import loop
 from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 
 # Option of the decoder that exports the quantiser steps.
@@ -30,6 +33,15 @@ VP9_LOSSLESS, VP9_FIRST, VP9_GROWTH, VP9_GAIN, VP9_COUNT = 4.0, 8, 1.01975, 8.0,
 # is smaller, and a filter reduces the remaining errors. Measured with `python -m tests.benchmarks.compressed_video
 # --only mpeg4-1-upright vp9-1-upright`.
 MPEG_LEAVES, VP9_LEAVES = 2.0, 0.5
+# Parameters of 8 to 14 bits in any codec lie within these limits; a damaged stream may state values beyond them.
+LEAST_PARAMETER, MOST_PARAMETER = -128, 511
+# Five numbers of four bytes (libavutil/video_enc_params.h, AVVideoBlockParams).
+BLOCK_BYTES = 20
+# A block that is not coded again keeps the error of the last picture that coded it, and what later pictures add. They
+# also mend some of it: an earlier step counts by so much less with every picture.
+FADES = 0.97
+
+_fill = loop("quantiser_steps_fill")
 
 
 def _vp9_steps() -> NDArray[np.float64]:
@@ -62,14 +74,39 @@ def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
         return Quantiser(np.full(shape, step, dtype=np.float32))
     if not count or kind not in (H264, MPEG):
         return None
-    blocks: NDArray[np.int32] = np.frombuffer(data, np.int32, count * (size // 4), blocks_at).reshape(count, size // 4)
-    x, y, parameter = blocks[:, 0] // BLOCK_PX, blocks[:, 1] // BLOCK_PX, base + blocks[:, 4].astype(np.float32)
-    is_inside = (x >= 0) & (y >= 0) & (x < shape[1]) & (y < shape[0])
-    bits = picture.format.components[0].bits
-    if kind == H264:
-        steps = 2.0 ** ((parameter - H264_UNIT) / H264_DOUBLES) / 2.0 ** (bits - 8)
-    else:
-        steps = MPEG_LEAVES * parameter
-    step = np.full(shape, np.float32(np.max(steps, initial=0.0)), dtype=np.float32)
-    step[y[is_inside], x[is_inside]] = steps[is_inside]
+    if size < BLOCK_BYTES or blocks_at + count * size > len(data):
+        return None
+    step = np.empty(shape, dtype=np.float32)
+    _fill(data, blocks_at, size, count, base, _steps(kind, picture.format.components[0].bits), step)
     return Quantiser(step)
+
+
+@cache
+def _steps(kind: int, bits: int) -> NDArray[np.float32]:
+    """Step for every parameter from `LEAST_PARAMETER` to `MOST_PARAMETER`, on the scale of 8 bits."""
+    parameter = np.arange(LEAST_PARAMETER, MOST_PARAMETER + 1, dtype=np.float32)
+    if kind == H264:
+        return np.asarray(2.0 ** ((parameter - H264_UNIT) / H264_DOUBLES) / 2.0 ** (bits - 8), dtype=np.float32)
+    return np.asarray(MPEG_LEAVES * parameter, dtype=np.float32)
+
+
+@dataclass(slots=True, eq=False)
+class StepTrail:
+    """Quantiser steps that the pictures of a stream were coded with, where they show what earlier ones have coded.
+
+    A block that is copied from another picture (skipped) states no step of its own, but that of the block before it
+    (H.264's QP_Y,PRED, ITU-T H.264 (2021), 7.4.5), often that of flat ground, which is up to four times finer. What it
+    shows was coded in earlier pictures. The step of every block is therefore the largest since the last picture that
+    was coded by itself, fading slowly.
+    """
+
+    last: NDArray[np.float32] | None = None
+
+    def of(self, picture: av.VideoFrame) -> Quantiser | None:
+        """Quantiser steps of the next picture of the stream; None if its codec does not report them."""
+        found = quantiser_steps(picture)
+        if found is None or picture.key_frame or self.last is None or self.last.shape != found.step.shape:
+            self.last = None if found is None else found.step
+            return found
+        self.last = np.maximum(found.step, np.float32(FADES) * self.last)
+        return Quantiser(self.last)

@@ -9,7 +9,7 @@ from fingervision.domain.frame import Coding, Frame
 from fingervision.frames import image_folder, video_file
 from fingervision.frames.luma import luma
 from fingervision.frames.open_container import open_container
-from fingervision.frames.quantiser_steps import EXPORTED
+from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
 from fingervision.frames.video_file import upright, upright_steps
 
 # Largest number of frames that are decoded from a key frame to the wanted frame; beyond it, frames are counted from the
@@ -70,11 +70,13 @@ class VideoSeeking:
             return None
         wanted = round(time_s / float(stream.time_base))
         self._container.seek(wanted, stream=stream, backward=True)
+        trail = StepTrail()
         for number, picture in enumerate(self._container.decode(stream)):
+            steps = trail.of(picture)
             if picture.pts == wanted and not picture.is_corrupt:
                 hangs = self._coding is Coding.INTERFRAME and not picture.key_frame
                 pixels = upright(luma(picture), picture.rotation)
-                return Frame(pixels, index, time_s, self._coding, hangs, upright_steps(picture))
+                return Frame(pixels, index, time_s, self._coding, hangs, upright_steps(steps, picture))
             if number > MOST_FRAMES_TO_DECODE or picture.pts is None or picture.pts > wanted:
                 return None
         return None

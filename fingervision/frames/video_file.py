@@ -19,7 +19,7 @@ from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
 from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.open_container import open_container
-from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
+from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
 from fingervision.frames.told_times import believable
@@ -152,6 +152,7 @@ class VideoFile:
         """Decode in sequence; frames that cannot be decoded, or depend on such frames, are marked as damaged."""
         numbers = count()
         last_tick: int | None = None
+        trail = StepTrail()
         with self._opened() as container:
             stream = _stream(container, self.name)
             stream.codec_context.options = STRICT | EXPORTED
@@ -160,16 +161,17 @@ class VideoFile:
                 # (libavcodec/h264_slice.c, enable_er), so that parts of older pictures would remain unnoticed.
                 stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
+            tick_s = stream.time_base
             untrusted = unseen_damage(Path(self.name), stream, container.metadata.get("comment"))
             for tick, found in believable(pictures(container, stream, Path(self.name))):
                 index = next(numbers)
-                time_s = None if tick is None or stream.time_base is None else float(tick * stream.time_base)
+                time_s = None if tick is None or tick_s is None else tick * tick_s.numerator / tick_s.denominator
                 if untrusted or isinstance(found, str):
                     words = found if isinstance(found, str) else untrusted
                     yield LostFrame(index, time_s, Status.DAMAGED, words)
                     last_tick = tick
                     continue
-                pixels = upright(luma(found), found.rotation)
+                pixels, steps = upright(luma(found), found.rotation), upright_steps(trail.of(found), found)
                 if pixels.shape[1::-1] != (self.description.width_px, self.description.height_px):
                     yield LostFrame(index, time_s, Status.DAMAGED, _of_another_size(pixels, self.description))
                 elif tick is not None and tick == last_tick:
@@ -178,7 +180,7 @@ class VideoFile:
                     )
                 else:
                     hangs = not found.key_frame
-                    yield Frame(pixels, index, time_s, self.description.coding, hangs, upright_steps(found))
+                    yield Frame(pixels, index, time_s, self.description.coding, hangs, steps)
                 last_tick = tick
 
     def _opened(self) -> av.container.InputContainer:
@@ -224,9 +226,8 @@ def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
     return turned
 
 
-def upright_steps(picture: av.VideoFrame) -> Quantiser | None:
-    """Quantiser steps of a picture, rotated as the file requests."""
-    steps = quantiser_steps(picture)
+def upright_steps(steps: Quantiser | None, picture: av.VideoFrame) -> Quantiser | None:
+    """Return the quantiser steps of a picture, rotated as the file requests."""
     if steps is None or picture.rotation % QUARTER_DEG:
         return steps
     return steps.turned(picture.rotation // QUARTER_DEG, picture.width, picture.height)

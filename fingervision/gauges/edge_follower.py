@@ -25,6 +25,8 @@ from fingervision.gauges.straight_edge import (
 from fingervision.vision.edge_search import Profile, StepCandidate, candidates, profile
 
 Floats = NDArray[np.float64]
+# Steps nearer to each other than this are one edge, twice: a profile of strips of a pixel knows a step to half of that.
+SAME_PX = 2.0
 
 
 class EdgeFollower:
@@ -45,7 +47,7 @@ class EdgeFollower:
     def __init__(self, axes: Axes, at_px: float, length_px: float, reach_px: float, polarity: int) -> None:
         self.axes, self.length_px, self.reach_px = axes, length_px, reach_px
         self.at_px, self.polarity = at_px, polarity
-        self.slope, self.times = 0.0, 1.0
+        self.slope, self.times, self.most_times = 0.0, 1.0, float(MOST_TIMES)
         self.first_reach_px = reach_px
         self.known: EdgeFound | None = None
 
@@ -60,7 +62,7 @@ class EdgeFollower:
 
     def lost(self) -> None:
         """Widen the search zone of the next frame, because the edge was not found."""
-        self.times = min(self.times + 1.0, float(MOST_TIMES)) if self.known is not None else 1.0
+        self.times = min(self.times + 1.0, self.most_times) if self.known is not None else 1.0
 
     def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
         """The only candidate that may be the edge, together with the other edges beside it."""
@@ -104,8 +106,26 @@ class EdgeFollower:
                 GaugeStatus.AMBIGUOUS, f"{len(alike)} edges lie within reach_px, at {places} px along the direction"
             )
         if abs(alike[0].position_px) > reach + 1.0:
-            return NotFound(GaugeStatus.NO_EDGE, "the nearest edge is farther away than reach_px permits")
+            return NotFound(GaugeStatus.NO_EDGE, "it lies farther away than it may have moved")
+        if self.known is None:
+            wide = profile(
+                picture.grey, picture.light, anchor, self.axes.direction_rad, self.slope, self.length_px,
+                ceil(GUARD * MOST_TIMES * self.reach_px) + BEYOND_PX,
+            )  # fmt: skip
+            self.most_times = self._times_clear_of(
+                candidates(wide), replace(alike[0], position_px=alike[0].position_px - off)
+            )
         return alike[0], steps
+
+    def _times_clear_of(self, steps: list[StepCandidate], own: StepCandidate) -> float:
+        """How many times the reach a search may grow without reaching an edge like the own one."""
+        apart = [
+            abs(step.position_px - own.position_px)
+            for step in steps
+            if LEAST_OF_KNOWN <= step.contrast / own.contrast <= MOST_OF_KNOWN
+        ]
+        nearest = min((away for away in apart if away > SAME_PX), default=float("inf"))
+        return float(np.clip((nearest - SAME_PX) / (GUARD * self.reach_px), 1.0, MOST_TIMES))
 
     def _in_reach(self, steps: list[StepCandidate], reach: float) -> list[StepCandidate]:
         sign = self.polarity if self.known is None else (1 if self.known.contrast > 0.0 else -1)

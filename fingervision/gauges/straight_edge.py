@@ -28,7 +28,8 @@ BEYOND_PX = 8
 # No similar edge may lie within this multiple of reach_px; a motion may then exceed reach_px by half without a
 # confusion with a neighbouring edge.
 GUARD = 1.5
-# Largest multiple of reach_px at which an edge is searched after frames without a value.
+# After a frame without a number the thing may be farther away: so many times the reach at most, and not so far that
+# something like it, seen in the first frame beside it, could be taken for it.
 MOST_TIMES = 4
 # Smallest contrast of a neighbouring edge, as a share of the measured edge's contrast, at which it is fitted too.
 LEAST_BESIDE = 0.1

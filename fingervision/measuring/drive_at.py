@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
+from fingervision.measuring.drive_jumps import jumps
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,8 @@ def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
     """Interpolate the drive linearly between the two samples that bracket an instant.
 
     Nothing is extrapolated: before the first sample, after the last sample, and between two runs the function returns
-    no input.
+    no input. It returns none either where the log jumps from one place of rest to another, because the place in between
+    is not known.
 
     Parameters
     ----------
@@ -42,7 +44,7 @@ def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
     Returns
     -------
     DriveState or None
-        None if no run brackets the instant.
+        None if no run brackets the instant, or if the log jumps there.
     """
     after = int(np.searchsorted(drive.time_s, time_s, side="left"))
     if after == drive.time_s.size:
@@ -55,6 +57,8 @@ def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
         before = after - 1
     run = ("", "") if drive.run is None else (drive.run[before], drive.run[after])
     if run[0] != run[1]:
+        return None
+    if before != after and jumps(drive)[before]:
         return None
     start_s, end_s = float(drive.time_s[before]), float(drive.time_s[after])
     share = 0.0 if before == after else (time_s - start_s) / (end_s - start_s)

@@ -4,11 +4,14 @@ from collections.abc import Set
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.common_clock import clock_of, refusal, sentence
 from fingervision.measuring.clock.common_clock import in_words as clock_in_words
+from fingervision.measuring.drive_jumps import within_jump
 from fingervision.measuring.frame_loop import Prepared
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.summary import summarise
@@ -32,9 +35,33 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
     description = how.description
     if isinstance(clock, ClockOffset):
         description = replace(description, notes=(*description.notes, sentence(clock), *clock.notes))
+    unknown = _within_jumps(task, series, clock)
+    if unknown:
+        description = replace(
+            description,
+            notes=(
+                *description.notes,
+                f"{unknown} frames lie between two rows at which the drive's log jumps; where the stage was then is "
+                "not known, and their input is empty.",
+            ),
+        )
     given_s = task.drive_offset_s if task.drive is not None else None
     settings = {**in_words(task, how.settings), **clock_in_words(clock, given_s)}
     return summarise(description, settings, task.scale, task.scale_file, series, complete=complete)
+
+
+def _within_jumps(task: Task, series: GapSeries, clock: Clock) -> int:
+    """Count the frames that lie within a jump of the drive's log."""
+    times = series.times_s()
+    if task.drive is None or times is None:
+        return 0
+    if isinstance(clock, ClockOffset):
+        log_s = np.array([clock.log_time_s(float(time_s)) for time_s in times[0]])
+    elif task.drive_offset_s is not None:
+        log_s = times[0] - task.drive_offset_s
+    else:
+        return 0
+    return int(np.count_nonzero(within_jump(task.drive, log_s)))
 
 
 def undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[bool], where: str) -> DataError | None:

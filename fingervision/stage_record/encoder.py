@@ -111,7 +111,8 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
     moved = [run.start + np.flatnonzero(np.abs(np.diff(input_mm[run], prepend=np.inf)) > RESOLVED_MM) for run in runs]
     values = input_mm[np.concatenate(moved)]
     span = float(np.ptp(values))
-    if values.size < MANY or span == 0.0:
+    # A record that is on the lines of its encoder has no jitter: halts at equal distances would be taken for its lines.
+    if values.size < MANY or span == 0.0 or input_sigma(input_mm, runs)[1] > 0.0:
         return input_mm
     finest = np.median(np.abs(np.diff(np.sort(values)))) * 4.0
     frequency = np.arange(FEWEST_LINES, min(span / max(finest, RESOLVED_MM), MOST_LINES), PEAK_STEP) / span

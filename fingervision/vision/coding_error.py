@@ -4,43 +4,49 @@ If an edge is parallel to the codec's blocks, all its rows share an error, which
 does not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture
 either. The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For
 an edge of contrast A the codec's transform coefficients change by about A per pixel of displacement, so that the
-displacement is a fixed fraction of the ratio of step to contrast.
+displacement is a fixed fraction of `step / A`.
+
+A block that the coder does not code again states no step of its own but that of the block before it (H.264's QP_Y,PRED,
+ITU-T H.264 (2021), 7.4.5), which may be flat ground with a step four times finer than the coder allows an edge. The
+step that counts is therefore the largest along the outlines of both fingers.
 """
 
 from dataclasses import replace
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
-from fingervision.domain.quantiser import Quantiser
+from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.median import middle
 from fingervision.vision.orientation import Orientation
-from fingervision.vision.profile_lines import INNER
+from fingervision.vision.profile_lines import INNER, IS_ROW
 
 Floats = NDArray[np.float64]
 
-# Standard uncertainty of one edge's position in units of step / contrast, measured on rendered recordings of upright
-# and tilted fingers at 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
-DISPLACED = 0.42
-# Extent of the blocks that affect an edge, from the measuring point: across the finger (a multiple of the blur plus
-# pixels), and along the finger.
-ACROSS_SIGMAS, ACROSS_PX, ALONG_PX = 3.0, 2.0, 40.0
-# If the stream does not state its quantiser: standard uncertainty in units of the displacement estimated from the rows'
-# mean residual. An independently coded picture is displaced by less than a picture predicted from others.
-SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 1.5}
-# The same factor for a picture that is stored without loss but may have been processed before (saved again, enlarged,
-# demosaiced); its error is assumed to be the same in every frame.
+# Standard uncertainty of one edge's place in units of step over contrast. Measured on drawn recordings, upright and
+# leaning, 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
+DISPLACED = 0.4
+# So much of an outline (pixels) says where a finger's edge is: the rows that are fitted (`profile_lines.INNER`).
+ALONG_PX = 72.0
+# The blocks this far across an outline (standard deviations of the blur, and pixels more) carry the edge.
+ACROSS_SIGMAS, ACROSS_PX = 3.0, 2.0
+# Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
+# coded by itself is displaced by less than one that is copied from its neighbours (the classes of HEVC, AV1 and MJPEG
+# in `compressed_video`).
+SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 2.0}
+# The same for a picture that claims to be as the sensor saw it (saved again, enlarged, interpolated from colours): its
+# rows are looked at as well, and what they share is in every frame alike, as far as anybody knows.
 EVEN_SHIFTS = 2.0
 # Full scale for which quantiser steps are stated: 8 bits.
 EIGHT_BITS = 255.0
 
 
-def displaced_px(step: float, contrast: float) -> float:
-    """Standard uncertainty of an edge's position (px) from a codec error that the whole edge shares.
+def displaced_px(step: float, contrast: float, slope: float = 0.0) -> float:
+    """Standard uncertainty of an edge's position along its normal (px) from a codec error that the whole edge shares.
 
     Parameters
     ----------
@@ -48,14 +54,16 @@ def displaced_px(step: float, contrast: float) -> float:
         Quantiser step, in grey levels of an 8-bit scale.
     contrast : float
         Contrast of the edge, in grey levels of an 8-bit scale.
+    slope : float
+        Slope of the edge against the blocks of the codec: an edge that crosses several columns of blocks averages
+        their errors, which are independent.
     """
-    return DISPLACED * step / max(abs(contrast), 1.0)
+    columns = 1.0 + abs(slope) * ALONG_PX / BLOCK_PX
+    return DISPLACED * step / max(abs(contrast), 1.0) / sqrt(columns)
 
 
-def flanks_displaced_px(
-    edges: EdgePoints, orientation: Orientation, quantiser: Quantiser, light: Floats, top_level: int
-) -> tuple[float, float]:
-    """Standard uncertainty (px) of the position of both inner flanks, from codec errors that all of their rows share.
+def outline_step(edges: EdgePoints, orientation: Orientation, quantiser: Quantiser) -> float:
+    """Largest quantiser step of the blocks along both fingers' outlines, in grey levels of an 8-bit scale.
 
     Parameters
     ----------
@@ -65,6 +73,25 @@ def flanks_displaced_px(
         Transformation from the fingers' axes to the picture.
     quantiser : Quantiser
         Quantiser of the picture.
+    """
+    lines = edges.lines
+    reach = ACROSS_SIGMAS * float(edges.blur_px.max()) + ACROSS_PX
+    beside = (edges.position[..., None] + np.array([-reach, reach]))[lines.weight > 0]
+    fixed = np.broadcast_to(lines.fixed[..., None], (*lines.fixed.shape, 2))[lines.weight > 0]
+    is_row = np.broadcast_to(IS_ROW, lines.fixed.shape)[lines.weight > 0][:, None]
+    x, y = orientation.points_to_pixels(np.where(is_row, beside, fixed), np.where(is_row, fixed, beside))
+    return quantiser.at(x, y) if x.size else float(quantiser.step.max())
+
+
+def flanks_displaced_px(edges: EdgePoints, step: float, light: Floats, top_level: int) -> tuple[float, float]:
+    """Standard uncertainty (px) of the position of both inner flanks, from codec errors that all of their rows share.
+
+    Parameters
+    ----------
+    edges : EdgePoints
+        Steps that were fitted to every line.
+    step : float
+        Quantiser step along the outlines (`outline_step`).
     light : ndarray of float, shape (levels,)
         Light for every stored level (look-up table).
     top_level : int
@@ -76,18 +103,13 @@ def flanks_displaced_px(
         if not np.any(is_seen):
             displaced.append(0.0)
             continue
-        across, contrast = (middle(a[k, :INNER][is_seen]) for a in (edges.position, edges.contrast))
-        rows = edges.lines.fixed[k, :INNER][is_seen]
-        x, y = orientation.to_pixels(across, 0.5 * float(rows.min() + rows.max()))
-        half_px = ACROSS_SIGMAS * float(edges.blur_px[k, 0]) + ACROSS_PX, 0.5 * float(np.ptp(rows))
-        beside, along = half_px if orientation.direction.is_vertical else half_px[::-1]
-        step = quantiser.near(x, y, beside, along)
+        contrast = middle(edges.contrast[k, :INNER][is_seen])
         displaced.append(displaced_px(step, _stored_contrast(level, contrast, light, top_level)))
     return displaced[0], displaced[1]
 
 
 def with_coding_error(
-    found: GapMeasurement, quantiser: Quantiser, inside: tuple[float, float], light: Floats, top_level: int
+    found: GapMeasurement, step: float, inside: tuple[float, float], light: Floats, top_level: int
 ) -> GapMeasurement:
     """Return the measurement with its uncertainty increased by possible codec errors of the two edges.
 
@@ -95,8 +117,8 @@ def with_coding_error(
     ----------
     found : GapMeasurement
         Measurement in the picture's pixels.
-    quantiser : Quantiser
-        Quantiser of the picture.
+    step : float
+        Quantiser step along the outlines (`outline_step`).
     inside : (float, float)
         Light of the left and of the right finger beside its edge.
     light : ndarray of float, shape (levels,)
@@ -104,16 +126,11 @@ def with_coding_error(
     top_level : int
         Highest level of the scale.
     """
-    displaced = []
-    for edge, level in zip((found.left, found.right), inside, strict=True):
-        across, along = ACROSS_SIGMAS * edge.blur_px + ACROSS_PX, ALONG_PX
-        if not found.direction.is_vertical:
-            across, along = along, across
-        step = quantiser.near(edge.x_px, edge.y_px, across, along)
-        displaced.append(
-            displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level)) * _by_slope(edge.slope)
-        )
-    return _less_sure(found, displaced[0], displaced[1])
+    left, right = (
+        displaced_px(step, _stored_contrast(level, edge.contrast, light, top_level), edge.slope) * _by_slope(edge.slope)
+        for edge, level in zip((found.left, found.right), inside, strict=True)
+    )
+    return _less_sure(found, left, right)
 
 
 def _stored_contrast(level: float, contrast: float, light: Floats, top_level: int) -> float:

@@ -27,11 +27,13 @@ from fingervision.vision.polygonal_outline import polygonal_measuring_point
 from fingervision.vision.profile_lines import INNER, PLACES, ROWS
 from fingervision.vision.residuals import (
     SHARED_POINTS,
+    corner_aside_px,
     has_flanks,
     set_aside_variance,
     shape_holds,
     shared_points,
     spread,
+    top_aside_variance,
 )
 from fingervision.vision.rough_corner import with_corner_doubt
 from fingervision.vision.roughness import best_linear, roughness, with_roughness
@@ -149,9 +151,13 @@ def measure_gap(
         set_aside_variance(p, end, found.edge, found.tip + below_tip_px)
         for p, end, found in zip(points, (left, right), fitted, strict=True)
     ]
-    if not chains and (not all(holds) or any(aside)):
+    cuts_px = [corner_aside_px(*one, below_tip_px) for one in zip(points, (left, right), fitted, strict=True)]
+    are_cut = all(cuts_px)
+    if not chains and (not all(holds) or any(aside) or are_cut):
         chains = _polygonal(points, below_tip_px, noise_shared)
-    if chains and all(holds):  # the shape with the smaller uncertainty is used
+    if are_cut:  # by whatever else than a fillet: the edge lies between the shape and the points that it left aside
+        aside = [beyond + 2.0 / 3.0 * cut_px**2 for beyond, cut_px in zip(aside, cuts_px, strict=True)]
+    if chains and all(holds):  # what knows its points better
         variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]
         chains = chains if sum(own.covariance[1, 1] for own in chains) < sum(variances) else []
     measured = list(chains)
@@ -165,6 +171,7 @@ def measure_gap(
                     return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
                 covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
                 covariance[1, 1] += beyond
+                covariance += top_aside_variance(p, end) * np.outer((1.0, found.slope), (1.0, found.slope))
                 own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
             if own is None:
                 return NoGap(Status.NO_FINGERS, BROKEN_BY[coding])

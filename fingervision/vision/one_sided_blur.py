@@ -6,6 +6,10 @@ width w beyond the edge displaces the single fitted step by q w, and adds q (1 -
 equally, and displaces neither of them. If one side's squared blur still differs by D, its edges may be displaced by
 sqrt(|D| q / (1 - q)): by sqrt(|D|) if the shadow is half as dark as the body (q = 1/2), by twice that for q = 4/5. The
 offset of this side therefore has the standard uncertainty sqrt(|D|).
+
+A lens with distortion, or a camera that looks at the plane at an angle, magnifies the sides differently. The blur of
+optics is then the same in the picture, that of an object out of focus rather the same in the plane; both, and what lies
+between them, count as equal.
 """
 
 import numpy as np
@@ -44,7 +48,9 @@ def sides_of(middles: Array, normals: Array) -> NDArray[np.intp]:
     return side
 
 
-def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: Array) -> Array:
+def doubtful_offsets(
+    middles: Array, normals: Array, blur_px: Array, u_blur_px: Array, stretch: Array | None = None
+) -> Array:
     """Uncertainty of the edge positions that is suggested by differences in blur between the sides of a body.
 
     Each column of the result is one standard uncertainty, which all chunks of one side share.
@@ -55,6 +61,8 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
         Middles and unit normals of the fitted chunks, in their order along the outline.
     blur_px, u_blur_px : ndarray of float, shape (m,)
         Gaussian sigma of each chunk's edge, and its standard uncertainty.
+    stretch : ndarray of float, shape (m,), or None
+        Distance across each edge in the undistorted plane over that in the picture; None for 1 everywhere.
 
     Returns
     -------
@@ -66,6 +74,7 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
     numbers = np.unique(side)
     square, variance = blur_px**2, np.maximum((2.0 * blur_px * u_blur_px) ** 2, 1e-12)
     mean, spread, normal = np.zeros(numbers.size), np.zeros(numbers.size), np.zeros((2, numbers.size))
+    magnified = np.ones(numbers.size)
     for j, number in enumerate(numbers):
         own = side == number
         weight = 1.0 / variance[own]
@@ -73,7 +82,9 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
         chi_square = float(weight @ (square[own] - mean[j]) ** 2)
         spread[j] = max(1.0, chi_square / max(int(own.sum()) - 1, 1)) / weight.sum()
         normal[:, j] = normals[:, own].mean(axis=1)
-    excess = _excess(mean, spread, normal)
+        if stretch is not None:
+            magnified[j] = stretch[own].mean()
+    excess = _excess(mean, spread, normal, magnified)
     if not excess.any():
         return np.zeros((side.size, 0))
     # If one side has a shadow, the positions of the other sides have an uncertainty as well, from the uncertainty of
@@ -82,7 +93,7 @@ def doubtful_offsets(middles: Array, normals: Array, blur_px: Array, u_blur_px: 
     return np.asarray(np.where(side[:, None] == numbers, u_side, 0.0))
 
 
-def _excess(mean: Array, variance: Array, normal: Array) -> Array:
+def _excess(mean: Array, variance: Array, normal: Array, magnified: Array) -> Array:
     """Part of each side's squared blur that a shadow would explain, shape (k,); 0 for a side without such a part.
 
     Parameters
@@ -91,10 +102,14 @@ def _excess(mean: Array, variance: Array, normal: Array) -> Array:
         Mean squared blur of each side, and the variance of this mean.
     normal : ndarray of float, shape (2, k)
         Outward normal of each side.
+    magnified : ndarray of float, shape (k,)
+        Mean stretch of each side.
     """
     cosine = normal.T @ normal
     apart = mean[:, None] - mean
-    limit = np.hypot(SURE * np.sqrt(variance[:, None] + variance), OPTICS * np.minimum(mean[:, None], mean))
+    least = np.minimum(mean[:, None], mean)
+    limit = np.hypot(SURE * np.sqrt(variance[:, None] + variance), OPTICS * least)
+    limit += least * np.abs(np.exp(2.0 * np.abs(np.log(magnified[:, None] / magnified))) - 1.0)
     agree = np.abs(apart) <= limit
     across = np.abs(cosine) < -OPPOSITE
     found = np.zeros(mean.size)

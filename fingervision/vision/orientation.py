@@ -65,6 +65,14 @@ class Orientation:
             along = self.along_size - 1 - along
         return (across, along) if self.direction.is_vertical else (along, across)
 
+    def points_to_pixels(
+        self, across: NDArray[np.float64], along: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Convert arrays of (across, along) to pixel coordinates (x, y)."""
+        if self.is_flipped:
+            along = self.along_size - 1 - along
+        return (across, along) if self.direction.is_vertical else (along, across)
+
     def along_to_pixels(self, along: float) -> float:
         """Convert a coordinate along the fingers to the picture's coordinate on the same axis."""
         return self.along_size - 1 - along if self.is_flipped else along

@@ -120,6 +120,8 @@ class ChunkEdges:
         pixels' noise.
     blur, u_blur : ndarray of float, shape (m,)
         Gaussian sigma of the optics (px), and its standard uncertainty.
+    stretch : ndarray of float, shape (m,)
+        Distance across the edge in the undistorted plane over that in the picture.
     used, in_view : ndarray of bool, shape (m,)
         Whether the chunk shows an edge of the body, and whether the chunk lies in the picture.
     """
@@ -128,6 +130,7 @@ class ChunkEdges:
     variance: Array
     blur: Array
     u_blur: Array
+    stretch: Array
     used: NDArray[np.bool_]
     in_view: NDArray[np.bool_]
 
@@ -215,7 +218,7 @@ def chunk_edges(
         used &= _like_the_others(blurs, level, contrast, noise, used)
     offset = chunks.stretch * (offset - view.outward_px)
     variance, u_blur = variance * view.shared_pixels * chunks.stretch**2, u_blur * view.shared_pixels**0.5
-    return ChunkEdges(offset, variance, blurs, u_blur, used, in_view)
+    return ChunkEdges(offset, variance, blurs, u_blur, chunks.stretch, used, in_view)
 
 
 def _like_the_others(

@@ -18,17 +18,36 @@ NOISE_MARGIN = 1.4
 ROUNDING = 1.0 / 12.0
 
 
+def residual_power(gain: Doubles, x: Doubles, y: Doubles) -> Doubles:
+    """Mean square of the smoothed residuals of k patches for noise of unit variance in every pixel of both pictures."""
+    table = phase_power(SMOOTHING_PX, CURVATURE)
+    places = [np.floor((v - np.floor(v)) * table.size).astype(np.intp) % table.size for v in (x, y)]
+    return np.asarray(table[0] ** 2 + gain**2 * table[places[0]] * table[places[1]])
+
+
 def noise_covariance(
     hessian: Doubles,
     score: Doubles,
-    squares: Doubles,
+    residual: Doubles,
+    by_noise: Doubles,
     gain: Doubles,
-    x: Doubles,
-    y: Doubles,
     half_size: tuple[int, int],
     shared_pixels: float,
 ) -> tuple[Doubles, Doubles]:
     """Covariance of x, y and rotation from the residuals, and standard deviation of the noise of one picture.
+
+    Parameters
+    ----------
+    hessian, score : ndarray of float, shape (k, 3, 3)
+        Of the references.
+    residual, by_noise : ndarray of float, shape (k,)
+        Mean square of the smoothed residuals, and the same for noise of unit variance (`residual_power`).
+    gain : ndarray of float, shape (k,)
+        Contrast of the reference relative to that of the picture.
+    half_size : (int, int)
+        Pixels on either side of the patch's middle across and down.
+    shared_pixels : float
+        Number of neighbouring pixels that share an error and count as one.
 
     Both pictures have noise of variance `sigma^2` per pixel. Smoothing and interpolation reduce it by the factors `k_0`
     (first picture) and `k` (second picture, by the sub-pixel phase), so that the residuals have the variance
@@ -37,11 +56,8 @@ def noise_covariance(
     Gram matrix of the gradients smoothed once more. The noise in the gradients of the reference increases their Gram
     matrix and is subtracted from it (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
-    count, (n, turned) = squares.size, extent(*half_size)
-    table = phase_power(SMOOTHING_PX, CURVATURE)
-    places = [np.floor((v - np.floor(v)) * table.size).astype(np.intp) % table.size for v in (x, y)]
-    power = table[places[0]] * table[places[1]]
-    one = np.maximum(squares / max(n - 7, 1) / (table[0] ** 2 + gain**2 * power), ROUNDING)
+    count, (n, turned) = residual.size, extent(*half_size)
+    one = np.maximum(residual / by_noise, ROUNDING)
     spread = one * (1.0 + gain**2) * shared_pixels
     noisy = np.zeros((count, 3, 3))
     noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * derivative_power(SMOOTHING_PX, CURVATURE)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
-from fingervision.vision.patch_aliasing import aliasing_covariance
+from fingervision.vision.patch_aliasing import Aliasing, patch_aliasing
 from fingervision.vision.spline_interpolation import (
     KERNEL_REACH,
     SPLINE_REACH,
@@ -53,11 +53,9 @@ class PatchReference:
     hessian : ndarray, shape (3, 3)
         Gram matrix of the jacobian.
     score : ndarray, shape (3, 3)
-        Gram matrix of the jacobian smoothed once more: covariance of the projections of smoothed noise of unit variance
-        on the jacobian.
-    aliasing : ndarray, shape (2, 3)
-        Variance of x, y and angle due to texture that is too fine for the columns (first row) and for the rows of
-        pixels (second row), averaged over all sub-pixel phases (`patch_aliasing`).
+        That of the jacobian smoothed once more: covariance of what smoothed noise of unit variance projects on it.
+    aliasing : Aliasing
+        What texture that is too fine for the pixels does to the registration.
     template : ndarray, shape (height, width)
         Light without smoothing, for the coarse search.
     """
@@ -70,7 +68,7 @@ class PatchReference:
     jacobian: Floats
     hessian: Doubles
     score: Doubles
-    aliasing: Doubles
+    aliasing: Aliasing
     template: Floats
 
     @property
@@ -132,7 +130,7 @@ def patch_reference(levels: Floats, column: int, row: int, half_width: int, half
     for axis in (1, 2):
         images = correlate1d(images, smoothing(SMOOTHING_PX, CURVATURE), axis=axis, mode="constant")
     smoothed = images.reshape(3, -1)
-    aliasing = aliasing_covariance(part, MARGIN_PX, jacobian, smoothing(SMOOTHING_PX, CURVATURE))
+    aliasing = patch_aliasing(part, MARGIN_PX, jacobian, smoothing(SMOOTHING_PX, CURVATURE))
     return PatchReference(
         float(column), float(row), half_width, half_height, own.astype(np.float32), jacobian.astype(np.float32),
         jacobian @ jacobian.T, smoothed @ smoothed.T, aliasing, part[inner, inner].copy(),

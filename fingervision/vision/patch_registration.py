@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
 from fingervision.vision.patch_aliasing import aliasing_at
-from fingervision.vision.patch_covariance import noise_covariance, widened
+from fingervision.vision.patch_covariance import noise_covariance, residual_power, widened
 from fingervision.vision.patch_reference import CURVATURE, SMOOTHING_PX, PatchReference  # noqa: F401 - the loop takes it
 from fingervision.vision.spline_interpolation import coefficients
 
@@ -27,6 +27,9 @@ SETTLED_PX, ITERATIONS = 0.01, 12
 # Number of blocks across and down into which a patch is divided. Each block contains several correlation lengths of
 # smoothed noise (2.5 px), and sixteen blocks determine a variance with a relative uncertainty of a third.
 BLOCKS = 4
+
+# Unknowns of a registration: x, y, rotation, gain, and the plane's three.
+UNKNOWNS = 7
 
 _settled = loop("patch_registration_settled")
 
@@ -47,6 +50,9 @@ class Registered:
         Standard deviation of the noise of one picture.
     settled : ndarray of bool, shape (k,)
         Whether the registration converged inside the given part.
+    aliasing_px : ndarray of float, shape (k,)
+        Standard deviation of x or y by texture that is too fine for the pixels, at the sub-pixel phase where it is
+        largest.
     """
 
     x_px: Doubles
@@ -56,6 +62,7 @@ class Registered:
     correlation: Doubles
     noise: Doubles
     settled: NDArray[np.bool_]
+    aliasing_px: Doubles
 
 
 def register(
@@ -103,7 +110,10 @@ def register(
     settled = np.array([of[6] for of in found], dtype=bool)
     score = np.stack([reference.score for reference in references])
     size = (first.half_width_px, first.half_height_px)
-    covariance, noise = noise_covariance(hessian, score, squares, gain, x, y, size, shared_pixels)
-    aliasing = aliasing_at(np.stack([reference.aliasing for reference in references]), x, y, turn, size)
-    covariance = widened(covariance, inverse, scores, aliasing)
-    return Registered(x + origins_px[:, 0], y + origins_px[:, 1], turn, covariance, correlation, noise, settled)
+    residual, by_noise = squares / max((2 * size[0] + 1) * (2 * size[1] + 1) - UNKNOWNS, 1), residual_power(gain, x, y)
+    covariance, noise = noise_covariance(hessian, score, residual, by_noise, gain, size, shared_pixels)
+    aliasing = [reference.aliasing for reference in references]
+    aliased = aliasing_at(aliasing, (x, y, turn), size, residual, by_noise)
+    covariance = widened(covariance, inverse, scores, aliased.variance)
+    x_px, y_px = (np.stack([x, y], axis=1) + aliased.pull_px + origins_px).T
+    return Registered(x_px, y_px, turn, covariance, correlation, noise, settled, aliased.worst_px)

@@ -25,6 +25,7 @@ from fingervision.vision.coding_error import (
     EVEN_SHIFTS,
     SHARED_SHIFTS,
     flanks_displaced_px,
+    outline_step,
     with_coding_error,
     with_shared_shift,
 )
@@ -252,7 +253,8 @@ def _edges_and_gap(
 
     def displaced_px(found: EdgePoints) -> tuple[float, float]:
         if coded.quantiser is not None:
-            return flanks_displaced_px(found, fingers.orientation, coded.quantiser, light, top)
+            step = outline_step(found, fingers.orientation, coded.quantiser)
+            return flanks_displaced_px(found, step, light, top)
         if coded.coding is Coding.LOSSLESS:
             return 0.0, 0.0
         alike_px = SHARED_SHIFTS[coded.coding] * shared_shift_px(flanks(upright, found, light))
@@ -266,7 +268,8 @@ def _edges_and_gap(
     outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
         if coded.quantiser is not None:
-            outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, top)
+            step = outline_step(edges, fingers.orientation, coded.quantiser)
+            outcome = with_coding_error(outcome, step, edges.inside, light, top)
         elif coded.coding is not Coding.LOSSLESS:
             outcome = with_shared_shift(outcome, shared_shift_px(flanks(upright, edges, light)), coded.coding)
         elif not edges.beside:  # a structure beside an edge has its own contribution

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_M, OUTER_M, PARAMETERS, on_flanks
+from fingervision.vision.finger_shape import INNER_C, INNER_M, INNER_R, OUTER_C, OUTER_M, OUTER_R, PARAMETERS, on_flanks
 from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
@@ -32,8 +32,11 @@ SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # Share of rejected points near the measuring point above which they are not dust but the finger's shape; weight below
 # which a point counts as rejected.
 MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
-# Distance above and below the measuring point (pixels) in which rejected points may be the finger's own edge (a
-# chamfer, a bend) instead of dust: most points on one side are rejected, or half of the points on both sides.
+# Dust that hides so many points of a corner seldom does so at both fingers: a cut corner does, because it lies on both
+# sides of the fillet that fits it best.
+FEWEST_OF_CORNER = 3
+# Where most of the points within so many pixels above or below the measuring point are rejected, or half of them on
+# both sides, they may be the finger's own edge (a corner that is cut off, a bend) and not dust.
 BESIDE_PX = 4.0
 # Largest height of a tip above every point (in sigma, plus pixels). Blur moves the half-level of a sharp right-angled
 # corner away from the vertex by 0.77 sigma, and by 1.1 sigma at a turn of 120 degrees.
@@ -102,6 +105,40 @@ def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, heigh
     sum (JCGM 100:2008, 4.3.7 and 5.2.2).
     """
     return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
+
+
+def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float) -> float:
+    """Largest residual (px) of several rejected points between the tip and the inner edge, where a cut is no fillet.
+
+    The result is 0 if too few points of the corner were rejected.
+
+    Parameters
+    ----------
+    points, end, found : OutlinePoints, FingerEnd, MeasuringPoint
+        Outline points, fitted end and measuring point of one finger.
+    below_tip_px : float
+        Distance of the measuring point below the tip.
+    """
+    is_corner = (points.x > found.apex) & (points.y < found.tip + below_tip_px + SHAPE_REACH_PX)
+    is_aside = is_corner & (end.robust <= 0.0)
+    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER:
+        return 0.0
+    return float(np.max(np.abs(end.residual * points.u)[is_aside]))
+
+
+def top_aside_variance(points: OutlinePoints, end: FingerEnd) -> float:
+    """Variance of the tip's height due to points of the top, between the corners, most of which the fit rejected.
+
+    The top may lie anywhere between the fitted one and the farthest of these points, as in `set_aside_variance`; the
+    result is 0 where fewer than half of the points are rejected, and where the corners leave no straight top.
+    """
+    inner = end.parameters[INNER_C] - end.parameters[INNER_R]
+    outer = end.parameters[OUTER_C] + end.parameters[OUTER_R]
+    is_top = ~points.is_row & (points.x > outer) & (points.x < inner)
+    is_aside = is_top & (end.robust <= 0.0)
+    if np.count_nonzero(is_aside) <= max(MOST_REJECTED * np.count_nonzero(is_top), FEWEST_OF_CORNER - 1):
+        return 0.0
+    return float(2.0 / 3.0 * np.max(np.abs(end.residual * points.u)[is_aside]) ** 2)
 
 
 def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:

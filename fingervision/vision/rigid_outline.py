@@ -190,9 +190,11 @@ def _rigid(
     arm = chunks.middles[:, used] - about[:, None]
     nx, ny = chunks.normals[:, used]
     rigid = np.stack([nx, ny, -nx * arm[1] + ny * arm[0]], axis=1)
-    doubtful = doubtful_offsets(chunks.middles[:, used], chunks.normals[:, used], edges.blur[used], edges.u_blur[used])
-    # Errors with a known standard uncertainty: an edge bias, which is a common offset of all chunks; a size error,
-    # which moves each chunk in proportion to its distance; and a separate offset of each doubtful side.
+    doubtful = doubtful_offsets(
+        chunks.middles[:, used], chunks.normals[:, used], edges.blur[used], edges.u_blur[used], edges.stretch[used]
+    )
+    # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance;
+    # a doubtful side has an offset of its own. Of each of these it is known how large it may be.
     shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
     columns = np.hstack([rigid, shared * (view.u_outward_px, view.u_size), doubtful])
     prior = np.diag([0.0] * 3 + [1.0] * (columns.shape[1] - 3))

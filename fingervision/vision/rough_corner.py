@@ -6,8 +6,10 @@ its likelihood (Bayesian model averaging: Hoeting et al., Statistical Science 14
 the variance between the two shapes is part of its uncertainty.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
-from math import atan2, exp, hypot
+from math import atan2, cos, exp, hypot, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,14 +61,16 @@ def with_corner_doubt(
     """
     cut_ends, log_odds = [], 0.0
     for p, end in zip(points, ends, strict=True):
-        tried = [_cut(p, end, leg, below_tip_px, shared_px) for leg in LEGS]
-        cuts = np.array([each for each in tried if each is not None])
-        if not len(cuts):  # no corner that could be chamfered
+        corners = _corners(p, end, shared_px)
+        tried = [] if corners is None else [_cut(corners, leg, below_tip_px) for leg in LEGS]
+        cuts = [each for each in tried if each is not None]
+        if corners is None or not cuts:  # no corner that could be cut
             return found
-        least = float(cuts[:, 0].min())
-        likely = np.exp(0.5 * (least - cuts[:, 0]))
+        excess = _excess(corners, cuts)
+        least = float(excess.min())
+        likely = np.exp(0.5 * (least - excess))
         log_odds += float(np.log(likely.sum() / len(LEGS))) - 0.5 * least
-        cut_ends.append((likely / likely.sum(), cuts[:, 1:]))
+        cut_ends.append((likely / likely.sum(), np.array([(cut.tip, cut.edge) for cut in cuts])))
     share = 1.0 / (1.0 + exp(min(max(-log_odds, -50.0), 50.0)))
     averaged = []
     for own, (likely, cut) in zip(found, cut_ends, strict=True):
@@ -83,46 +87,129 @@ def with_corner_doubt(
     return averaged
 
 
-def _cut(
-    points: OutlinePoints, end: FingerEnd, leg: float, below_tip_px: float, shared_px: float
-) -> tuple[float, float, float] | None:
-    """Chi-square of chamfers minus that of fillets, and tip and edge of the chamfered finger; None without chamfer."""
-    p, (x0, y0) = end.parameters, end.origin
+class _Near(NamedTuple):
+    """Points near the vertex of a corner, which tell its shape.
+
+    Parameters
+    ----------
+    x, y, normal_u : ndarray of float, shape (n,)
+        Positions, and standard uncertainties along the normal (pixels).
+    beyond_sides : ndarray of float, shape (n,)
+        Distance of each point outwards from the nearest of the flanks and the top.
+    fillet_squares : ndarray of float, shape (n,)
+        Squared residuals about the fillet, in units of the uncertainty, limited to a stray point's.
+    alike : float
+        Number of these points that share an error.
+    """
+
+    x: Floats
+    y: Floats
+    normal_u: Floats
+    beyond_sides: Floats
+    fillet_squares: Floats
+    alike: float
+
+
+class _Corners(NamedTuple):
+    """The outer and the inner corner of a finger.
+
+    Parameters
+    ----------
+    vertices : ((float, float), (float, float))
+        Vertex of each corner.
+    radii, slopes : (float, float)
+        Radius of each fillet, and slope of each flank.
+    near : list of _Near
+        Points near each vertex, if there are any.
+    outer, top, inner : Side
+        The sides.
+    top_slope : float
+        Slope of the top.
+    """
+
+    vertices: tuple[tuple[float, float], tuple[float, float]]
+    radii: tuple[float, float]
+    slopes: tuple[float, float]
+    near: list[_Near]
+    outer: Side
+    top: Side
+    inner: Side
+    top_slope: float
+
+
+class _Cut(NamedTuple):
+    """A finger with cut corners: the two cuts, its tip and its inner edge."""
+
+    outer: Side
+    inner: Side
+    tip: float
+    edge: float
+
+
+def _corners(points: OutlinePoints, end: FingerEnd, shared_px: float) -> _Corners | None:
+    """Everything about a finger's corners that no cut changes; None if they are too small to be cut."""
+    p, (x0, y0) = end.parameters.tolist(), end.origin.tolist()
     if p[INNER_R] < SMALLEST_PX:
         return None
-    vertices = []
-    for c, m in ((p[OUTER_C], p[OUTER_M]), (p[INNER_C], p[INNER_M])):
-        x = (c + m * (p[TOP_C] - p[TOP_M] * x0 - y0)) / (1.0 - m * p[TOP_M])
-        vertices.append((x, p[TOP_C] + p[TOP_M] * (x - x0)))
-    along_top, length = hypot(1.0, p[TOP_M]), vertices[1][0] - vertices[0][0]
-    sides, radii = [Side(p[OUTER_C], y0, atan2(-1.0, -p[OUTER_M]))], (p[OUTER_R], p[INNER_R])
-    legs = [leg * max(radius, SMALLEST_PX) for radius in radii]
-    if sum(legs) > 0.95 * length:
-        return None
-    for (x, y), m, way, sense in zip(vertices, (p[OUTER_M], p[INNER_M]), legs, (1.0, -1.0), strict=True):
-        down = hypot(1.0, m)
-        on_flank = x + way * m / down, y + way / down
-        on_top = x + sense * way / along_top, y + sense * way * p[TOP_M] / along_top
-        start, stop = (on_flank, on_top) if sense > 0.0 else (on_top, on_flank)
-        sides.append(Side(*start, atan2(stop[1] - start[1], stop[0] - start[0])))
-        if sense > 0.0:
-            sides.append(Side(x0, p[TOP_C], atan2(p[TOP_M], 1.0)))
-    sides.append(Side(p[INNER_C], y0, atan2(1.0, p[INNER_M])))
-    is_level = abs(p[TOP_M]) * length < LEVEL_PX
-    read = Polygon(sides, [0.0] * (len(sides) - 1), LEVEL_TOP if is_level else None).read_off(below_tip_px)
-    if read is None:
-        return None
-    away = np.max([(points.x - s.x) * np.sin(s.angle) - (points.y - s.y) * np.cos(s.angle) for s in sides], axis=0)
-    _, slant = seen(p, end.origin, points.x, points.y, points.is_row)
-    normal_u, excess = points.u * slant, 0.0
-    for (x, y), radius in zip(vertices, radii, strict=True):
+    outer, inner = (
+        (x, p[TOP_C] + p[TOP_M] * (x - x0))
+        for c, m in ((p[OUTER_C], p[OUTER_M]), (p[INNER_C], p[INNER_M]))
+        for x in ((c + m * (p[TOP_C] - p[TOP_M] * x0 - y0)) / (1.0 - m * p[TOP_M]),)
+    )
+    sides = (
+        Side(p[OUTER_C], y0, atan2(-1.0, -p[OUTER_M])),
+        Side(x0, p[TOP_C], atan2(p[TOP_M], 1.0)),
+        Side(p[INNER_C], y0, atan2(1.0, p[INNER_M])),
+    )
+    beyond = _beyond(sides, points.x, points.y).max(axis=0)
+    _, slant = seen(end.parameters, end.origin, points.x, points.y, points.is_row)
+    normal_u, radii, found = points.u * slant, (p[OUTER_R], p[INNER_R]), []
+    for (x, y), radius in zip((outer, inner), radii, strict=True):
         near = np.hypot(points.x - x, points.y - y) < NEAR_RADII * max(radius, SMALLEST_PX)
         if not near.any():
             continue
         # Number of points in this stretch of outline that have an error in common.
         stretch = (2.0 * NEAR_RADII - 0.43) * radius
         alike = max(shared_px * float(np.count_nonzero(near)) / max(stretch, 1.0), 1.0)
-        cut, fillet = np.abs(away[near] / normal_u[near]), np.abs(end.residual[near])
-        most = MOST_SIGMAS
-        excess += float(np.sum(np.minimum(cut, most) ** 2 - np.minimum(fillet, most) ** 2)) / alike
-    return excess, read.tip, read.edge
+        squares = np.minimum(np.abs(end.residual[near]), MOST_SIGMAS) ** 2
+        found.append(_Near(points.x[near], points.y[near], normal_u[near], beyond[near], squares, alike))
+    return _Corners((outer, inner), radii, (p[OUTER_M], p[INNER_M]), found, *sides, p[TOP_M])
+
+
+def _cut(corners: _Corners, leg: float, below_tip_px: float) -> _Cut | None:
+    """The finger with legs of so many radii cut off its corners; None if there is no such finger."""
+    vertices, top_slope = corners.vertices, corners.top_slope
+    along_top, length = hypot(1.0, top_slope), vertices[1][0] - vertices[0][0]
+    legs = [leg * max(radius, SMALLEST_PX) for radius in corners.radii]
+    if sum(legs) > 0.95 * length:
+        return None
+    cuts = []
+    for (x, y), m, way, sense in zip(vertices, corners.slopes, legs, (1.0, -1.0), strict=True):
+        down = hypot(1.0, m)
+        on_flank = x + way * m / down, y + way / down
+        on_top = x + sense * way / along_top, y + sense * way * top_slope / along_top
+        start, stop = (on_flank, on_top) if sense > 0.0 else (on_top, on_flank)
+        cuts.append(Side(start[0], start[1], atan2(stop[1] - start[1], stop[0] - start[0])))
+    sides = [corners.outer, cuts[0], corners.top, cuts[1], corners.inner]
+    is_level = abs(top_slope) * length < LEVEL_PX
+    read = Polygon(sides, [0.0] * (len(sides) - 1), LEVEL_TOP if is_level else None).read_off(below_tip_px)
+    return None if read is None else _Cut(cuts[0], cuts[1], read.tip, read.edge)
+
+
+def _excess(corners: _Corners, cuts: list[_Cut]) -> Floats:
+    """Chi-square of the points near the corners about every cut, minus that about the fillets; shape (cuts,)."""
+    excess = np.zeros(len(cuts))
+    for near in corners.near:
+        away = near.beyond_sides
+        for sides in ([cut.outer for cut in cuts], [cut.inner for cut in cuts]):
+            away = np.maximum(away, _beyond(sides, near.x, near.y))
+        cut_squares = np.minimum(np.abs(away / near.normal_u), MOST_SIGMAS) ** 2
+        excess += np.sum(cut_squares - near.fillet_squares, axis=1) / near.alike
+    return excess
+
+
+def _beyond(sides: Sequence[Side], x: Floats, y: Floats) -> Floats:
+    """Distance of points outwards from sides, shape (sides, n)."""
+    places = np.array([(side.x, side.y, sin(side.angle), cos(side.angle)) for side in sides])
+    side_x, side_y, sine, cosine = places.T[:, :, None]
+    return np.asarray((x - side_x) * sine - (y - side_y) * cosine)

@@ -1,32 +1,47 @@
 /* after linear_solve */
+/* Cholesky's factor in place of the lower half of a matrix (n, n); 0 where it is not positive. Column by column, so that the
+   sums of a whole row go on side by side. */
+static int factor(double *a, int64_t n) {
+    double *column = floats(n);
+    int is_positive = 1;
+    for (int64_t k = 0; k < n && is_positive; k++) {
+        if (!(a[k * n + k] > 0.0)) {
+            is_positive = 0;
+            break;
+        }
+        double pivot = a[k * n + k] = sqrt(a[k * n + k]);
+        for (int64_t i = k + 1; i < n; i++) column[i] = a[i * n + k] /= pivot;
+        for (int64_t i = k + 1; i < n; i++) {
+            double *row = a + i * n, own = column[i];
+            for (int64_t j = k + 1; j <= i; j++) row[j] -= own * column[j];
+        }
+    }
+    free(column);
+    return is_positive;
+}
+
+/* Solve l x = b in place: Cholesky's factor l (n, n), b (n, wide), which becomes x. */
+static inline void forward(const double *l, int64_t n, double *b, int64_t wide) {
+    for (int64_t k = 0; k < n; k++) {
+        const double *known = b + k * wide;
+        for (int64_t c = 0; c < wide; c++) b[k * wide + c] /= l[k * n + k];
+        for (int64_t i = k + 1; i < n; i++)
+            for (int64_t c = 0; c < wide; c++) b[i * wide + c] -= l[i * n + k] * known[c];
+    }
+}
+
 /* Logarithm of the restricted likelihood, but for a constant, of the residuals of a parabola whose points have this
    covariance (n, n), of which the lower half is overwritten: columns (n, OWN + 1), the last one the points themselves.
    0 in `is_sound` where the covariance is not positive. */
 static double restricted(double *covariance, double *columns, int64_t n, int *is_sound) {
     enum { WIDE = OWN + 1 };
     double normal[OWN * OWN] = {0.0}, solved[OWN] = {0.0}, lower[OWN * OWN], logarithm = 0.0, left = 0.0;
-    for (int64_t i = 0; i < n; i++) {
-        double *row = covariance + i * n;
-        for (int64_t j = 0; j <= i; j++) {
-            double *other = covariance + j * n, total = row[j];
-            for (int64_t k = 0; k < j; k++) total -= row[k] * other[k];
-            if (j < i) {
-                row[j] = total / other[j];
-            } else {
-                if (!(total > 0.0)) {
-                    *is_sound = 0;
-                    return 0.0;
-                }
-                row[i] = sqrt(total);
-                logarithm += 2.0 * log(row[i]);
-            }
-        }
-        for (int c = 0; c < WIDE; c++) {
-            double total = columns[i * WIDE + c];
-            for (int64_t k = 0; k < i; k++) total -= row[k] * columns[k * WIDE + c];
-            columns[i * WIDE + c] = total / row[i];
-        }
+    if (!factor(covariance, n)) {
+        *is_sound = 0;
+        return 0.0;
     }
+    for (int64_t i = 0; i < n; i++) logarithm += 2.0 * log(covariance[i * n + i]);
+    forward(covariance, n, columns, WIDE);
     for (int64_t i = 0; i < n; i++)
         for (int a = 0; a < OWN; a++) {
             solved[a] += columns[i * WIDE + a] * columns[i * WIDE + OWN];
@@ -105,3 +120,17 @@ LOOP(roughness_errors, "FFFFFf", "") {
         FLOATS(5)[i * n + i] += square(FLOATS(3)[i] / u[i]);
     }
 }
+
+/* Whiten errors with a known covariance, none of whose combinations is surer than a limit: covariance (n, n), which becomes
+   Cholesky's factor, limit of the variance; whether all combinations are as unsure as that. */
+LOOP(roughness_factor, "fd", "b") {
+    int64_t n = in[0].shape[0];
+    double *less = floats(n * n);
+    memcpy(less, FLOATS(0), (size_t)(n * n) * sizeof(double));
+    for (int64_t i = 0; i < n; i++) less[i * n + i] -= in[1].d;
+    out[0].i = factor(less, n) && factor(FLOATS(0), n);
+    free(less);
+}
+
+/* White errors in place of correlated ones: Cholesky's factor (n, n), columns (n, wide). */
+LOOP(roughness_whiten, "Ff", "") { forward(FLOATS(0), in[0].shape[0], FLOATS(1), in[1].shape[1]); }

@@ -10,6 +10,7 @@ averaged over that likelihood, not taken at its maximum, because a few waves do 
 well.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -46,6 +47,7 @@ STEPS, LEAST_WEIGHT = 5, 1e-4
 
 _likelihood = loop("roughness_likelihood")
 _errors = loop("roughness_errors")
+_factor, _whiten = loop("roughness_factor"), loop("roughness_whiten")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,20 +162,37 @@ def best_linear(
     errors = np.empty((x.size, x.size))
     _errors(x, y, points.u * slant, bare.u * slant, found.covariance, errors)
     errors[np.diag_indices(x.size)] += 1.0 / np.maximum(end.robust, LEAST_WEIGHT) - 1.0
-    # The variance of a combination of points is at least that of their own noise; rounding of the tabulated covariance
-    # may give less.
-    with _blas().limit(limits=1, user_api="blas"):
-        values, vectors = np.linalg.eigh(errors)
-    whitening = vectors / np.sqrt(np.maximum(values, float(np.min((bare.u / points.u) ** 2))))
+    whitened = _whitening(errors, float(np.min((bare.u / points.u) ** 2)))
     prior = np.diag(1.0 / u_prior**2)
     for _ in range(STEPS):
         residual, jacobian, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
-        white = whitening.T @ np.column_stack([jacobian, residual])
-        covariance = np.linalg.inv(white[:, :-1].T @ white[:, :-1] + prior)
+        white = whitened(np.column_stack([jacobian, residual]))
+        covariance = np.asarray(np.linalg.inv(white[:, :-1].T @ white[:, :-1] + prior), dtype=np.float64)
         parameters = parameters - covariance @ (white[:, :-1].T @ white[:, -1] + prior @ (parameters - start))
         parameters[[INNER_R, OUTER_R]] = np.maximum(parameters[[INNER_R, OUTER_R]], 0.0)
     residual, _, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
     return FingerEnd(parameters, covariance, end.origin, 1.0, residual, end.robust)
+
+
+def _whitening(errors: Floats, least_variance: float) -> Callable[[Floats], Floats]:
+    """Transformation to white errors of unit variance, for errors with a covariance in units of the points' own.
+
+    No combination of points is surer than their own noise, which is `least_variance`; rounding of the tabulated
+    covariance may say so. Cholesky's factor suffices where it does not, and costs a tenth of the eigenvalues.
+    """
+    factor = errors.copy()
+    if _factor(factor, least_variance):
+
+        def whitened(columns: Floats) -> Floats:
+            white = np.ascontiguousarray(columns)
+            _whiten(factor, white)
+            return white
+
+        return whitened
+    with _blas().limit(limits=1, user_api="blas"):
+        values, vectors = np.linalg.eigh(errors)
+    whitening = (vectors / np.sqrt(np.maximum(values, least_variance))).T
+    return lambda columns: whitening @ columns
 
 
 @lru_cache(maxsize=1)

@@ -33,16 +33,18 @@ def symmetric_squares(t: Floats, value: Floats, weight: Floats, blur: float) -> 
     """
     knots = np.arange(1, STEPS + 1) * max(STEP_IN_BLURS * blur, LEAST_STEP_PX)
     root, place, least = np.sqrt(weight), 0.0, np.inf
-    for _look in range(LOOKS):
+    for look in range(LOOKS):
         away = t - place
         hats = np.maximum(1.0 - np.abs(np.abs(away)[:, None] - knots) / knots[0], 0.0) * np.sign(away)[:, None]
         step = ndtr(away / blur)
         slope = np.exp(-0.5 * (away / blur) ** 2)
         columns = np.column_stack((np.ones_like(t), step, hats))
-        both = np.column_stack((columns, slope))
-        found, *_ = np.linalg.lstsq(root[:, None] * both, root * value, rcond=None)
         own, *_ = np.linalg.lstsq(root[:, None] * columns, root * value, rcond=None)
         least = min(least, float(np.sum((root * (value - columns @ own)) ** 2)))
+        if look == LOOKS - 1:
+            break
+        both = np.column_stack((columns, slope))
+        found, *_ = np.linalg.lstsq(root[:, None] * both, root * value, rcond=None)
         contrast = own[1] if abs(own[1]) > 0.0 else 1.0
         place -= float(np.clip(found[-1] * blur * np.sqrt(2.0 * np.pi) / contrast, -0.5, 0.5))
         if abs(place) > FARTHEST_PX:

@@ -60,11 +60,13 @@ class Truth:
     is_mirrored: bool
     moves: dict[str, tuple[float, float, float]]
     grown_mm: float
+    """Outward shift of every edge, in pixels of the picture over the scale."""
 
 
 def picture(truth: Truth, centroids: dict[str, Array], seen: "Scale", blur_px: float, dark: bool) -> Array:
     """Draw the scene, without noise."""
     total = np.zeros((HEIGHT, WIDTH))
+    by_x, by_y = stretches(seen)
     for sub_y in SUB:
         for sub_x in SUB:
             x, y = np.meshgrid(np.arange(WIDTH) + sub_x, np.arange(HEIGHT) + sub_y)
@@ -84,9 +86,16 @@ def picture(truth: Truth, centroids: dict[str, Array], seen: "Scale", blur_px: f
                 arm = drawn - (centroids[name] + (mx, my))[:, None]
                 own_x = cc * arm[0] + ss * arm[1] + centroids[name][0]
                 own_y = -ss * arm[0] + cc * arm[1] + centroids[name][1]
-                g = truth.grown_mm
+                # The sensor shifts an edge by pixels of the picture: in the plane by the stretch across it.
+                turned = truth.angle + side * turn
+                (g_x, g_y) = (truth.grown_mm * np.hypot(by_x @ n, by_y @ n)
+                              for n in (np.array([np.cos(turned), np.sin(turned)]),
+                                        np.array([-np.sin(turned), np.cos(turned)])))  # fmt: skip
                 # Boxes of a body that abut are grown on their outer sides alone; necks are no edges.
-                gx0, gx1, gy0, gy1 = (0, 0, 0, 0) if (x0, x1, y0, y1) in NECKS else _outer(name, (x0, x1, y0, y1), g)
+                outer = (False,) * 4 if (x0, x1, y0, y1) in NECKS else _outer(name, (x0, x1, y0, y1))
+                gx0, gx1, gy0, gy1 = (
+                    g if is_outer else 0.0 for g, is_outer in zip((g_x, g_x, g_y, g_y), outer, strict=True)
+                )
                 across = ndtr((x1 + gx1 - own_x) / sigma) - ndtr((x0 - gx0 - own_x) / sigma)
                 along = ndtr((y1 + gy1 - own_y) / sigma) - ndtr((y0 - gy0 - own_y) / sigma)
                 covered += across * along
@@ -95,13 +104,23 @@ def picture(truth: Truth, centroids: dict[str, Array], seen: "Scale", blur_px: f
     return ground + (body - ground) * np.clip(total, 0.0, 1.0)
 
 
-def _outer(name: str, box: tuple[float, ...], grown: float) -> tuple[float, float, float, float]:
+def stretches(seen: "Scale") -> tuple[Array, Array]:
+    """Motion in the plane by a pixel along x and along y, at every pixel; shape (pixels, 2)."""
+    x, y = np.meshgrid(np.arange(WIDTH, dtype=float), np.arange(HEIGHT, dtype=float))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    if not isinstance(seen, Calibration):
+        return np.tile([1.0, 0.0], (x.size, 1)), np.tile([0.0, 1.0], (x.size, 1))
+    halves = np.array([[0.5, 0.0], [0.0, 0.5]])
+    along = [seen.flatten(points + half) - seen.flatten(points - half) for half in halves]
+    return along[0], along[1]
+
+
+def _outer(name: str, box: tuple[float, ...]) -> tuple[bool, bool, bool, bool]:
+    """Whether the sides of a box are the body's own outline: left, right, lower, upper."""
     y0, y1 = box[2:]
-    if name != "finger":
-        return grown, grown, grown, grown
-    if (y0, y1) == (40, 50):
-        return grown, grown, grown, grown
-    return grown, grown, (0.0 if y0 == 50 else grown), (0.0 if y1 == 40 else grown)
+    if name != "finger" or (y0, y1) == (40, 50):
+        return True, True, True, True
+    return True, True, y0 != 50, y1 != 40
 
 
 def centroid(name: str) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 
 from fingervision.stage_record.encoder import input_sigma
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
+from fingervision.stage_record.window_blending import blended
 from tests.benchmarks.hidden.design import Kind, draw_design
 from tests.benchmarks.hidden.gripper_table import draw_table
 from tests.benchmarks.hidden.noise import draw_noise, rounded
@@ -49,6 +50,7 @@ def main() -> None:
         if sigma == 0.0:
             continue
         found, leverage = smoothed(recorded, np.concatenate(times), runs, sigma, step)
+        found = blended(found, recorded, np.concatenate(times), runs, leverage)
         error = (found - true) ** 2 / noise.input_variance_mm2
         claim = leverage * sigma**2 / noise.input_variance_mm2
         for index, run in enumerate(runs):

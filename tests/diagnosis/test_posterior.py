@@ -1,5 +1,6 @@
 """Uncertainties with known true values: of a mean, and of a parameter whose best value lies at its bound."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.posterior import settled
+from fingervision.diagnosis.inference.record_errors import with_record_errors
 from fingervision.diagnosis.input.preparation import prepare
+from fingervision.effects.play_operator import play
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
@@ -51,3 +54,24 @@ def test_a_play_of_nothing_is_not_known_exactly(problem: Problem) -> None:
     # Half of the play changes the gap by 7 mm per mm, and the mean over some 200 samples in motion shows 0.001 mm.
     assert 0.0 <= play_mm < 1e-3
     assert 5e-5 < u < 1e-3
+
+
+def test_the_record_of_an_encoder_widens_a_play_and_an_exact_one_does_not(tmp_path: Path) -> None:
+    rng = np.random.default_rng(SEED)
+    t = 0.1 * np.arange(400)
+    u = 0.8 * np.abs((t / 10.0 + 0.5) % 2.0 - 1.0)
+    gap = 2.0 + 5.0 * play(u, 0.05, 0.0) + 0.002 * rng.standard_normal(t.size)
+    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-0.2,1.0\n1.0,7.0\n")
+    found = {}
+    for step_mm in (0.0, 0.03):
+        recorded = np.round(u / step_mm) * step_mm if step_mm else u
+        lines = [f"{t[k]:.3f},{recorded[k]:.6f},{gap[k]:.6f}" for k in range(t.size)]
+        (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(lines) + "\n")
+        data = prepare(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv"))
+        problem = data.problem(data.stacked_mm - data.chain.stacked({"backlash": {"play_mm": 0.05}}), 1, explained=True)
+        best = fit(problem, ("backlash",), {"backlash": {"play_mm": 0.05}}, iterations=5)
+        best = replace(best, covariance=np.array([[1e-8]]))
+        found[step_mm] = with_record_errors(data, problem, best, np.random.default_rng(SEED)).covariance[0, 0]
+    assert found[0.0] == 1e-8
+    # The mean of a stroke's roundings is a play: of some ten lines a stroke a third of a rounding at most.
+    assert 1e-8 + (0.03 / 300.0) ** 2 < found[0.03] < (0.03 / 6.0) ** 2

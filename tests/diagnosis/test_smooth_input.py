@@ -122,11 +122,11 @@ def test_blending_keeps_lines_and_takes_out_the_zigzag_of_an_encoder() -> None:
     rng = np.random.default_rng(8)
     t = np.cumsum(rng.uniform(0.05, 0.2, 300))
     whole = (slice(0, 300),)
-    assert blended(0.3 * t, t, whole, np.full(300, 0.05)) == pytest.approx(0.3 * t, abs=1e-12)
+    assert blended(0.3 * t, 0.3 * t, t, whole, np.full(300, 0.05)) == pytest.approx(0.3 * t, abs=1e-12)
     # At half a step per sample, the rounding error alternates, and so do the selected windows.
     t = np.arange(300.0)
     true = 0.503 * STEP_MM * t
     recorded = np.round(true / STEP_MM) * STEP_MM
     found, leverage = smoothed(recorded, t, whole, STEP_MM / np.sqrt(12.0), STEP_MM)
-    rough, smooth = (np.std(np.diff(values - true)) for values in (found, blended(found, t, whole, leverage)))
+    rough, smooth = (np.std(np.diff(values - true)) for values in (found, blended(found, recorded, t, whole, leverage)))
     assert smooth < 0.7 * rough

@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.quantiser import BLOCK_PX, Quantiser
-from fingervision.frames.quantiser_steps import VP9_STEPS
+from fingervision.frames import quantiser_steps
+from fingervision.frames.quantiser_steps import FADES, VP9_STEPS, StepTrail
 from fingervision.frames.seeking import seeking
 from fingervision.frames.source import open_source
 
@@ -108,3 +110,19 @@ def test_the_coarsest_block_near_a_place_counts_and_a_part_keeps_its_places() ->
     assert whole.near(15.0, 0.0, 1.0, 1.0) == 1.0
     assert whole.near(1e6, 1e6, 0.0, 0.0) == 11.0
     assert whole.seen_from(16, 32).near(0.0, 0.0, 0.0, 0.0) == 9.0
+    assert whole.at(np.array([0.0, 40.0]), np.array([16.0, 3.0])) == 4.0
+    assert whole.seen_from(16, 32).at(np.array([0.0, -1e6]), np.array([0.0, 0.0])) == 9.0
+
+
+def test_a_block_that_is_copied_keeps_the_step_that_coded_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A block that is skipped states the step of its neighbour; a picture coded by itself begins anew."""
+    stated = iter([[16.0, 4.0], [2.0, 8.0], [2.0, 2.0], [1.0, 1.0]])
+    monkeypatch.setattr(
+        quantiser_steps, "quantiser_steps", lambda _: Quantiser(np.array([next(stated)], dtype=np.float32))
+    )
+    trail, found = StepTrail(), []
+    for is_key in (True, False, False, True):
+        quantiser = trail.of(SimpleNamespace(key_frame=is_key))
+        assert quantiser is not None
+        found.append(quantiser.step[0])
+    assert np.allclose(found, [[16.0, 4.0], [16.0 * FADES, 8.0], [16.0 * FADES**2, 8.0 * FADES], [1.0, 1.0]])

@@ -63,6 +63,16 @@ def test_another_like_it_within_reach_is_ambiguous(tmp_path: Path) -> None:
     assert [reading.status.value for reading in readings] == ["ambiguous", "ok"]
 
 
+def test_a_mark_that_is_covered_in_part_is_not_displaced(tmp_path: Path) -> None:
+    """What covers it has the ground's level: the rest looks like a mark too."""
+    rng = np.random.default_rng(45)
+    lights = [
+        drawn(SHAPE, 60, [(disc(45, 45, 6.3), 160), (half_plane(edge, 45, np.pi), 60)]) for edge in (30, 30, 40, 42, 44)
+    ]
+    rows = followed(gauges_of(tmp_path, _mark("dot", 25, 8)), [seen(light, 2.0, rng) for light in lights])
+    assert [bool(reading.quantities) for (reading,) in rows] == [True, True, False, False, False]
+
+
 @pytest.mark.parametrize("what", ["wall", "noise", "texture", "edge", "bar", "shade", "others"])
 def test_what_is_no_mark_has_no_number(tmp_path: Path, what: str) -> None:
     rng = np.random.default_rng(44)

@@ -7,7 +7,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.measuring.clock.corner_rounding import rounded
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.noise_of_motion import _even_variance
-from fingervision.stage_record.encoder import input_sigma
+from fingervision.stage_record.encoder import input_sigma, on_lines
 from tests.benchmarks import drawn_recordings
 
 STEP_MM = 0.002
@@ -87,3 +87,27 @@ def test_a_rounded_turn_between_two_rows_is_drawn_finely_enough_for_the_play():
 def test_a_record_that_ends_within_an_encoders_line_is_read():
     one = drawn_recordings.draw(232003, creep=0.02)
     assert LogPath.of(DriveHistory(one.log_s, one.input_mm)).step_mm > 0.0
+
+
+def test_a_halt_between_two_lines_is_at_its_reading():
+    """The smoothing alone runs on within a halt, outwards by half a step; play and offset took it up."""
+    rng = np.random.default_rng(31)
+    corners_s, corners_mm, now_s, at_mm = [0.0, 1.0], [0.05, 0.05], 1.0, 0.05
+    for target_mm in rng.uniform(0.0, 0.6, 12):
+        now_s += abs(target_mm - at_mm) / 0.16
+        corners_s += [now_s, now_s + 0.6]
+        corners_mm += [target_mm, target_mm]
+        now_s, at_mm = now_s + 0.6, target_mm
+    time_s = np.arange(0.0, now_s, 0.0146)
+    step = 0.0126
+    path = LogPath.of(DriveHistory(time_s, np.round(np.interp(time_s, corners_s, corners_mm) / step) * step))
+    assert path.step_mm == pytest.approx(step)
+    halts_s = np.array(corners_s[2::2]) + 0.3
+    found = np.interp(halts_s, path.drive.time_s, path.drive.input_mm)
+    np.testing.assert_allclose(found, np.round(np.array(corners_mm[2::2]) / step) * step, atol=1e-9)
+
+
+def test_halts_at_equal_distances_are_not_taken_for_the_lines_of_an_encoder():
+    """Readings on the lines of an encoder were moved by up to 6 um, to a line for every share of a staircase's step."""
+    read = drawn_recordings.draw(99001093).input_mm
+    np.testing.assert_array_equal(on_lines(read, (slice(0, read.size),)), read)

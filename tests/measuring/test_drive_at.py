@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.measuring.drive_at import drive_at
+from fingervision.measuring.drive_jumps import within_jump
 
 # Rounding of a weighted mean of two doubles.
 ROUNDING = 1e-9
@@ -41,3 +42,19 @@ def test_a_frame_belongs_to_the_run_that_brackets_it() -> None:
     assert last is not None
     assert first is not None
     assert (last.run, first.run) == ("a", "b")
+
+
+def test_a_jump_between_two_rests_has_no_input_inside() -> None:
+    times = np.arange(12.0)
+    log = DriveHistory(times, np.where(times < 6.0, 0.2, 0.9))
+    assert drive_at(log, 5.5) is None
+    assert [drive_at(log, at).input_mm for at in (5.0, 6.0, 4.5)] == [0.2, 0.9, 0.2]  # type: ignore[union-attr]
+    assert within_jump(log, np.array([4.5, 5.0, 5.5, 6.0, 20.0])).tolist() == [False, False, True, False, False]
+
+
+def test_a_ramp_between_corners_and_an_encoder_step_are_no_jumps() -> None:
+    corners = DriveHistory(np.array([0.0, 1.0, 4.0, 5.0, 8.0, 9.0]), np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0]))
+    assert drive_at(corners, 2.5).input_mm == pytest.approx(0.5)  # type: ignore[union-attr]
+    slow = np.round(np.arange(0.0, 40.0, 0.2) * 0.05 / 0.03) * 0.03
+    encoder = DriveHistory(np.arange(slow.size) * 0.2, slow)
+    assert all(drive_at(encoder, at) is not None for at in encoder.time_s[:-1] + 0.1)

@@ -17,7 +17,7 @@ from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, li
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
-from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.diagnosis.input.input_uncertainty import below_the_input, mean_slope
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
@@ -59,7 +59,10 @@ def beside_gains(state: Searched, look: Look) -> Searched:
         apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
         if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
             beside = apart
-    if not _does_more(beside):
+    left = standing_of(beside.data, beside.found)
+    # Gains of runs that stay at one place are no more than offsets, and may be anything: what they leave is looked at.
+    worse = not left.is_little and left.after_mm > standing_of(state.data, found).after_mm
+    if worse or not _does_more(beside):
         return state
     fewer = len(beside.found.best.names) < len(found.best.names)
     least = -LEAST_GAIN if explained and fewer else LEAST_GAIN
@@ -125,7 +128,8 @@ def beside_map(state: Searched, look: Look) -> Searched:
 
 
 def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
-    rms_um, sigma_um = 1e3 * repeated.rms_mm.value, 1e3 * problem.chain.history.input_sigma_mm
+    gap_mm = float(np.sqrt(np.mean(repeated.fitted_mm[: problem.chain.history.input_mm.size] ** 2)))
+    rms_um, sigma_um = 1e3 * gap_mm / mean_slope(problem), 1e3 * problem.chain.history.input_sigma_mm
     return (
         f"the error of the recorded input repeats at the same positions ({rms_um:.2g} um RMS): as this is less than "
         f"its standard uncertainty, {sigma_um:.2g} um, it does not count as {NAME}."

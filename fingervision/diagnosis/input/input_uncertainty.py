@@ -12,7 +12,12 @@ positions are rounded equally, whereas noise is smoothed."""
 def below_the_input(problem: Problem, size_mm: float) -> bool:
     """Whether a change of the gap is smaller than the change that the input's error or its encoder step may cause."""
     history = problem.chain.history
-    gap = problem.chain.stacked({})[: history.input_mm.size]
-    slope = float(np.ptp(gap)) / history.input_span_mm
     share = OF_ROUNDING if history.input_step_mm > 0.0 else OF_NOISE
-    return size_mm < share * slope * history.input_sigma_mm
+    return size_mm < share * mean_slope(problem) * history.input_sigma_mm
+
+
+def mean_slope(problem: Problem) -> float:
+    """Mean change of the gap per change of the input, by the model."""
+    history = problem.chain.history
+    gap = problem.chain.stacked({})[: history.input_mm.size]
+    return float(np.ptp(gap)) / history.input_span_mm

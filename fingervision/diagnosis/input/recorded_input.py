@@ -84,7 +84,7 @@ class RecordedInput:
         if sigma == 0.0:
             return cls.exact(table)
         smooth, leverage = smoothed(snapped_mm, time_s, runs, sigma, step)
-        smooth = blended(smooth, time_s, runs, leverage)
+        smooth = blended(smooth, snapped_mm, time_s, runs, leverage)
         if _is_motion(table, model, smooth[rows]):
             return cls.exact(table, is_motion=True)
         samples, stays = 1.0 / float(np.median(leverage)), leverage < STAYING

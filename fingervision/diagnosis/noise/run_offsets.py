@@ -87,9 +87,13 @@ class RunOffsets:
             return known
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
-        found = np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
-        # Results are cached, because spreads come from a grid, with one run even a single spread, and searches request
-        # the same ones repeatedly.
+        normal = self.gram + np.diag(1.0 / np.array(prior) ** 2)
+        # Columns of equal length: unscaled, a residual of a million noises came out with a negative square.
+        length = np.sqrt(np.diag(normal))
+        found = np.asarray(
+            np.linalg.inv(normal / np.outer(length, length)) / np.outer(length, length), dtype=np.float64
+        )
+        # Spreads come from a grid, and with one run there is only one: the searches ask for the same again and again.
         found.setflags(write=False)
         self._metrics[sigma_mm] = found
         return found

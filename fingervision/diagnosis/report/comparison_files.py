@@ -44,7 +44,7 @@ def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenanc
     (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     curves, residuals = _curves(found), residuals_of(found)
     (out / PICTURE).write_bytes(png_bytes(residuals))
-    write_figures(out, curves, residuals, " and ".join(found))
+    write_figures(out, curves, residuals, " and ".join(found), prefix="compare_")
     (out / PAGE).write_text(_page(found, curves, made, strip_html(measured)), encoding="utf-8")
     return document
 

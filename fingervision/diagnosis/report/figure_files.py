@@ -11,7 +11,7 @@ from fingervision.diagnosis.report.vector_figure import FORMATS, write_vector
 INPUT, TIME, RESIDUALS = "gap_against_input", "gap_over_time", "residuals"
 
 
-def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str) -> tuple[Path, ...]:
+def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str, *, prefix: str = "") -> tuple[Path, ...]:
     """Write the plots into a folder, replacing earlier ones.
 
     Parameters
@@ -24,12 +24,17 @@ def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str) -
         Plot of measured minus predicted values.
     title : str
         Title of the plots.
+    prefix : str
+        Beginning of the names of the files, so that two commands may write into one folder.
     """
     over_time = gap_over_time(curves, title)
     if over_time is None:
         for kind in FORMATS:
-            (out / f"{TIME}.{kind}").unlink(missing_ok=True)
+            (out / f"{prefix}{TIME}.{kind}").unlink(missing_ok=True)
     figures = {INPUT: gap_against_input(curves, title), TIME: over_time, RESIDUALS: residuals}
     return tuple(
-        path for name, figure in figures.items() if figure is not None for path in write_vector(figure, out / name)
+        path
+        for name, figure in figures.items()
+        if figure is not None
+        for path in write_vector(figure, out / f"{prefix}{name}")
     )

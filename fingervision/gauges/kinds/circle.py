@@ -76,7 +76,7 @@ class FollowedCircle:
         self._spec = spec
         self._at = (*spec.middle_px, 0.5 * spec.diameter_px)
         self._known: Circle | None = None
-        self._times = 1.0
+        self._times, self._most_times = 1.0, float(MOST_TIMES)
 
     def _zone(self) -> Mark:
         x, y, radius = self._at
@@ -88,11 +88,14 @@ class FollowedCircle:
         zone = self._zone()
         found = self._found(picture)
         if not isinstance(found, Circle):
-            self._times = min(self._times + 1.0, MOST_TIMES) if self._known is not None else 1.0
+            self._times = min(self._times + 1.0, self._most_times) if self._known is not None else 1.0
             status, words = found
             return Reading(status, zone=zone, words=words)
+        is_first = self._known is None
         self._known, self._times = found, 1.0
         self._at = (found.x_px, found.y_px, found.radius_px)
+        if is_first:
+            self._most_times = self._times_alone(picture)
         displaced = _displaced_px(picture, found)
         u_x, u_y, u_radius = (hypot(sqrt(float(found.covariance[i, i])), displaced) for i in range(3))
         centre, radius = (found.x_px, found.y_px), found.radius_px
@@ -152,6 +155,16 @@ class FollowedCircle:
         if not 0.0 < float(np.max(np.diag(found.covariance))) < LEAST_SURE_PX**2:
             return GaugeStatus.LOW_CONTRAST, ""
         return None
+
+    def _times_alone(self, picture: Picture) -> float:
+        """How many times the reach a search may grow without reaching another disc like this."""
+        for times in range(2, MOST_TIMES + 1):
+            self._times = float(times)
+            is_alone = self._start(picture)[0] is not GaugeStatus.AMBIGUOUS
+            self._times = 1.0
+            if not is_alone:
+                return float(times - 1)
+        return float(MOST_TIMES)
 
     def _start(self, picture: Picture) -> tuple[float, float, float, float] | tuple[GaugeStatus, str]:
         """Initial estimates of centre and radius in the next frame, with their uncertainties."""

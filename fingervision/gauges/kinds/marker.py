@@ -32,7 +32,11 @@ NEAR = 0.35
 # Smallest zero-normalised cross-correlation of a mark with its template from the first frame (the same limit as for
 # patches).
 LEAST_CORRELATION = 0.7
-# Largest standard uncertainty of an accepted centre (pixels).
+# After a quarter turn it correlates (or anticorrelates) with itself as in the first frame: what covers a part of it
+# displaces the middle, by 0.3 px for a tenth of a dot's diameter, where the correlation falls by 0.02. It may fall by
+# this share, and the share that noise takes may double.
+MOST_SHAPE_LOSS, MOST_NOISE_LOSS = 0.01, 2.0
+# A middle that is less sure than this (pixels) is none.
 LEAST_SURE_PX = 0.5
 
 
@@ -68,7 +72,8 @@ class FollowedMarker:
         self._half = max(int(spec.size_px) // 2, 3)
         self._at = spec.middle_px
         self._template: Template | None = None
-        self._times = 1.0
+        self._first: Symmetric | None = None
+        self._times, self._most_times = 1.0, float(MOST_TIMES)
 
     def _zone(self) -> Mark:
         (x, y), half = self._at, self._half
@@ -79,7 +84,7 @@ class FollowedMarker:
         zone = self._zone()
         found = self._found(picture)
         if isinstance(found[0], GaugeStatus):
-            self._times = min(self._times + 1.0, MOST_TIMES) if self._template is not None else 1.0
+            self._times = min(self._times + 1.0, self._most_times) if self._template is not None else 1.0
             status, words = found
             return Reading(status, zone=zone, words=words)
         (x, y), covariance = found
@@ -113,6 +118,9 @@ class FollowedMarker:
             refused = self._taken(picture, place)
             if refused is not None:
                 return refused
+            self._first = found
+        if self._first is not None and _is_cut(found, self._first):
+            return GaugeStatus.NOT_FOUND, "it has lost its shape: something may cover a part of it"
         return place, found.covariance
 
     def _near(self, picture: Picture) -> list[tuple[float, float]] | tuple[GaugeStatus, str]:
@@ -174,16 +182,27 @@ class FollowedMarker:
 
     def _taken(self, picture: Picture, place: tuple[float, float]) -> tuple[GaugeStatus, str] | None:
         """Store the mark's picture as a template; return the reason if a similar mark is within reach."""
-        half = self._half + ceil(GUARD * self._spec.reach_px) + BEYOND_PX
         x, y = round(place[0]), round(place[1])
         own, _ = picture.part(x - self._half, y - self._half, 2 * self._half + 1, 2 * self._half + 1)
         if own.shape != (2 * self._half + 1, 2 * self._half + 1):
             return GaugeStatus.OUT_OF_VIEW, ""
-        levels, _ = picture.part(x - half, y - half, 2 * half + 1, 2 * half + 1)
         template = Template(own.astype(np.float32))
-        if min(levels.shape) >= 2 * (self._half + BEYOND_PX) + 3:
-            match = template.best_match(levels.astype(np.float32))
-            if not match.is_alone:
-                return GaugeStatus.AMBIGUOUS, "a similar mark lies within 1.5 times reach_px"
+        for times in range(1, MOST_TIMES + 1):
+            half = self._half + ceil(GUARD * self._spec.reach_px * times) + BEYOND_PX
+            levels, _ = picture.part(x - half, y - half, 2 * half + 1, 2 * half + 1)
+            if min(levels.shape) < 2 * (self._half + BEYOND_PX) + 3:
+                continue
+            if not template.best_match(levels.astype(np.float32)).is_alone:
+                if times == 1:
+                    return GaugeStatus.AMBIGUOUS, "another mark like it lies within 1.5 reach_px"
+                self._most_times = float(times - 1)
+                break
         self._template = template
         return None
+
+
+def _is_cut(found: Symmetric, first: Symmetric) -> bool:
+    """Whether a mark is less symmetric than in the first frame by more than noise explains."""
+    by_noise = (first.noise / max(found.spread, 1e-12)) ** 2
+    allowed = MOST_SHAPE_LOSS + MOST_NOISE_LOSS * max(by_noise, 1.0 - abs(first.quarter_turn))
+    return 1.0 - abs(found.quarter_turn) > allowed

@@ -26,15 +26,17 @@ SMALLEST_PX, LARGEST_PX = 9.0, 501.0
 # value. A coarse texture needs a higher correlation than chance would give; if chance gives more than the second value,
 # the patch is too small for its texture.
 LEAST_CORRELATION, MOST_BY_CHANCE = 0.7, 0.9
-# No similar texture may lie within this multiple of reach_px (as for edges). After frames without a value, the search
-# distance grows to at most the second multiple.
-GUARD, MOST_TIMES = 1.5, 4.0
-# The template is rotated again if its rotation differs from that of the patch by this angle (radians); the displacement
-# 15 px from the centre is then 1.5 px.
+# Nothing alike may be within so many times the reach (as for edges).
+GUARD, MOST_TIMES = 1.5, 4
+# The template is turned with the patch once it lags by this (radians, at a rim of 15 px a pixel and a half).
 TURN_AT = 0.1
 # Largest standard uncertainty of an accepted position (pixels).
 LEAST_SURE_PX = 0.3
-# Smallest root-mean-square contrast (grey levels); a smaller contrast is mainly rounding.
+# Texture too fine for the pixels may displace a patch by this (standard deviation in pixels, at its worst phase). With
+# more, lines jump from one column of pixels to the next: intervals covered 96 to 99 % up to here, and 90 % beyond
+# (`python -m tests.benchmarks.gauges --only drawings photographs`, without optics).
+MOST_ALIASED_PX = 0.04
+# Contrast below a grey level a pixel is rounding.
 LEAST_SPREAD = 1.0
 
 Floats = NDArray[np.float32]
@@ -73,7 +75,7 @@ class FollowedPatch:
         self._least_correlation = LEAST_CORRELATION
         self._refused: Reading | None = None
         self._at = (*spec.middle_px, 0.0)
-        self._times = 1.0
+        self._times, self._most_times = 1.0, float(MOST_TIMES)
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
@@ -106,8 +108,9 @@ class FollowedPatch:
             for k, (number, _, _, _) in enumerate(group):
                 place = (float(found.x_px[k]), float(found.y_px[k]), float(found.turn_rad[k]))
                 readings[number] = own[k].taken(
-                    place, found.covariance[k], float(found.correlation[k]), bool(found.settled[k])
-                )
+                    place, found.covariance[k], float(found.correlation[k]), bool(found.settled[k]),
+                    float(found.aliasing_px[k]),
+                )  # fmt: skip
         return [readings[number] for number in range(len(followers))]
 
     def _zone(self) -> Mark:
@@ -122,7 +125,7 @@ class FollowedPatch:
         return self._refused
 
     def _failed(self, status: GaugeStatus, words: str = "") -> Reading:
-        self._times = min(self._times + 1.0, MOST_TIMES)
+        self._times = min(self._times + 1.0, self._most_times)
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
@@ -153,11 +156,22 @@ class FollowedPatch:
                 GaugeStatus.LOW_CONTRAST, "the texture is too coarse for the size of the patch: enlarge the patch"
             )
         self._least_correlation = max(LEAST_CORRELATION, chance)
+        self._most_times = self._times_alone(picture, template, column, row)
         self.reference = reference
         self._around, self._template = part, template
         self._at = (float(column), float(row), 0.0)
         zero = (Shift((x, y), (x, y), 0.0, 0.0), Shift((x, y), (x, y), 0.5 * np.pi, 0.0), Angle((x, y), 0.0, 0.0, True))
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
+
+    def _times_alone(self, picture: Picture, template: Template, column: int, row: int) -> float:
+        """How many times the reach a search may grow without reaching something like the patch."""
+        a, b = self.half
+        for times in range(2, MOST_TIMES + 1):
+            reach = ceil(GUARD * self._spec.reach_px * times) + BEYOND_PX
+            levels, _ = picture.part(column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1)
+            if not template.best_match(levels.astype(np.float32)).is_alone:
+                return float(times - 1)
+        return float(MOST_TIMES)
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
         """Locate the patch roughly: return the part of the picture for the registration, and an initial estimate."""
@@ -202,7 +216,12 @@ class FollowedPatch:
         return self._template
 
     def taken(
-        self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
+        self,
+        place: tuple[float, float, float],
+        covariance: NDArray[np.float64],
+        correlation: float,
+        settled: bool,
+        aliasing_px: float,
     ) -> Reading:
         """Accept or reject the result of a registration, and store an accepted result."""
         x, y, turn = place
@@ -212,6 +231,9 @@ class FollowedPatch:
             return self._failed(GaugeStatus.NOT_FOUND, "the patch would have moved farther than reach_px permits")
         if not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._failed(GaugeStatus.LOW_CONTRAST)
+        # Where it does not move it is refused too: unresolved lines stay in their pixels until they jump.
+        if aliasing_px > MOST_ALIASED_PX:
+            return self._failed(GaugeStatus.LOW_CONTRAST, "its texture is finer than the pixels: defocus a little")
         self._at, self._times = place, 1.0
         # The stated point may differ from the patch's centre, which is the centre of a pixel.
         (from_x, from_y) = self._spec.middle_px

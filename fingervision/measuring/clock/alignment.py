@@ -13,7 +13,7 @@ from fingervision.measuring.clock.correlation import candidates
 from fingervision.measuring.clock.joint_fit import Fit, fit
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import WHITE, Motion
-from fingervision.measuring.clock.noise_of_motion import noise_of
+from fingervision.measuring.clock.noise_of_motion import noise_of, of_input
 from fingervision.measuring.clock.other_valleys import other_valleys
 from fingervision.measuring.clock.play_posterior import beside, most_likely, posterior
 from fingervision.measuring.clock.refusals import (
@@ -25,6 +25,7 @@ from fingervision.measuring.clock.refusals import (
     unlike,
 )
 from fingervision.measuring.clock.rivals import QUICK_PLAYS, fitted, only, unrefuted
+from fingervision.measuring.clock.set_points import Jumps, jumps_of
 from fingervision.measuring.clock.stated_offset import stated
 
 OUTLIER_SIGMAS = 6.0
@@ -70,13 +71,15 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
         return NoClockOffset("fewer than 12 frames with a gap lie within the drive's times: record longer.")
     best, motion, whole = max(fits, key=lambda entry: _information(entry[1], entry[2]))
     whole = beside(motion, whole, QUICK_PLAYS)
-    within_log = motion.time_s.size
-    for _ in range(REFINEMENTS):
-        kept = _inliers(whole.residual_mm)
-        motion, near = only(motion, kept), replace(whole, residual_mm=whole.residual_mm[kept])
-        motion = replace(motion, noise=noise_of(motion, near))
-        whole = most_likely(motion, whole.at)
-    refused = many_left_out(within_log, motion, whole) or only_set_points(motion, whole)
+    every_frame = motion
+    motion, whole = _refined(every_frame, whole)
+    jumps = _jumps(every_frame, motion, whole)
+    refused = only_set_points(jumps)
+    if refused is None and many_left_out(every_frame, motion, whole) is not None:
+        # Where a gap creeps, the frames of every move are beyond the noise of the model without creep.
+        creeping = replace(every_frame, creeps=True)
+        motion, whole = _refined(creeping, most_likely(creeping, whole.at))
+        refused = many_left_out(every_frame, motion, whole)
     if refused is not None:
         return refused
     motion, whole = _creeping(motion, whole)
@@ -91,7 +94,30 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     if far_s:
         return ambiguous([whole.at.offset_s, *far_s])
     at = posterior(motion, whole)
-    return stated(motion, at, whole, spread + beside_best, frame_s, runner_up)
+    return stated(motion, at, whole, spread + beside_best, frame_s, runner_up, jumps)
+
+
+def _refined(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
+    """Estimate outliers, noise and fit alternately."""
+    for _ in range(REFINEMENTS):
+        kept = _inliers(motion, found)
+        motion, near = only(motion, kept), replace(found, residual_mm=found.residual_mm[kept])
+        motion = replace(motion, noise=noise_of(motion, near))
+        found = most_likely(motion, found.at)
+    return motion, found
+
+
+def _jumps(every_frame: Motion, motion: Motion, found: Fit) -> Jumps | None:
+    """Jumps of the log and of the gap, at the alignment at which the gap completes the smaller share of them.
+
+    If the gap follows later than the log, the residuals resemble a random walk, and a fit to their differences may
+    explain nothing; a fit to the gap itself shows which share of the jumps the gap completes in time.
+    """
+    jumps = jumps_of(every_frame, found.at)
+    if jumps is None:
+        return None
+    by_gap = jumps_of(every_frame, most_likely(replace(motion, noise=WHITE), found.at).at)
+    return jumps if by_gap is None else min(jumps, by_gap, key=lambda one: one.arrived)
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
@@ -123,6 +149,14 @@ def _information(motion: Motion, found: Fit) -> float:
     return float(motion.time_s.size * np.log(max(float(around @ around), 1e-30) / max(found.squares, 1e-30)))
 
 
-def _inliers(residual_mm: Array) -> NDArray[np.bool_]:
-    spread = 1.4826 * float(np.median(np.abs(residual_mm - np.median(residual_mm))))
-    return np.asarray(np.abs(residual_mm - np.median(residual_mm)) <= max(OUTLIER_SIGMAS * spread, 1e-12))
+def _inliers(motion: Motion, found: Fit) -> NDArray[np.bool_]:
+    """Frames whose residual is no larger than noise and the input's uncertainty allow.
+
+    While the stage moves, the predicted gap is less certain than at rest; a limit for all frames alike would leave out
+    the moves, which determine the offset.
+    """
+    around = found.residual_mm - np.median(found.residual_mm)
+    spread = 1.4826 * float(np.median(np.abs(around)))
+    own_mm, shared_mm, _ = of_input(motion, found)
+    limit = OUTLIER_SIGMAS * np.sqrt(spread**2 + own_mm**2 + shared_mm**2)
+    return np.asarray(np.abs(around) <= np.maximum(limit, 1e-12))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
+from fingervision.measuring.clock.encoder_halts import level_halts
 from fingervision.measuring.clock.path_between_rows import STANDS, piece
 from fingervision.measuring.clock.sharp_reversals import sharp_reversals
 from fingervision.stage_record.encoder import input_sigma, on_lines
@@ -20,6 +21,10 @@ LONG_ROWS = 4 * CORNER_ROWS
 AVERAGED = 0.5
 """Leverage below which a smoothed row is mainly a mean of several rows, and has an error in common with its neighbours.
 """
+RIPPLE = 0.5
+"""Share of the variance of a smoothed stroke that changes from one encoder line to the next, because the windows end at
+other lines. If a whole window shared this error, the best offset would be one at which frames happen to lie on
+ripples."""
 LEAST_LEVERAGE = 1.0 / 241.0
 """Leverage of a row in the widest window of the smoothing."""
 
@@ -124,6 +129,7 @@ class LogPath:
         shared = SharedErrors(np.zeros(0), np.zeros(1), np.zeros(1, dtype=np.bool_), np.zeros(1))
         if step_mm > 0.0:
             for run in runs:
+                smooth_mm[run] = level_halts(log.time_s[run], snapped_mm[run], smooth_mm[run], step_mm)
                 smooth_mm[run] = sharp_reversals(log.time_s[run], snapped_mm[run], smooth_mm[run], step_mm)
             shared, u_mm = _shared_errors(log.time_s, snapped_mm, smooth_mm, u_mm, leverage, still, step_mm)
         pieces = [piece(log.time_s[run], smooth_mm[run], u_mm[run]) for run in runs]
@@ -175,6 +181,7 @@ def _shared_errors(
         max(CORNER_ROWS, round(step_mm * (end - begin) / moved)) if moved > step_mm else 0
         for (begin, end), moved in zip(stretches, moved_mm, strict=True)
     ]
+    ripple_mm = np.zeros(time_s.size)
     found: list[tuple[int, float, bool, float]] = []
     unseen: list[tuple[int, int]] = []
     for k, (begin, end) in enumerate(stretches):
@@ -196,13 +203,16 @@ def _shared_errors(
         last = end - near[k] if k + 1 < len(stretches) and near[k + 1] else end
         if last > first:
             count = max(1, round((last - first) * averaged))
-            found += [(int(row), error_mm, False, 0.0) for row in np.linspace(first, last, count + 1)[:-1]]
+            common_mm = error_mm * float(np.sqrt(1.0 - RIPPLE))
+            found += [(int(row), common_mm, False, 0.0) for row in np.linspace(first, last, count + 1)[:-1]]
+            ripple_mm[first : last + 1] = error_mm * float(np.sqrt(RIPPLE))
         if last < end:  # a reversal without a halt, whose position is known to one encoder step
             turn = min(max(last, first), end)
             found.append((turn, rounding_mm, True, float(np.sign(smooth_mm[end] - smooth_mm[begin]))))
     for begin, end in unseen:
         near_rows = slice(max(begin, 0), min(end, time_s.size - 1) + 1)
         scatter_mm[near_rows] = np.maximum(scatter_mm[near_rows], rounding_mm)
+    scatter_mm = np.hypot(scatter_mm, ripple_mm)
     rows, errors, halts, outward = (np.array(part) for part in zip(*found, strict=True))
     return SharedErrors(time_s[rows[1:]], errors, halts, outward), scatter_mm
 

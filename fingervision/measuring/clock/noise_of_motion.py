@@ -73,12 +73,8 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
     input's uncertainty between two rows of the log. The variance of the measured gap is estimated by maximum likelihood
     from the residuals.
     """
-    log_s = motion.log_time_s(found.at)
-    after = np.clip(np.searchsorted(motion.drive.time_s, log_s), 0, motion.path.u_mm.size - 1)
-    slope = abs(found.scale) / max(0.5 * float(np.ptp(motion.drive.input_mm)), 1e-12)
-    input_mm2 = (slope * motion.path.u_mm[after]) ** 2
-    stretch = _stretch_of(motion, found, log_s)
-    shared_mm = slope * motion.path.shared.u_mm[stretch]
+    own_mm, shared_mm, stretch = of_input(motion, found)
+    input_mm2 = own_mm**2
     residual_mm, taken = _without_shared(found.residual_mm - np.median(found.residual_mm), stretch, shared_mm)
     even_mm2 = max(_even_variance(residual_mm**2, input_mm2) * taken, _least_variance(residual_mm))
     shrunk = residual_mm * np.sqrt(even_mm2 / (even_mm2 + input_mm2))
@@ -86,8 +82,13 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
     order = terms.size
     white_mm2 = even_mm2 * max(1.0 - _explained(terms, shrunk), 1e-3)
     extra = input_mm2[order:].copy()
+    # The error of the stretch before stays in the past of the first frames of the next one.
+    carried_mm = np.zeros(extra.size)
     for k, share in enumerate(terms, start=1):
-        extra += share**2 * input_mm2[order - k : input_mm2.size - k]
+        past = slice(order - k, input_mm2.size - k)
+        extra += share**2 * input_mm2[past]
+        carried_mm += abs(share) * np.where(stretch[past] != stretch[order:], shared_mm[past], 0.0)
+    extra += carried_mm**2
     weights = 1.0 / np.sqrt(1.0 + extra / white_mm2)
     if not shared_mm.any():
         return Noise(terms, weights, variance_mm2=white_mm2)
@@ -98,6 +99,23 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
     ratio = (shared_mm[order:][starts] * lengths) ** 2 / white_mm2
     shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio)
     return Noise(terms, weights, starts, course / np.repeat(lengths, counts), shrink, white_mm2)
+
+
+def of_input(motion: Motion, found: Fit) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Effect of the input's uncertainty on the gap of each frame.
+
+    Returns
+    -------
+    own_mm, shared_mm : ndarray of float, shape (n,)
+        Standard uncertainty of the predicted gap by the path between rows, and by the error that a stretch shares.
+    stretch : ndarray of int, shape (n,)
+        Stretch of the log to which each frame belongs.
+    """
+    log_s = motion.log_time_s(found.at)
+    after = np.clip(np.searchsorted(motion.drive.time_s, log_s), 0, motion.path.u_mm.size - 1)
+    slope = abs(found.scale) / max(0.5 * float(np.ptp(motion.drive.input_mm)), 1e-12)
+    stretch = _stretch_of(motion, found, log_s)
+    return slope * motion.path.u_mm[after], slope * motion.path.shared.u_mm[stretch], stretch
 
 
 SEEN_SHARED = 0.5

@@ -1,16 +1,13 @@
 """Reasons to refuse a log: no motion, a gap that does not follow the log, or a motion that repeats."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.measuring.clock.clock_offset import NoClockOffset
 from fingervision.measuring.clock.joint_fit import Fit
-from fingervision.measuring.clock.motion_model import WHITE, Motion
-from fingervision.measuring.clock.play_posterior import most_likely
-from fingervision.measuring.clock.set_points import ARRIVED, gap_arrives
+from fingervision.measuring.clock.motion_model import Motion
+from fingervision.measuring.clock.set_points import ARRIVED, Jumps
 
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
 """Least number of frames with a gap, and of log rows: the fit has eight parameters."""
@@ -37,8 +34,9 @@ def too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOffs
     return None
 
 
-def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset | None:
+def many_left_out(every_frame: Motion, motion: Motion, found: Fit) -> NoClockOffset | None:
     """Refuse an offset that explains the frames only without many of them, as a wrong step of a staircase does."""
+    within_log = every_frame.time_s.size
     left_out = within_log - motion.time_s.size
     if left_out <= MOST_LEFT_OUT * within_log:
         return None
@@ -49,24 +47,14 @@ def many_left_out(within_log: int, motion: Motion, found: Fit) -> NoClockOffset 
     )
 
 
-def only_set_points(motion: Motion, found: Fit) -> NoClockOffset | None:
-    """Refuse a log of target positions instead of actual ones.
-
-    If the gap follows later than the log, the residuals resemble a random walk, and a fit to their differences may
-    explain nothing; the fit to the gap itself shows which share of the jumps the gap completes in time.
-    """
-    share = gap_arrives(motion, found)
-    if share is None:
-        return None
-    even = replace(motion, noise=WHITE)
-    by_gap = gap_arrives(even, most_likely(even, found.at))
-    share = share if by_gap is None else min(share, by_gap)
-    if share >= ARRIVED:
+def only_set_points(jumps: Jumps | None) -> NoClockOffset | None:
+    """Refuse a log of target positions instead of actual ones."""
+    if jumps is None or jumps.arrived >= ARRIVED:
         return None
     return NoClockOffset(
-        f"the drive's rows jump from one position to the next, and the gap completes only a share of "
-        f"{max(share, 0.0):.2f} of these jumps in the same time: the rows are set-points, which do not state when the "
-        "stage arrived. Log the stage's measured positions, or state --drive-offset-s."
+        "the drive's rows jump from one position to the next, and the gap completes only a share of "
+        f"{max(jumps.arrived, 0.0):.2f} of these jumps in the same time: the rows are set-points, which do not state "
+        "when the stage arrived. Log the stage's measured positions, or state --drive-offset-s."
     )
 
 

@@ -43,8 +43,8 @@ def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm:
     out = smooth_mm.copy()
     turns = _reversals(smooth_mm, step_mm)
     for before, turn, after in zip([0, *turns], turns, [*turns[1:], smooth_mm.size - 1], strict=False):
-        left = _stroke(time_s, reading_mm, turn, np.arange(turn, before - 1, -1), step_mm)
-        right = _stroke(time_s, reading_mm, turn, np.arange(turn, after + 1), step_mm)
+        left = stroke(time_s, reading_mm, turn, np.arange(turn, before - 1, -1), step_mm)
+        right = stroke(time_s, reading_mm, turn, np.arange(turn, after + 1), step_mm)
         if left is None or right is None or left.speed * right.speed >= 0.0:
             continue
         rows = slice(left.nearest, right.nearest + 1)
@@ -91,7 +91,7 @@ class Stroke:
     height_mm: float
 
 
-def _stroke(time_s: Array, reading_mm: Array, turn: int, rows: NDArray[np.intp], step_mm: float) -> Stroke | None:
+def stroke(time_s: Array, reading_mm: Array, turn: int, rows: NDArray[np.intp], step_mm: float) -> Stroke | None:
     """Fit the longest straight stroke to the rows on one side of a reversal; None if there is none."""
     away = np.abs(reading_mm[rows] - reading_mm[turn])
     crossed = np.flatnonzero(away > 0.5 * step_mm)

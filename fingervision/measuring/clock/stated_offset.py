@@ -12,7 +12,7 @@ from fingervision.measuring.clock.offset_covariance import inflation
 from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
 from fingervision.measuring.clock.rivals import RunnerUp
-from fingervision.measuring.clock.set_points import gap_arrives
+from fingervision.measuring.clock.set_points import Jumps
 
 FOLLOWED = 0.95
 """Share of the gap's variance explained by the log below which a note says that something else also moves the gap."""
@@ -40,7 +40,13 @@ def crossed_in_s(path: LogPath) -> float:
 
 
 def stated(
-    motion: Motion, at: Posterior, best: Fit, spread: Spread, frame_s: float, runner_up: RunnerUp | None
+    motion: Motion,
+    at: Posterior,
+    best: Fit,
+    spread: Spread,
+    frame_s: float,
+    runner_up: RunnerUp | None,
+    jumps: Jumps | None,
 ) -> ClockOffset | NoClockOffset:
     """Convert the fitted offset to the time of the log's first row."""
     first_s = float(motion.drive.time_s[0])
@@ -60,8 +66,9 @@ def stated(
     variance += (SYSTEMATIC * np.hypot(frame_s, row_s)) ** 2
     # Frames show at which time between two rows the stage jumped, but the log does not. A program that moves and logs
     # in one cycle jumps at the same phase of each cycle, so that the error does not average out over jumps.
-    jumps = gap_arrives(motion, best) is not None
-    variance += row_s**2 / 12.0 if jumps else 0.0
+    if jumps is not None:
+        # Rows that are set-points precede the gap by up to half of the time of a move, and short moves do not show it.
+        variance += (row_s**2 + jumps.move_s**2) / 12.0
     u_time_s = float(np.sqrt(np.mean(variance[:-1])))
     u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
     if not np.isfinite(u_time_s) or u_time_s > 0.1 * float(np.ptp(motion.time_s)):
@@ -84,7 +91,7 @@ def stated(
         )
     notes = []
     share = explained(motion, best)
-    if jumps:
+    if jumps is not None:
         notes.append(
             "The drive's rows jump from one position to the next: if they are set-points instead of measured "
             "positions, the offset includes the time that the stage takes to follow."

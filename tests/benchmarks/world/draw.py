@@ -15,7 +15,7 @@ from tests.benchmarks.world.folder import write
 from tests.benchmarks.world.nearest import Judge
 from tests.benchmarks.world.rig import Rig
 from tests.benchmarks.world.right_answers import FAR, RightAnswers, outside_enough, right_answers
-from tests.benchmarks.world.rows.catalogue import ROWS
+from tests.benchmarks.world.rows.catalogue import ENCODER_KINDS, ROWS
 
 TRIES = 30
 FORM_SHARE = 0.01
@@ -33,7 +33,7 @@ def fair(rig: Rig, right: RightAnswers, judge: Judge) -> bool:
 
 def drawn(row: str, seed: int, index: int, attempt: int) -> Rig:
     """One attempt at a table: the same numbers give the same table."""
-    return ROWS[row](np.random.default_rng([seed, index, attempt, *row.encode()]))
+    return (ROWS | ENCODER_KINDS)[row](np.random.default_rng([seed, index, attempt, *row.encode()]))
 
 
 def draw_judged(row: str, seed: int, index: int) -> tuple[Rig, Judge, RightAnswers, dict[str, object]]:
@@ -63,7 +63,7 @@ def main() -> None:
     options.add_argument("--out", type=Path, required=True)
     chosen = options.parse_args()
     for row in chosen.rows.split(","):
-        if row not in ROWS:
+        if row not in ROWS | ENCODER_KINDS:
             options.error(f"--rows must be of {', '.join(ROWS)}, but has {row}.")
         begun = time.perf_counter()
         for index in range(chosen.tables):

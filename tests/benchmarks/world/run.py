@@ -21,7 +21,7 @@ from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.world.ask import ask
 from tests.benchmarks.world.draw import draw_table
 from tests.benchmarks.world.marks import COVERAGE_FACTOR, Marker
-from tests.benchmarks.world.rows.catalogue import ROWS
+from tests.benchmarks.world.rows.catalogue import ENCODER_KINDS, ROWS
 
 Result = dict[str, Any]
 NAMES = ("named", "ambiguous")
@@ -64,10 +64,10 @@ def row_lines(row: str, found: list[Result]) -> list[str]:
             lines.append(f"    {title}: exact or set with the truth {count(few, 'exact', 'set', 'right')}, exact "
                          f"{count(few, 'exact').hits}, part {count(few, 'part').hits}, unknown "
                          f"{count(few, 'unknown').hits}")  # fmt: skip
-    bar = [r for r in inside if r["row"] == "encoder_bar"]
+    bar = [r for r in inside if r["row"] == "encoder_bar" or r["row"] in ENCODER_KINDS]
     if bar:
         among = sum(any("backlash" in s.split("+") for s in r["sets"]) and r["verdict"] in NAMES for r in bar)
-        lines.append(f"    encoder_bar: backlash named or in the set {Rate(among, len(bar))}")
+        lines.append(f"    play behind an encoder: backlash named or in the set {Rate(among, len(bar))}")
     if inside:
         lines.append(f"    wrong {count(inside, 'wrong')}; false agrees {count(inside, 'false agrees')}")
     if outside:
@@ -123,10 +123,10 @@ def main() -> None:
     options.add_argument("--answers", default="answers", help="name under which the answers are kept")
     options.add_argument("--again", action="store_true", help="ask anew")
     chosen = options.parse_args()
-    rows = chosen.rows.split(",")
+    rows = list(ENCODER_KINDS) if chosen.rows == "encoder_kinds" else chosen.rows.split(",")
     for row in rows:
-        if row not in ROWS:
-            options.error(f"--rows must be of {', '.join(ROWS)}, but has {row}.")
+        if row not in ROWS | ENCODER_KINDS:
+            options.error(f"--rows must be encoder_kinds, or of {', '.join(ROWS)}, but has {row}.")
     base = chosen.out.absolute() / f"seed{chosen.seed}"
     tables = chosen.tables_from.absolute() if chosen.tables_from else base / "tables"
     os.environ.setdefault("OMP_NUM_THREADS", "1")

@@ -1,6 +1,7 @@
 """The rows of the benchmark, by name."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -41,3 +42,11 @@ ROWS: dict[str, Callable[[np.random.Generator], Rig]] = {
     "wrong_sign": wrong_sign.draw,
     "bad_input": bad_input.draw,
 }
+ENCODER_KINDS: dict[str, Callable[[np.random.Generator], Rig]] = {
+    f"encoder_{'on' if true_zero else 'off'}_{jitter_um}um": partial(
+        encoder_jitter.draw_kind, jitter_mm=1e-3 * jitter_um, true_zero=true_zero
+    )
+    for true_zero in (True, False)
+    for jitter_um in (0, 1, 3)
+}
+"""Six kinds of encoder, drawn on demand only (`--rows encoder_kinds`)."""

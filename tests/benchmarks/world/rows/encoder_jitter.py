@@ -61,3 +61,8 @@ def draw_bar(rng: np.random.Generator) -> Rig:
     """The issue's bar: a step of 30 um, a jitter of 3 um, a play of 50 um."""
     true_zero = bool(rng.random() < 0.5)
     return drawn_with(rng, 0.03, 0.003, 0.05, kind="true zero" if true_zero else "zero off", true_zero=true_zero)
+
+
+def draw_kind(rng: np.random.Generator, jitter_mm: float, *, true_zero: bool) -> Rig:
+    """One of the six kinds of encoder: a step of 30 um and a play of 50 um, zero on or off a step, and jitter."""
+    return drawn_with(rng, 0.03, jitter_mm, 0.05, kind="true zero" if true_zero else "zero off", true_zero=true_zero)

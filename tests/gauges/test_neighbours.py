@@ -1,0 +1,45 @@
+"""Something like it beside it: no gauge jumps to it while its own thing is covered, and each finds its own again."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.gauges.drawn import Texture, bar, cross, disc, drawn, seen
+from tests.gauges.followed import followed, gauges_of
+
+SHAPE, APART = (64, 110), 26.0
+GAUGES = {
+    "marker": 'kind="marker"\nsize_px=17\nshape="dot"',
+    "cross": 'kind="marker"\nsize_px=17\nshape="cross"',
+    "circle": 'kind="circle"\ndiameter_px=16',
+    "edge": 'kind="edge"\ndirection_deg=0\nlength_px=30\npolarity="rising"',
+    "line": 'kind="line"\nangle_deg=90\nlength_px=30\npolarity="rising"',
+    "pair": 'kind="pair"\ndirection_deg=0\nlength_px=30\ndistance_px=10',
+    "patch": 'kind="patch"\nwidth_px=21\nheight_px=21',
+}
+
+
+def _light(kind: str, xs: list[float], texture: Texture) -> np.ndarray:
+    if kind == "patch":
+        return sum((texture.light(SHAPE, x, 32, 0.0, 0.0) for x in xs), np.full(SHAPE, 128.0))
+    thing = {
+        "marker": lambda x: disc(x, 32, 4.3),
+        "cross": lambda x: cross(x, 32, 0.1, 3, 7),
+        "circle": lambda x: disc(x, 32, 8),
+        "pair": lambda x: bar(x, 32, 0.0, 10),
+    }.get(kind, lambda x: bar(x + 2.5, 32, 0.0, 5))
+    return drawn(SHAPE, 60, [(thing(x), 160) for x in xs])
+
+
+@pytest.mark.parametrize("kind", GAUGES)
+def test_no_gauge_jumps_to_a_neighbour_while_its_own_thing_is_covered(tmp_path: Path, kind: str) -> None:
+    rng = np.random.default_rng(31)
+    texture = Texture(rng, 13, 3.5, 1.3)
+    both, other = _light(kind, [40, 40 + APART], texture), _light(kind, [40 + APART], texture)
+    gauges = gauges_of(tmp_path, f"{GAUGES[kind]}\nx_px=40\ny_px=32\nreach_px=10")
+    rows = followed(gauges, [seen(light, 2.0, rng) for light in (both, both, *[other] * 5, both)])
+    value = [row[0].quantities[0].in_pixels()[0] if row[0].quantities else None for row in rows]
+    assert value[2:7] == [None] * 5
+    assert value[1] is not None
+    assert value[7] == pytest.approx(value[1], abs=0.3)
