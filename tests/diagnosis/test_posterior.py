@@ -73,5 +73,6 @@ def test_the_record_of_an_encoder_widens_a_play_and_an_exact_one_does_not(tmp_pa
         best = replace(best, covariance=np.array([[1e-8]]))
         found[step_mm] = with_record_errors(data, problem, best, np.random.default_rng(SEED)).covariance[0, 0]
     assert found[0.0] == 1e-8
-    # The mean of a stroke's roundings is a play: of some ten lines a stroke a third of a rounding at most.
+    # The mean rounding error of a stroke resembles a play: with some ten encoder steps per stroke, it is at most a
+    # third of the largest rounding error.
     assert 1e-8 + (0.03 / 300.0) ** 2 < found[0.03] < (0.03 / 6.0) ** 2

@@ -157,7 +157,7 @@ def test_several_models_stand_in_one_table(rig: Path, answer: Path) -> None:
     page = (out / "compare.html").read_text(encoding="utf-8")
     assert all(escape(name) in page for name in rms)
     check_markup_is_text(page)
-    # A diagnosis may share the folder: no name is one of its own.
+    # A comparison and a diagnosis may be written to the same folder, so that their file names must differ.
     of_answer = {each.name for each in answer.iterdir() if each.is_file() and each.name.startswith(("gap_", "resid"))}
     assert of_answer
     assert not of_answer & {each.name for each in out.iterdir()}

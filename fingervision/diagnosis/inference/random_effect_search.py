@@ -60,7 +60,8 @@ def beside_gains(state: Searched, look: Look) -> Searched:
         if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
             beside = apart
     left = standing_of(beside.data, beside.found)
-    # Gains of runs that stay at one place are no more than offsets, and may be anything: what they leave is looked at.
+    # If runs stay at one position, their gains are only offsets and can have any value. The remaining residuals are
+    # therefore compared as well.
     worse = not left.is_little and left.after_mm > standing_of(state.data, found).after_mm
     if worse or not _does_more(beside):
         return state

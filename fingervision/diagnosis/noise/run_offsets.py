@@ -88,12 +88,14 @@ class RunOffsets:
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
         normal = self.gram + np.diag(1.0 / np.array(prior) ** 2)
-        # Columns of equal length: unscaled, a residual of a million noises came out with a negative square.
+        # The matrix is scaled to a unit diagonal before inversion. Without scaling, rounding made the square of a
+        # residual negative if it was a million times the noise.
         length = np.sqrt(np.diag(normal))
         found = np.asarray(
             np.linalg.inv(normal / np.outer(length, length)) / np.outer(length, length), dtype=np.float64
         )
-        # Spreads come from a grid, and with one run there is only one: the searches ask for the same again and again.
+        # Results are cached, because spreads come from a grid, with one run even a single spread, and searches request
+        # the same ones repeatedly.
         found.setflags(write=False)
         self._metrics[sigma_mm] = found
         return found
