@@ -75,7 +75,7 @@ class OpenSet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunPlan:
-    """A proposed run, with the chi-square distance that it adds between each assumed truth and each member."""
+    """A proposed run, with the chi-square distance that it adds between explanations of the ambiguity set."""
 
     name: str
     steps: list[Step]

@@ -52,8 +52,8 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
 def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
     """Find effects of an explanation that act like a map at their fitted parameters.
 
-    An example of such an effect is a cyclic error with a period of half the range, because a map can follow a curve as
-    smooth as this one.
+    For example, a cyclic error with a period of half the range acts like a map, because a map can follow so smooth a
+    curve.
 
     Parameters
     ----------

@@ -43,10 +43,10 @@ def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
 def without_fits_to_structure(data: Observations, found: Findings) -> Findings:
     """Drop effects, down to two, that the remaining structure could imitate by chance; the verdict is then *unknown*.
 
-    If structure remains, the gain of an effect cannot be compared with the noise. It is compared with the residual
-    without the effect, which consists of a few bumps of many rows each: an F test is used, whose degrees of freedom are
-    the number of independent values in this residual. For one turn of a rotary table, for example, a warming within two
-    seconds and an arc fitted such bumps in addition to the friction.
+    If structure remains, the gain of an effect cannot be compared with the noise. The gain is compared with the
+    residual without the effect, which consists of a few bumps of many rows each: an F test is used, whose degrees of
+    freedom are the number of independent values in this residual. For one turn of a rotary table, for example, a
+    warming within two seconds and an arc fitted such bumps in addition to the friction.
     """
     while len(found.best.names) > 2 and found.left_over is not None and found.unknown is None:
         fewer = [_without(found, name) for name in found.best.names]

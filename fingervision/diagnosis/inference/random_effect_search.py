@@ -34,8 +34,9 @@ def beside_gains(state: Searched, look: Look) -> Searched:
     """Search with gains that differ between runs, and keep the result if it is much more probable.
 
     If a named effect changes the prediction more than the gains of the runs do, the gains are nuisance parameters. If
-    no named effect does, the gains are structure without a name. If further effects are not much more probable than
-    gains that differ between runs, the gains are kept, because naming an effect claims more than stating a scatter.
+    the gains of the runs change the prediction more than every named effect, the gains are reported as structure
+    without a name. If further effects are not much more probable than gains that differ between runs, the gains are
+    kept, because naming an effect claims more than stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:

@@ -124,9 +124,9 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
 def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:
     """Keep pairs of effects that change the prediction by more than the recorded input's error.
 
-    If the best pair changes the prediction by less, its effects only follow the rounding errors of an encoder. Another
-    pair may follow the same rounding errors with a larger amplitude, and is kept only if its effects gain significantly
-    when they are added to the best pair.
+    If the best pair changes the prediction by less than the input's error, its effects only follow the rounding errors
+    of an encoder. Another pair may follow the same rounding errors with a larger amplitude, and is kept only if its
+    effects gain significantly when they are added to the best pair.
     """
     shown = beyond_the_input(state.problem, state.singles[0], pairs)
     if not shown or shown[0] is pairs[0]:

@@ -8,8 +8,8 @@ from fingervision.domain.effect import Array
 def independent_values(residual_mm: Array, runs: tuple[slice, ...]) -> float:
     """Number of independent values whose mean is as certain as the mean of the correlated residual.
 
-    The number is that of the rows, divided by the integrated autocorrelation, which is summed up to its first zero
-    (Sokal, in Functional Integration, 1997, doi:10.1007/978-1-4899-0319-8_6).
+    The number of independent values is the number of rows divided by the integrated autocorrelation, which is summed up
+    to its first zero (Sokal, in Functional Integration, 1997, doi:10.1007/978-1-4899-0319-8_6).
 
     Parameters
     ----------

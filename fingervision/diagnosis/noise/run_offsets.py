@@ -17,8 +17,8 @@ MIDLINE_FREE_MM = 1e3
 class RunOffsets:
     """Nuisance parameters of every explanation: re-zeroing between runs, constant of the midline, the drawing.
 
-    Re-zeroing is a zero-mean random effect per channel; the midline's constant is free; an uncertain dimension of the
-    drawing is a random effect with its stated uncertainty.
+    Offsets by re-zeroing are zero-mean random effects of each channel, and the constant of the midline is a free
+    parameter. The errors of uncertain dimensions in the drawing are random effects with their stated uncertainties.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ class RunOffsets:
     def __post_init__(self) -> None:
         """Tabulate, for each channel and each spread, the quantities that do not depend on the residual.
 
-        The tables contain the weights of the runs, the part of each run's squared mean that an offset absorbs, and the
-        penalty.
+        The precomputed tables contain the weights of the runs, the part of each run's squared mean that an offset
+        absorbs, and the penalty.
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)

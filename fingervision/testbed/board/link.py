@@ -119,7 +119,9 @@ class BoardLink:
                 self._news.wait(seconds)
 
     def command(self, words: str, within_s: float = ANSWER_WITHIN_S) -> wire.Answer | wire.Identity:
-        """Send a command, repeat it if the response is lost, and return the response. The board executes it only once.
+        """Send a command, repeat the command if the response is lost, and return the response.
+
+        The board executes a repeated command only once, because every command has a number.
 
         Raises
         ------
