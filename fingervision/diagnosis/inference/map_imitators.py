@@ -102,7 +102,7 @@ def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[
     offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
 
     def left(beside: Array) -> Array:
-        """Squared lengths of columns after projection off the run offsets and the columns `beside`; shape (k,)."""
+        """Squared lengths of the parts of columns orthogonal to run offsets and to the columns `beside`; shape (k,)."""
         moved = beside - offsets.design @ (metric @ (offsets.design.T @ beside))
         rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
         shared = offsets.design.T @ rest

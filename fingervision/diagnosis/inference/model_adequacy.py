@@ -179,7 +179,7 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
 
 
 def _beside(design: Array, metric: Array, columns: Array) -> Array:
-    """Whitened columns after projection off the runs' offsets and other random effects."""
+    """Parts of whitened columns that are orthogonal to the runs' offsets and to other random effects."""
     return np.asarray(columns - design @ (metric @ (design.T @ columns)), dtype=np.float64)
 
 

@@ -37,7 +37,7 @@ NUMBERS = 128
 
 
 class BoardRefusalError(FingervisionError):
-    """The board did not execute a command; `reason` is its word for the cause."""
+    """The board did not execute a command; `reason` is the cause, as stated by the board."""
 
     def __init__(self, port: str | None, reason: str) -> None:
         super().__init__(f"The board on {port} refused a command ({reason}).")
