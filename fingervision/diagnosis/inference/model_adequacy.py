@@ -48,7 +48,7 @@ class _Basis:
         return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
 
     def beside_offsets(self, metric: Array) -> Array:
-        """Squared lengths of columns after projection off the run offsets that a metric allows; shape (k,)."""
+        """Squared lengths of the parts of columns orthogonal to the run offsets, for given spreads; shape (k,)."""
         return np.asarray(self.squares - np.einsum("ij,ij->j", self.shared, metric @ self.shared))
 
 
