@@ -199,9 +199,12 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     if binary.contrast < CONTRAST_FLOOR * top:
         return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
+    are_edges: dict[Binary, bool] = {}
     for split, fingers, light_gap in candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
-            if fingers.status is not Status.NO_FINGERS and not has_edges(denoised, split, binary.contrast):
+            if fingers.status is not Status.NO_FINGERS and split not in are_edges:
+                are_edges[split] = has_edges(denoised, split, binary.contrast)
+            if fingers.status is not Status.NO_FINGERS and not are_edges[split]:
                 fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
             attempt = _Attempt(fingers, split)
         else:
