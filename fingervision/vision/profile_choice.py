@@ -44,6 +44,9 @@ Ints = NDArray[np.int_]
 
 # The flanks are looked at where a step leaves so many times the noise of the picture's flat parts.
 UNEXPLAINED = 1.2
+# Flanks that are broader than the tips and leave so many times the noise, without a common profile, are no steps: a pad
+# or a shadow is as broad as the window there. Motion leaves less than twice the noise.
+NO_STEP = 3.0
 # A wall improves what a step leaves by so much in chi-square.
 SIGNIFICANT = 30.0
 # One model is clearly better than another that leaves so much more chi-square, in units of what its own bins leave
@@ -109,7 +112,8 @@ def with_profile(
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        return _unsure_of_width(edges, displaced_px)
+        is_strip = edges.noise > NO_STEP * edges.noise_flat and np.any(is_surely_broader(edges, displaced_px))
+        return replace(edges, beside=STRIP) if is_strip else _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:

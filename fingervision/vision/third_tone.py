@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
 # A strip ends in a step of at least this share of the edge's contrast within so many pixels; it is not looked for
 # nearer to the edge than the blur reaches.
-LEAST_STEP, STEP_PX = 0.12, 6
+LEAST_STEP, STEP_PX = 0.10, 6
 
 THIRD_TONE = NoGap(
     Status.NO_FINGERS,
