@@ -15,8 +15,8 @@ from fingervision.stage_record.window_blending import blended
 
 RECORDS = 30
 """Number of simulated records: a standard deviation is then known to an eighth."""
-MOST_ROWS = 60_000
-"""Largest number of rows in all simulated records (half a second), and `FEWEST_RECORDS` at least."""
+MOST_ROWS = 40_000
+"""Largest number of rows in all simulated records (a third of a second), and least number of records."""
 FEWEST_RECORDS = 8
 BARELY = 1e-3
 """Share of the recorded input's standard uncertainty below which noise beside an encoder's rounding is none."""
