@@ -152,11 +152,11 @@ def with_profile(
     if outer[0] is None or outer[1] is None:
         wall = fits.of(WALL)
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
-        is_strip = [
+        has_strip = [
             step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
             for step, fit, (profile, _, _) in zip(steps, wall, profiles, strict=True)
         ]
-        if is_strip[0] != is_strip[1]:
+        if has_strip[0] != has_strip[1]:
             return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
             # The flanks are more blurred than the tips, because of a wall or of motion, which cannot be distinguished
