@@ -27,7 +27,7 @@ def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
     Parameters
     ----------
     figures : mapping of str to ModelFigures
-        Figures of each model, by the name of its kind.
+        Results of each model, by the name of its kind.
 
     Returns
     -------

@@ -1,6 +1,7 @@
 """Damping of the gripper's vibrations: four damping laws.
 
-The laws are a constant modal ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko & Havlik (2015).
+The damping laws are a constant modal damping ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko &
+Havlik (2015).
 
 PA12 at room temperature has a loss factor tan d = 0.03 to 0.08, so that its damping ratio tan d / 2 is about 0.025;
 static results do not depend on damping.
@@ -78,12 +79,12 @@ class PaperDamping:
     """Damping by equation (4) of Hricko & Havlik (2015), evaluated mode by mode.
 
     For a mode with angular frequency w, the damping ratio zeta follows from 2 zeta w = gamma w0 c(w / w0), with the
-    rate c of `paper_rate`, the reference frequency w0 and a factor gamma. The equation is an illustrative example of a
-    theory (Adhikari, 2006, Journal of Sound and Vibration 293, 156), not a material law. The equation adds powers of
-    the angular frequency w that have different units, so that its result would depend on the unit of time; frequencies
-    are therefore divided by a reference frequency w0. Below the reference frequency the damping would be negative, and
-    at several times this frequency it would be more than critical. Therefore the reference frequency must not exceed
-    that of the lowest mode, and damping ratios outside (0, 0.3) are refused.
+    rate c of `paper_rate`, the reference frequency w0 and a factor gamma. Equation (4) of Hricko & Havlik (2015) is an
+    illustrative example of a theory (Adhikari, 2006, Journal of Sound and Vibration 293, 156), not a material law.
+    Equation (4) adds powers of the angular frequency w that have different units, so that its result would depend on
+    the unit of time; frequencies are therefore divided by a reference frequency w0. Below the reference frequency the
+    damping would be negative, and at several times this frequency it would be more than critical. Therefore the
+    reference frequency must not exceed that of the lowest mode, and damping ratios outside (0, 0.3) are refused.
 
     Parameters
     ----------
@@ -117,8 +118,8 @@ class PaperDamping:
 def paper_rate(w: float) -> float:
     """Equation (4) for one mode: 2 zeta w as a function of the dimensionless frequency w, with zeta the damping ratio.
 
-    The rate is exp(-w^4 / 2) sinh((4/3) ln(w) / w^2) + w^(3/2) cos^2(1 / w^2) atan(w / pi). For a single mode, the
-    argument sqrt(M^-1 K) / pi in the paper becomes w / pi.
+    At the angular frequency w, the rate is exp(-w^4 / 2) sinh((4/3) ln(w) / w^2) + w^(3/2) cos^2(1 / w^2) atan(w / pi).
+    For a single mode, the argument sqrt(M^-1 K) / pi in the paper becomes w / pi.
     """
     first = 0.0 if w**4 > 2.0 * _SINH_UNDERFLOWS_ABOVE else exp(-(w**4) / 2.0) * sinh(4.0 / 3.0 * log(w) / w**2)
     return first + float(w**1.5) * cos(1.0 / w**2) ** 2 * atan(w / pi)

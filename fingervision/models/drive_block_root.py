@@ -3,8 +3,8 @@
 The block is hardly larger than the bar is wide, so that the formula for a bar rooted in a half plane (O'Donnell, 1960,
 Journal of Applied Mechanics 27, 764) does not hold. The block is meshed with a stub of the bar, as long as
 Saint-Venant's principle requires, fixed at its drive face and on the symmetry axis; the bar's own compliance is
-subtracted from the compliance at the stub's end. The compliance depends on geometry only, and is computed once per
-block.
+subtracted from the compliance at the stub's end. For unit modulus, the compliance of a block depends on its geometry
+only, and is computed once per block.
 """
 
 from dataclasses import dataclass

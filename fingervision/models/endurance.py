@@ -1,9 +1,9 @@
 """Number of cycles that a flexure endures, from the S-N line of its material.
 
-Basquin's line: the logarithm of the amplitude falls linearly with the logarithm of the number of cycles. Cycles about a
-mean stress are converted to fully reversed ones by Soderberg's line, amplitude / (1 - mean / yield) (Shigley,
-Mechanical Engineering Design, chapter 6), which is more conservative than Goodman's line and needs only the yield
-stress.
+By Basquin's line, the logarithm of the stress amplitude falls linearly with the logarithm of the number of cycles.
+Cycles about a mean stress are converted to fully reversed ones by Soderberg's line, amplitude / (1 - mean / yield)
+(Shigley, Mechanical Engineering Design, chapter 6), which is more conservative than Goodman's line and needs only the
+yield stress.
 """
 
 from dataclasses import dataclass

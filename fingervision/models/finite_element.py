@@ -1,12 +1,12 @@
 """Finite-element model of the gripper: its outline as a plane body (Hricko & Havlik (2015) used Comsol).
 
-One half is solved under the symmetry constraint: the lower face of the pillar is clamped, points on the symmetry axis
-cannot move perpendicular to it, and the drive face moves by the input. The plate is in plane stress; its hinges lie
-between plane stress and plane strain, depending on their width (`width_effect`). For the published gripper in plane
-stress, a converged mesh gives 7.7212 mm of gap per millimetre of input, a stiffness of 2.0014 N/mm and a stress of
-19.07 MPa/mm; including the width of the hinges the stiffness is 2.06 N/mm, as with three-dimensional brick elements.
-The link length of the published gripper is unknown and was chosen so that the slope equals the published slope of the
-Comsol model; the agreement of the two slopes is therefore no validation.
+One half of the gripper is solved under the symmetry constraint: the lower face of the pillar is clamped, points on the
+symmetry axis cannot move perpendicular to it, and the drive face moves by the input. The plate is in plane stress; its
+hinges lie between plane stress and plane strain, depending on their width (`width_effect`). For the published gripper
+in plane stress, a converged mesh gives 7.7212 mm of gap per millimetre of input, a stiffness of 2.0014 N/mm and a
+stress of 19.07 MPa/mm; including the width of the hinges the stiffness is 2.06 N/mm, as with three-dimensional brick
+elements. The link length of the published gripper is unknown and was chosen so that the slope equals the published
+slope of the Comsol model; the agreement of the two slopes is therefore no validation.
 """
 
 from collections.abc import Sequence

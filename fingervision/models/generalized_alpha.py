@@ -45,7 +45,7 @@ def integrate(
     *,
     high_frequency_radius: float = 0.8,
 ) -> Motion:
-    """Integrate M a + C v + f(u) = 0 over equal steps.
+    """Integrate M a + C v + f(u) = 0 over equal time steps, for displacement u, velocity v and acceleration a.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def gripper_figures(
 def life_between(gripper: Gripper, low: Sequence[float | None], high: Sequence[float | None]) -> Endurance | None:
     """Endurance of the hinges for a cycle between two states of load (input, gap, force, grip, stress).
 
-    The stress has the sign of the input.
+    In each state, the stress is taken as positive if the input is positive, and else as negative.
     """
     ends = sorted(copysign(load[4] or 0.0, load[0] or 0.0) for load in (low, high))
     return endurance(gripper.material, ends[0], ends[1])

@@ -1,6 +1,7 @@
 """Outline of a gripper's right half, and the geometric conditions that this outline must satisfy.
 
-The half is the union of its bars and polygons, minus four notch discs, minus everything left of the symmetry axis.
+One half of the gripper is the union of its bars and polygons, minus four notch discs, minus everything left of the
+symmetry axis.
 """
 
 from functools import lru_cache

@@ -140,8 +140,8 @@ shear differs from that of a straight beam."""
 def sway_shear(notch: Notch) -> float:
     """Shear compliance of a notch in a body, as a multiple of the integral of 1 / (E b h) over its length.
 
-    In plane stress this multiple does not depend on Poisson's ratio, because the stresses under given loads do not
-    depend on it (Michell's theorem).
+    In plane stress, the shear compliance as such a multiple does not depend on Poisson's ratio, because the stresses
+    under given loads do not depend on this ratio (Michell's theorem).
     """
     return SWAY_SHEAR * _sway_ratio(notch.curvature_ratio)
 

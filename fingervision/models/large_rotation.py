@@ -177,7 +177,7 @@ def _is_slow(body: DrivenBody, residual: float, before: float, wanted: float, si
 
 
 def _predicted(body: DrivenBody, input_mm: float, path: list[Equilibrium]) -> Array:
-    """Extrapolate the path of equilibria; if there is only one so far, add the small displacements."""
+    """Extrapolate the path of equilibria; if only one equilibrium is known, add small displacements to it."""
     last = path[-1]
     if len(path) == 1:
         return last.displacement_mm + (input_mm - last.input_mm) * body.unit_displacement_mm

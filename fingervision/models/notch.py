@@ -58,7 +58,7 @@ class Notch:
 
     @property
     def curvature_ratio(self) -> float:
-        """Thickness over radius of curvature at the neck: t / R for a circular notch, t c / a^2 for an elliptic one."""
+        """Thickness over radius of curvature of the neck: R of a circle, a^2 / c of an ellipse with half axes a, c."""
         return self.thickness_mm * self.depth_mm / self.half_length_mm**2
 
     @property

@@ -1,4 +1,4 @@
-"""Sweep over a grid of dimensions: figures of the lumped model, scaled by ratios from a faster bar model."""
+"""Sweep over a grid of dimensions: results of the lumped model, approximated by a faster bar model times ratios."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """A drawn gripper for the diagnosis: its small-displacement response, and its own formulas for effects.
 
-Expensive parts (large rotation, contact, changed links) are computed once and interpolated, so that a search may
-evaluate them thousands of times.
+Expensive parts of the response (large rotation, contact, changed links) are computed once and interpolated, so that a
+search may evaluate them thousands of times.
 """
 
 from collections.abc import Mapping
@@ -113,7 +113,7 @@ class PhysicalGripper:
     def drawn_anew(self, changes: Mapping[str, float]) -> "PhysicalGripper":
         """Return the gripper with changed dimensions, computed by this kind of model itself.
 
-        The scaled response of `redrawn` differs from the response computed here by about 1e-4 (relative).
+        The response that a bar model and fixed ratios give for the same dimensions differs by about 1e-4 (relative).
         """
         if not changes:
             return self._with(self._drawn)

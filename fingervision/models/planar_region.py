@@ -158,8 +158,8 @@ def _box_mm(curve: Curve) -> tuple[Array, Array]:
 def _chained(pieces: list[Curve], same_mm: float, unresolved_mm: float) -> tuple[Loop, ...]:
     """Join pieces to loops where one ends and the next begins.
 
-    A piece between two shapes that nearly touch may be too short for its sides to be told apart; the pieces before and
-    after it are joined across the gap of at most `unresolved_mm` that it leaves.
+    A piece of outline between two shapes that nearly touch may be too short to decide on which side the material lies.
+    The pieces before and after this piece are then joined across a gap of at most `unresolved_mm`.
     """
     starts = np.array([p.start_mm for p in pieces]).reshape(-1, 2)
     following: dict[int, int] = {}

@@ -60,11 +60,11 @@ class RatioCurves:
     force: Array
 
     def force_at_gap(self, gap_ratio: float) -> float:
-        """Force ratio at the change for which the gap ratio has a given value; both ratios are 1 without change."""
+        """Force ratio for that change of the dimension for which the gap ratio has a given value."""
         return float(self._force(np.clip(gap_ratio, self.gap.min(), self.gap.max())))
 
     def gap_at_force(self, force_ratio: float) -> float:
-        """Gap ratio at the change for which the force ratio has a given value."""
+        """Gap ratio for that change of the dimension for which the force ratio has a given value."""
         return float(self._gap(np.clip(force_ratio, self.force.min(), self.force.max())))
 
     @cached_property

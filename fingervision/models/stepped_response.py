@@ -107,9 +107,9 @@ def _drag(body: DrivenBody, damping: Damping) -> csr_matrix:
     """Damping matrix for motion relative to the static shape.
 
     For the modes that the damping law describes and the time step resolves, the damping matrix is M Phi diag(2 zeta w)
-    Phi' M, with the mass matrix M, the mode shapes Phi, the damping ratios zeta and the angular frequencies w. For all
-    other modes, damping is proportional to their stiffness, and so strong that they follow the drive without delay, as
-    in `modal_model`.
+    Phi' M, with the mass matrix M, the mode shapes Phi, the damping ratios zeta and the angular frequencies w. Modes
+    that the damping law does not describe, or the time step does not resolve, have a damping proportional to their
+    stiffness, so strong that these modes follow the drive without delay, as in `modal_model`.
     """
     model, ratios = gripper_modes(body, _RESOLVED_MODES).damped(damping)
     rad_s, shapes = body.modes(drive_held=True, count=_RESOLVED_MODES + 1)

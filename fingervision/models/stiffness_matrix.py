@@ -13,9 +13,9 @@ The published equations are corrected for these reasons:
   does.
 * Equation (14) of the paper has C_2A on both sides; on the right-hand side it must be C_12.
 * Equation (15) of the paper, K = 2 C^-1, gives the stiffness along the drive only if the shuttle cannot move sideways
-  or rotate. The
-  other half of the gripper prevents these motions of the shuttle, so that the stiffness is 2 (C^-1)_yy; for a free
-  shuttle, the stiffness would be 2 / C_yy.
+  or rotate. The other half of the gripper prevents sideways motion and rotation of the shuttle, so that the stiffness
+  is 2 (C^-1)_yy, with C the compliance of one half and y the direction of the drive; for a free shuttle, it would be 2
+  / C_yy.
 
 The links are elastic too, as Timoshenko bars; `rigid_links` gives the published model with elastic hinges only, which
 for the published gripper has a 0.9 % larger slope and about 10 % more force.

@@ -50,8 +50,8 @@ def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]
 def stretched_share(width_over_length: float, poisson: float) -> float:
     """Weight of plane strain, from 0 to 1, in a stretched strip whose ends cannot become narrower.
 
-    The bodies at the ends restrain the strip. The weight is computed by Ritz's method, with zero stress in the
-    direction of the strip's thickness; parameters as in `strip_share`.
+    The bodies at the ends of the strip prevent it from becoming narrower there. The weight of plane strain is computed
+    by Ritz's method, with zero stress in the direction of the strip's thickness; parameters as in `strip_share`.
     """
     if poisson <= 0.0:
         return 0.0

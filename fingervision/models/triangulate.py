@@ -1,10 +1,10 @@
 """Quadratic triangles of a plane body: exact outline, Delaunay triangulation, and nodes that repel each other.
 
-The outline is divided by the size field and stays fixed. Inner nodes start on squares of the required size and move
-under forces along the edges (Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329), are
-triangulated again as they move, and are finally placed at the area-weighted mean of their triangles' circumcentres
-(Alliez et al., Variational tetrahedral meshing, ACM Transactions on Graphics 24 (2005) 617, in the plane). Midside
-nodes lie on the arcs of the outline.
+The outline is divided into edges of the required size, and its nodes stay fixed. Inner nodes start on squares of the
+required size and move under forces along the edges (Persson and Strang, A simple mesh generator in MATLAB, SIAM Review
+46 (2004) 329), are triangulated again as they move, and are finally placed at the area-weighted mean of their
+triangles' circumcentres (Alliez et al., Variational tetrahedral meshing, ACM Transactions on Graphics 24 (2005) 617, in
+the plane). Midside nodes lie on the arcs of the outline.
 """
 
 from fingervision.domain.errors import ModelError

@@ -1,8 +1,9 @@
 """Rigid-body transforms of compliance: equations (5) to (8) of Hricko & Havlik (2015), in six dimensions.
 
-Equation (6), T = [[R, R P], [0, R]], is used as published: R rotates the axes, and P is the cross-product matrix of (8)
-for the vector from the point whose motion is wanted to the point whose motion is known. In the publication (6) is 6 by
-6, but (3) is planar, 3 by 3; here every compliance is 6 by 6.
+Equation (6), T = [[R, R P], [0, R]], is used as published: R rotates the axes, and P is the cross-product matrix of
+equation (8) for the vector from the point whose motion is wanted to the point whose motion is known. In the
+publication, equation (6) contains 6 by 6 matrices, but the compliance of equation (3) is planar, 3 by 3; in this module
+every compliance is 6 by 6.
 """
 
 import numpy as np

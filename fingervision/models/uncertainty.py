@@ -3,7 +3,8 @@
 The propagation is linear (JCGM 100:2008, 5.1), by central differences of one standard uncertainty in either direction.
 The second differences measure the nonlinearity. If the nonlinearity would shift the mean of a quantity, or widen its
 uncertainty, by more than a tenth of the uncertainty, this quantity is sampled instead at Sobol points (Monte Carlo
-method, JCGM 101:2008). The dimensions are assumed normal and independent of each other.
+method, JCGM 101:2008). The errors of the dimensions are assumed to be normally distributed and independent of each
+other.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,9 +1,9 @@
 """Width effect: restraint of flexures by the width of the plate, between plane stress and plane strain.
 
 A bar in bending becomes narrower on its stretched side and wider on the compressed side. A flexure that is short
-compared with its width cannot become narrower or wider, because of the thick material at its ends. It is therefore
-stiffer than in plane stress, by a factor of up to 1 / (1 - nu^2) in plane strain (nu: Poisson's ratio). The weight w of
-plane strain (0 to 1) comes from brick elements (`hinge_correction`).
+compared with its width cannot become narrower or wider, because of the thick material at its ends. A flexure that is
+short compared with its width is therefore stiffer than in plane stress, by a factor of up to 1 / (1 - nu^2) in plane
+strain (nu: Poisson's ratio). The weight w of plane strain (0 to 1) comes from brick elements (`hinge_correction`).
 """
 
 from dataclasses import dataclass

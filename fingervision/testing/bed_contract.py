@@ -318,7 +318,7 @@ def _check_order(
 ) -> list[Reading]:
     """Check the order of readings.
 
-    With `asked`, the newest reading must have been taken on request; otherwise it may have been streamed before.
+    If `asked` is true, the newest reading must have been taken on request; otherwise it may have been streamed before.
     """
     seen: list[Reading] = []
     for _ in range(5):

@@ -1,4 +1,4 @@
-"""An emulated axis of an ESP300, after Newport's manual: it moves at its speed on the host's clock."""
+"""An emulated axis of an ESP300, written from Newport's manual: it moves at its speed on the host's clock."""
 
 from time import monotonic
 from typing import Any
@@ -7,7 +7,7 @@ from pymeasure.adapters import Adapter
 
 
 class EmulatedEsp300(Adapter):
-    """Answers as the controller does: commands have no answer, questions one line."""
+    """Responds as the controller does: no response to commands, one line in response to questions."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The bed as bluesky's devices, with a real RunEngine: scans, flights, a stop, and the agent around the next run."""
+"""The test bed as bluesky devices, with a real RunEngine: scans, flights, a stop, and the agent for the next run."""
 
 import threading
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.simulation.injected_effects import Hidden
 
 PLAY_MM, GAIN = 0.12, 7.7
-pytestmark = pytest.mark.filterwarnings("default")  # of bluesky and its libraries
+pytestmark = pytest.mark.filterwarnings("default")  # warnings of bluesky and its libraries
 
 
 @pytest.fixture
@@ -69,9 +69,11 @@ def test_the_devices_keep_blueskys_protocols(made: Devices) -> None:
 @pytest.mark.slow
 def test_a_scan_moves_and_measures_at_each_place(made: Devices, engine: RunEngine) -> None:
     seen = documents(engine, bp.list_scan([made.gap, made.force], made.stage, [0.0, 0.3, 0.6]))
-    np.testing.assert_allclose(rows(seen, "stage"), [0.0, 0.3, 0.6], atol=0.11)  # the stage's accuracy and encoder
+    np.testing.assert_allclose(
+        rows(seen, "stage"), [0.0, 0.3, 0.6], atol=0.11
+    )  # from the stage's accuracy and its encoder
     gaps, inputs = np.array(rows(seen, "gap_gap_mm")), np.array(rows(seen, "gap_input_mm"))
-    # The play is taken up on the first way: from there on the gap follows the input.
+    # The play is taken up in the first motion; afterwards, the gap follows the input.
     assert gaps[2] - gaps[1] == pytest.approx(GAIN * (inputs[2] - inputs[1]), abs=GAIN * 0.03)
     assert gaps[1] - gaps[0] == pytest.approx(GAIN * (inputs[1] - inputs[0] - 0.5 * PLAY_MM), abs=GAIN * 0.03)
     np.testing.assert_allclose(inputs, rows(seen, "stage"), atol=0.03)
@@ -98,7 +100,7 @@ def test_a_flight_gives_an_event_a_frame_and_the_agent_names_what_is_hidden(
     seen = documents(engine, run_steps(steps, made.stage, made.gap))
     engine.unsubscribe(token)
     inputs = np.array(rows(seen, "gap_input_mm"))
-    assert inputs.size > 25  # 125 where the machine keeps up
+    assert inputs.size > 25  # 125 frames if the machine is fast enough
     assert np.ptp(inputs) == pytest.approx(1.0, abs=0.2)
     report = agent.report().report
     assert ["backlash"] in [list(names) for names in report.alternatives], report.sentence

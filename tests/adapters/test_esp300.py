@@ -1,4 +1,4 @@
-"""The ESP300's axis: commands to the letter by pymeasure's protocol emulator, the contract on an emulated axis."""
+"""The ESP300's axis: exact commands with pymeasure's protocol emulator, and contract tests on an emulated axis."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -22,7 +22,7 @@ from fingervision.testbed.operators.operator_kinds import AtTheBed
 from fingervision.testing import ActuatorContract, NotApplicable, checks_of
 from tests.adapters.esp300_axis import EmulatedEsp300
 
-# pymeasure asks its own maintainers whether this controller knows SCPI; nothing of that is used here.
+# pymeasure warns that it is not known whether this controller supports SCPI; SCPI is not used here.
 pytestmark = pytest.mark.filterwarnings("ignore:It is not known:FutureWarning")
 LIMITS = StageLimits(-2.0, 8.0, 5.0, 10.0, accuracy_mm=0.001)
 OPENED = [("1SN?", "2"), ("1MO", None), ("TE?", "0")]

@@ -43,7 +43,7 @@ def test_frames_come_in_grey_levels_with_rising_times_and_stop_when_closed() -> 
 
 
 def test_pictures_are_copies_of_their_own() -> None:
-    """The producer fills its buffers again; Viky's ball moves, so two pictures are never the same memory or content."""
+    """The producer reuses its buffers. Viky's ball moves, so that two pictures must differ in memory and content."""
     _, frames = some(NAME, 8, Wish(rate_hz=50.0))
     assert not any(np.shares_memory(a.pixels, b.pixels) for a, b in pairwise(frames))
     assert any(not np.array_equal(a.pixels, frames[0].pixels) for a in frames[1:])

@@ -1,4 +1,4 @@
-"""A Zaber axis by the maker's own library, on an emulated device in the network."""
+"""A Zaber axis driven by the maker's library, on an emulated device in the network."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -87,7 +87,7 @@ def test_a_refusal_of_the_device_is_a_sentence_and_an_alarm(device: ZaberDevice)
 
 @pytest.mark.slow
 def test_the_emulated_stage_keeps_the_contract() -> None:
-    """With ramps, a stray of its readings and an error of its places, as it declares them."""
+    """The emulated stage has ramps, scatter of readings and positioning errors, as it declares them."""
     failed = {}
     for check in checks_of(ActuatorContract):
         device = ZaberDevice(MICROSTEP_MM, RAMP_S, STRAYS_MM, ERROR_MM)
@@ -104,7 +104,7 @@ def test_the_emulated_stage_keeps_the_contract() -> None:
 
 
 def test_a_stage_that_declares_too_little_is_told_what_to_state() -> None:
-    """Readings that stray by 0.3 um are no fault of a stage that says so, and one of a stage that does not."""
+    """Scatter of 0.3 um passes if the stage declares it, and fails if the stage does not."""
     device = ZaberDevice(MICROSTEP_MM, RAMP_S, 20.0 * STRAYS_MM, ERROR_MM)
     bed = bed_of(device, replace(LIMITS, repeatability_mm=0.0))
     try:

@@ -1,7 +1,8 @@
-"""An emulated Zaber device in the network, after Zaber's "ASCII Protocol Manual": one axis with ramps and a stray.
+"""An emulated Zaber device in the network, written from Zaber's "ASCII Protocol Manual": one axis with ramps and
+scatter.
 
-It knows `get`/`set` of maxspeed and pos, `move abs`, `home`, `stop` and the question for the state; it moves on the
-host's clock with a trapezoid of speed, and its encoder strays.
+The device understands `get` and `set` of maxspeed and pos, `move abs`, `home`, `stop` and the request for its state. It
+moves on the host's clock with a trapezoidal speed profile, and its encoder readings scatter.
 """
 
 import contextlib
@@ -34,13 +35,13 @@ class ZaberDevice:
         self._socket.close()
 
     def at_steps(self) -> float:
-        """Where it is: a trapezoid of speed, as a smooth step at both ends."""
+        """Present position, from a trapezoidal speed profile."""
         now_s = monotonic()
         if now_s >= self.ends_s:
             return self.to_steps
         whole_s, passed_s = self.ends_s - self.began_s, now_s - self.began_s
         ramp_s = min(self.ramp_s, 0.5 * whole_s)
-        top = 1.0 / (whole_s - ramp_s)  # share of the way per second at full speed
+        top = 1.0 / (whole_s - ramp_s)  # share of the distance per second at full speed
         if passed_s < ramp_s:
             done = 0.5 * top / ramp_s * passed_s**2
         elif passed_s < whole_s - ramp_s:

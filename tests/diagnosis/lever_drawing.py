@@ -1,4 +1,4 @@
-"""A small mechanism for tests: a finger between two notches, one on the ground and one on a guided shuttle."""
+"""A small mechanism for tests: a finger with two notch hinges, one at the fixed body and one at a guided shuttle."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -28,7 +28,7 @@ TABLES: dict[str, Any] = {
 
 
 def changed(**flexures: dict[str, Any]) -> dict[str, Any]:
-    """Return the tables with numbers of `hinge_1` or `hinge_2` changed."""
+    """Return the tables of the drawing with changed dimensions of `hinge_1` or `hinge_2`."""
     tables = deepcopy(TABLES)
     for flexure in tables["flexure"]:
         flexure.update(flexures.get(flexure["name"].replace(" ", "_"), {}))

@@ -1,4 +1,4 @@
-"""Tables that a careful metrologist would not trust: no confident name that is not the truth, and a sentence if due."""
+"""Tables with poor data: no wrong effect is named with confidence, and a sentence states the fault, if any."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,9 @@ CONSTANTS = {"rest_gap_error", "input_offset", "edge_bias"}
 
 
 def stage(directions: str, cycles: int, play_mm: float = PLAY_MM, offset_mm: float = 0.0) -> Columns:
-    """Readings at rest of a stage with play: the gap is 3 mm plus the place; `+` and `-` are its directions."""
+    """Readings of a stage with play, at rest: the gap is 3 mm plus the position; `+` and `-` are the directions of
+    approach.
+    """
     rng = np.random.default_rng(11)
     strokes = [(TARGETS if way == "+" else TARGETS[::-1], 1.0 if way == "+" else -1.0) for way in directions] * cycles
     u = np.concatenate([targets for targets, _ in strokes])
@@ -30,7 +32,9 @@ def stage(directions: str, cycles: int, play_mm: float = PLAY_MM, offset_mm: flo
 
 
 def asked(folder: Path, table: Columns, slope: float = 1.0, scale: float = 1.0) -> DiagnosisReport:
-    """Diagnose a table against the model 3 mm plus the input, mirrored by a slope of -1, or in another unit."""
+    """Diagnose a table with a model whose gap is 3 mm plus `slope` times the input, with lengths in a unit set by
+    `scale`.
+    """
     rows = "\n".join(",".join(f"{value:.6f}" for value in row) for row in zip(*table.values(), strict=True))
     (folder / "measured.csv").write_text(",".join(table) + "\n" + rows + "\n")
     ends = "\n".join(f"{u},{scale * (GAP_MM + slope * u)}" for u in (-0.5, 2.5))
@@ -39,7 +43,7 @@ def asked(folder: Path, table: Columns, slope: float = 1.0, scale: float = 1.0) 
 
 
 def singles(report: DiagnosisReport) -> set[str]:
-    """The names in a set of single effects."""
+    """Names of the effects that alone explain the table."""
     assert all(len(names) == 1 for names in report.alternatives)
     return {name for names in report.alternatives for name in names}
 

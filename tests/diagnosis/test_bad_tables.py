@@ -1,4 +1,4 @@
-"""Tables that are wrong end in one sentence; where an answer is still possible it is given with what it lacks."""
+"""Faulty tables are refused with one sentence; if a diagnosis is still possible, it states what is missing."""
 
 from pathlib import Path
 
@@ -105,7 +105,7 @@ def test_a_refused_table_leaves_no_empty_folder(tmp_path: Path, command: str) ->
     ],
 )
 def test_rows_that_are_no_one_measurement_are_asked_about(tmp_path: Path, kind: str, words: str | None) -> None:
-    """Two rows of three hold anything at all, or half of them another zero: no name would be right."""
+    """Two of three rows are wrong, or half of the rows have another zero: naming any effect would be wrong."""
     rng = np.random.default_rng(4)
     at = rng.uniform(-0.9, 1.9, 240)
     wrong = rng.random(at.size) < (0.5 if kind == "halved" else 2.0 / 3.0)

@@ -1,4 +1,4 @@
-"""The commands effects, compare and diagnose: files to the letter, sentences for wrong requests."""
+"""The commands effects, compare and diagnose: exact contents of files, and sentences for wrong requests."""
 
 import json
 import re
@@ -21,7 +21,7 @@ KEYS = {
 
 @pytest.fixture
 def tables(tmp_path: Path) -> tuple[Path, Path]:
-    """A gripper whose gap is a tenth of a millimetre too large, in two runs."""
+    """Tables of a gripper whose gap is 0.1 mm too large, in two runs."""
     rng = np.random.default_rng(SEED)
     u = np.concatenate([np.linspace(-0.4, 1.4, 60), np.linspace(1.4, -0.4, 60)])
     rows = []
@@ -48,7 +48,7 @@ def test_diagnose_writes_what_the_design_lays_down(tables: tuple[Path, Path], tm
     assert (out / "next_run.toml").exists()
     page = (out / "report.html").read_text()
     assert report["sentence"] in page
-    # The chart library names its home in its licence; nothing is fetched from there.
+    # The chart library states its web address in its licence; nothing is loaded from there.
     assert not re.search(r"(?:src|href)=\"?http|url\(http|fetch\(|import\(", page)
     again = CliRunner().invoke(cli, ["compare", str(tables[0]), "--model", str(out / "model.toml"), "--out", str(out)])
     assert "nowhere differ by more than the noise" in again.output

@@ -1,4 +1,4 @@
-"""A polymer finger whose runs differ in gain, drawn by arithmetic of this file alone."""
+"""Creep of a polymer finger whose gain differs between runs; the data are computed in this file alone."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ RATE_HZ, HOLD_S, NOISE_MM = 4.0, 50.0, 0.004
 
 
 def crept(time_s: np.ndarray, opening_mm: np.ndarray) -> np.ndarray:
-    """What is reached of an opening that is held between samples."""
+    """Response of the finger to an opening that is constant between samples."""
     out = opening_mm.copy()
     for share, tau_s in SHARES:
         behind = opening_mm[0]
@@ -42,7 +42,7 @@ def test_gains_that_differ_from_load_to_load_are_no_friction_and_no_map(tmp_path
     assert found.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
     named = {name for names in found.alternatives for name in names}
     assert "viscoelastic_creep" in named
-    # Four gains have a mean of their own, which is a ratio.
+    # The mean of the four gains differs from 1, which is an error of a ratio.
     assert named <= {"viscoelastic_creep", "lever_ratio_error", "input_scale", "scale_error"}
-    # Noise is 5 % of it, and what the mean of four gains is taken for by the slowest creep.
+    # Noise contributes 5 %; the rest is the part of the mean gain that the slowest creep imitates.
     assert found.standing_share < 0.1

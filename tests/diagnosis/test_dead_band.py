@@ -1,4 +1,4 @@
-"""A servo that stops within a band about its command is described where no effect of the catalogue is named."""
+"""A servo that stops within a band around its command is described, because no effect of the catalogue fits."""
 
 import re
 
@@ -15,7 +15,7 @@ NOISE_MM, SLOPE = 0.002, 2.0
 
 
 def servo(command: Array, kind: str) -> Array:
-    """Position of a servo of 8 / s, at most 6 mm/s, followed twenty times a sample."""
+    """Position of a servo with a gain of 8 / s and at most 6 mm/s, integrated with twenty steps per sample."""
     fine, place, moves, out = 20, command[0], False, []
     for target in command:
         for _ in range(fine):

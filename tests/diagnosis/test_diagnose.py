@@ -1,4 +1,4 @@
-"""The whole loop on made-up benches whose truth is known, and on the paper's own table."""
+"""Complete diagnoses of simulated data with known effects, and of the published table."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -34,7 +34,7 @@ def triangle(low: float, high: float, seconds: float) -> Array:
 
 
 def bench(folder: Path, plant: Plant) -> DiagnosisReport:
-    """Four runs at two speeds with holds, read and diagnosed."""
+    """Write four runs at two speeds with holds, then read and diagnose the table."""
     rng = np.random.default_rng(SEED)
     held = np.concatenate([np.full(40, -0.3), np.linspace(-0.3, 1.4, 30), np.full(60, 1.4), np.linspace(1.4, 0.2, 25)])
     runs = [triangle(-0.4, 1.5, 6.0), triangle(-0.4, 1.5, 2.5), held, triangle(-0.2, 1.0, 4.0)]
@@ -72,7 +72,8 @@ def with_play(u: Array, time: Array) -> tuple[Array, Array]:
 
 
 def test_a_tilted_camera_is_all_there_is_where_the_gripper_stands_far_off_the_picture_s_centre(tmp_path: Path) -> None:
-    # The tilt moves the middle as well, by 30 um: taken for where it stands, that would be a scale besides.
+    # The tilt also moves the midline by 30 um. If this shift were taken as the position of the gripper, a scale error
+    # would be found in addition.
     def tilted(u: Array, time: Array) -> tuple[Array, Array]:
         left, right = (edge / (1.0 + 0.012 * edge) for edge in halves(on_grid(u)))
         return left, right

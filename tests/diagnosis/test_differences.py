@@ -1,4 +1,4 @@
-"""Differences of a record with uneven rows: a straight motion has none, and noise keeps its size."""
+"""Differences of a record with uneven sampling: they are zero for a straight motion, and have the size of the noise."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_a_polynomial_of_a_lower_degree_vanishes_and_even_rows_give_ordinary_dif
 
 
 def test_the_noise_of_a_log_with_late_and_missing_rows_is_its_own():
-    """Ordinary differences take a row's delay times the speed for noise: ten times too much here."""
+    """Ordinary differences would include the delay of a row times the speed, ten times the noise in this test."""
     rng = np.random.default_rng(6)
     time_s = np.arange(600) * 0.02 + rng.uniform(-0.004, 0.004, 600)
     time_s = time_s[rng.random(600) > 0.05]

@@ -1,4 +1,4 @@
-"""A drawing beside measurements of another gripper: its own physics is named, its uncertain numbers are refitted."""
+"""A drawing compared with measurements of a changed gripper: the change is named, uncertain dimensions are refitted."""
 
 import re
 from collections.abc import Callable
@@ -18,12 +18,13 @@ Diagnosed = Callable[[str, bool], tuple[DiagnosisReport, Path]]
 SIGMAS = 4.0
 """Estimates lie within four standard uncertainties but once in 16 000 times."""
 NOISE_SHARE = 1.15
-"""What is left, over the noise of an edge: 400 samples know it to 4 %, and run offsets add a tenth."""
+"""Largest ratio of the residual to the noise of an edge: with 400 samples it is known to 4 %; offsets of runs add 10
+%."""
 EDGE_MM = 0.001
 
 
 def uncertain(folder: Path, **numbers: float) -> Path:
-    """Write the drawing with an uncertainty beside some of its numbers."""
+    """Write the drawing with uncertainties of some of its dimensions."""
     text = DRAWING.read_text(encoding="utf-8")
     for name, u in numbers.items():
         text, found = re.subn(rf"^{name} = ([-0-9.]+)", rf"{name} = {{value = \1, u = {u}}}", text, flags=re.MULTILINE)
@@ -39,7 +40,7 @@ def names(report: DiagnosisReport) -> list[str]:
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
-    """Each case once: its report, and the folder with its table."""
+    """Function that diagnoses each case once; it returns the report and the folder with the table."""
 
     @cache
     def run(case: str, force: bool) -> tuple[DiagnosisReport, Path]:
@@ -101,7 +102,7 @@ def test_an_uncertain_thickness_is_refitted_and_nothing_is_missing(tmp_path: Pat
     report = answered(CASES["hinges"], tmp_path, force=True, drawing=uncertain(tmp_path, thickness_mm=0.1))
     assert report.verdict is Verdict.AGREES, report.sentence
     note = next(note for note in report.notes if note.startswith("hinge.thickness_mm was refitted to "))
-    assert float(note.split()[4]) == pytest.approx(0.9, abs=0.001)  # known to 0.0005 from 400 samples
+    assert float(note.split()[4]) == pytest.approx(0.9, abs=0.001)  # 400 samples determine the thickness to 0.0005 mm
     assert note.endswith("drawn as 1 +-0.1.")
     assert report.disagreement.after_rms_mm < NOISE_SHARE * EDGE_MM
 

@@ -1,4 +1,4 @@
-"""What counts as evidence: families that noise lifts equally seldom, and effects that only imitate something else."""
+"""Evidence for effects: noise exceeds thresholds as rarely as stated, and effects that imitate others are dropped."""
 
 import re
 from dataclasses import replace
@@ -31,7 +31,7 @@ FORMS = {
     "lever_ratio_error": {"ratio": 0.01},
     "large_deflection": {"reach_mm": 6.0, "cross": 0.2},
 }
-"""What bends together to a kink."""
+"""Effects whose sum can imitate a kink."""
 
 
 def stroke() -> Array:
@@ -44,7 +44,7 @@ def several_and_fewer(problem: Problem) -> tuple[Explanation, list[Explanation]]
 
 
 def problem_of(folder: Path, away: Array) -> Problem:
-    """One run there and back whose gap is `away` from the model's."""
+    """One run to the end of the range and back, whose gap differs from that of the model by `away`."""
     rng = np.random.default_rng(SEED)
     u = stroke()
     left, right = (side * (2.0 + 3.5 * u + 0.5 * away) + EDGE_MM * rng.standard_normal(SAMPLES) for side in (-1, 1))
@@ -52,7 +52,7 @@ def problem_of(folder: Path, away: Array) -> Problem:
     (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
     (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
     bench = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
-    # The noise is the pictures' own: what is hidden leaves none of itself in it.
+    # The noise is only that of the frames: it contains no part of the simulated effect.
     return bench.problem(EDGE_MM * rng.standard_normal((2, SAMPLES)).ravel(), 0, explained=True)
 
 
@@ -68,7 +68,7 @@ def test_noise_lifts_some_family_over_its_threshold_as_seldom_as_stated(tmp_path
     over = np.array([thresholds.get(name, np.inf) for name in atoms.names])
     lifted = np.any((atoms.columns.T @ noise) ** 2 > (over * norm)[:, None], axis=0)
     assert float(np.mean(lifted)) < 1.0 - QUANTILE
-    # A single column needs less than a family of periods does.
+    # The threshold of an effect with one column is lower than that of a family of many periods.
     assert thresholds["lever_ratio_error"] < thresholds["encoder_cyclic_error"] - 3.0
 
 
@@ -104,7 +104,7 @@ def test_one_effect_that_is_there_imitates_nothing(tmp_path: Path, name: str) ->
 
 
 def jerking(folder: Path, jump_mm: float, play_mm: float) -> Path:
-    """A stage with play that moves in jumps between two stands; the record is known exactly."""
+    """Write tables of a stage with play that moves in jumps between two rests; the input is recorded without error."""
     rng = np.random.default_rng(SEED)
     rate_hz, stand = 10.0, 80
     way = np.concatenate([np.linspace(0.0, 0.5, 150), np.full(stand, 0.5), np.linspace(0.5, -0.3, 220)])
@@ -148,5 +148,5 @@ def test_waves_are_told_in_seconds_also_where_each_run_begins_at_zero(tmp_path: 
         words = probes(history, problem.whitener, 10_000).words
         told = [re.search(r"over time with a period of (\S+) s in the gap", each) for each in words]
         periods_s = [float(each[1]) for each in told if each]
-        assert max(periods_s) == pytest.approx(0.1 * (SAMPLES - 1), rel=5e-3)  # three digits are told
+        assert max(periods_s) == pytest.approx(0.1 * (SAMPLES - 1), rel=5e-3)  # periods are printed with three digits
         assert min(periods_s) > 2.0 * 0.1

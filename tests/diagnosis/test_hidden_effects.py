@@ -1,7 +1,7 @@
-"""Effects hidden by a bench that shares no code with the catalogue: the small part of tests/benchmarks/hidden.
+"""Effects simulated by a program that shares no code with the catalogue: a small part of tests/benchmarks/hidden.
 
-The figures of the whole benchmark come from `python -m tests.benchmarks.hidden.run`; here a few tables of each kind
-hold what a change must not break. Seeds are other than those used while building.
+`python -m tests.benchmarks.hidden.run` prints the results of the whole benchmark; here, a few tables of each kind are
+tested. The seeds differ from those used in development.
 """
 
 import ast
@@ -23,11 +23,11 @@ from tests.benchmarks.hidden.table_cache import draw_table_of_row
 SEED = 5001
 BENCHMARK = Path(__file__).resolve().parents[1] / "benchmarks" / "hidden"
 RATIO_TOLERANCE = 0.025
-"""Sizes are found by bisection to 2 %; the rest is rounding."""
+"""The benchmark sets sizes by bisection to 2 %; the rest is rounding."""
 START_TOLERANCE = 0.1
-"""Plays that engage over 6 % of their width, and a tenth of it where a run moves by little more than the play."""
+"""A play engages gradually over 6 % of its width; a run that moves by little more than the play allows 10 %."""
 EXACT_FORM = 1e-3
-"""Chi-square that a form which is the catalogue's own may leave: the optimiser's last digit."""
+"""Largest chi-square after a fit of exactly the simulated formula, from the convergence limit of the optimiser."""
 
 
 def test_the_benchmark_shares_no_code_with_what_it_judges() -> None:
@@ -105,7 +105,7 @@ def test_the_judge_finds_where_a_play_starts() -> None:
 def test_a_play_that_stays_engaged_belongs_to_the_set_of_an_offset() -> None:
     experiment = _first("start_poor", "input_offset")
     (hidden,) = experiment.plant.hidden
-    # The one run goes up, where a play that is engaged stays behind by its half.
+    # The single run moves up, so that an engaged play lags by half of its width.
     behind = replace(hidden, parameters={"offset_mm": -abs(hidden.parameters["offset_mm"])})
     judgement = judge(replace(experiment, plant=replace(experiment.plant, hidden=(behind,))))
     assert frozenset({"backlash"}) in judgement.must
@@ -118,8 +118,8 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-# Poor runs are left to the benchmark: there the answer is a set whose edge moves with the noise; and most outside
-# effects, whose many stand-ins take a minute a table.
+# Two kinds of table are tested only in the benchmark: poor runs, because the set of explanations depends on the noise,
+# and most effects outside the catalogue, because their many imitations take a minute per table.
 QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1),
              pytest.param("pair_3", 1, marks=pytest.mark.long)]  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""The number of independent values in a correlated residual, against the closed form of a first-order process."""
+"""The number of independent values in a correlated residual, against the closed formula for a first-order process."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,8 @@ def test_a_first_order_process_holds_its_closed_form(memory: float) -> None:
     noises = lfilter([1.0], [1.0, -memory], rng.normal(size=(draws, rows)), axis=1)
     runs = (slice(0, rows // 2), slice(rows // 2, rows))
     found = np.mean([independent_values(noise, runs) for noise in noises])
-    # Sum of memory^k from -infinity to infinity; the sum's end at the first zero leaves some percent.
+    # The sum of memory^|k| over all k is (1 + memory) / (1 - memory); summation up to the first zero changes it by some
+    # percent.
     assert found == pytest.approx(rows * (1.0 - memory) / (1.0 + memory), rel=0.15)
 
 

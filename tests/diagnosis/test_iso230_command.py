@@ -1,4 +1,4 @@
-"""`diagnose` takes a table of targets, cycles and directions and tells the figures of ISO 230-2."""
+"""`diagnose` reads a table of targets, cycles and directions and reports the quantities of ISO 230-2."""
 
 import json
 from pathlib import Path

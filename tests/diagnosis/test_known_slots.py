@@ -1,4 +1,4 @@
-"""A width that is known tells what the camera does from what the gripper does."""
+"""A slot of known width distinguishes errors of the camera from errors of the gripper."""
 
 import json
 from dataclasses import replace
@@ -21,7 +21,7 @@ OFFSET_MM = 0.06
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> tuple[MeasuredTable, CorrectedModel]:
-    """A gap that is larger by 0.06 mm throughout: the threshold's bias, or the gripper's rest."""
+    """Tables with a gap that is 0.06 mm too large throughout: an edge bias, or an error of the gap at rest."""
     folder = tmp_path_factory.mktemp("bench")
     rng = np.random.default_rng(4)
     up = np.linspace(-0.3, 1.2, 80)
@@ -44,7 +44,7 @@ def slot(measured_mm: float) -> ReferenceSlot:
 
 @pytest.fixture(scope="module")
 def bare(bench: tuple[MeasuredTable, CorrectedModel]) -> DiagnosisReport:
-    """Without a slot."""
+    """Diagnosis without a reference slot."""
     return report_with(bench)
 
 

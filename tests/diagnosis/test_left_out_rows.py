@@ -1,4 +1,4 @@
-"""Rows that the verdict leaves out are named, shown, and counted nowhere without a word."""
+"""Rows that are excluded from the verdict are listed and drawn, and every count that includes them states it."""
 
 import json
 from dataclasses import replace
@@ -23,7 +23,7 @@ OFFSET_MM, SPAN_MM = 0.02, 1.0
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A rest gap that is 0.02 mm larger than simulated, and three gross errors of 2 mm; both edges are measured."""
+    """Tables with a gap at rest 0.02 mm larger than simulated and three gross errors of 2 mm; they have both edges."""
     out = tmp_path_factory.mktemp("left_out")
     rng = np.random.default_rng(11)
     time_s = 0.05 * np.arange(500)
@@ -87,7 +87,7 @@ def test_a_difference_is_laid_to_the_clocks_only_within_their_uncertainty(
     found: Diagnosis, late_s: float, u_s: float, said: bool
 ) -> None:
     data = replace(found.data, table=replace(found.data.table, u_clock_s=u_s))
-    # The gap follows the input one to one, at most at 0.5 mm/s.
+    # The gap follows the input one to one, and the largest speed is 0.5 mm/s.
     size = late_s * 0.5
     ways: NDArray[np.float64] = np.array([1.0, -1.0])
     places = tuple(
@@ -95,6 +95,6 @@ def test_a_difference_is_laid_to_the_clocks_only_within_their_uncertainty(
         for way, sign in zip(("opening", "closing"), ways, strict=True)
     )
     assert all(("clocks 4" in place.words) is said for place in within_clock(places, data))
-    # A play of the other sign in one direction alone, or the same sign in both, is no clock.
+    # Differences with the same sign in both directions are not caused by clocks.
     same = (places[0], replace(places[1], size=size))
     assert within_clock(same, data) == same

@@ -1,4 +1,4 @@
-"""A map of position errors is the same in every run, or it is none."""
+"""A map of position errors is accepted only if it is the same in every run."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ ROWS = 60
 
 
 def loops(reaches_mm: tuple[float, ...], seed: int) -> tuple[np.ndarray, tuple[slice, ...], np.ndarray]:
-    """Runs there and back, two loops each; with the noise of a reading."""
+    """Runs with two loops each, to the end of the range and back; also the noise of the readings."""
     shape = 0.5 - 0.5 * np.cos(np.linspace(0.0, 4.0 * np.pi, ROWS))
     input_mm = np.concatenate([reach * shape for reach in reaches_mm])
     runs = tuple(slice(ROWS * k, ROWS * (k + 1)) for k in range(len(reaches_mm)))
@@ -25,7 +25,7 @@ def loops(reaches_mm: tuple[float, ...], seed: int) -> tuple[np.ndarray, tuple[s
 def mapped(
     input_mm: np.ndarray, runs: tuple[slice, ...], error_mm: np.ndarray, noise_mm: np.ndarray
 ) -> tuple[bool, float]:
-    """Whether a map foretells what it has not seen, and what it gains."""
+    """Whether a map predicts passes that were not used for its fit, and its gain."""
     time_s = 0.5 * np.arange(input_mm.size)
     names = tuple(str(k) for k in range(len(runs)))
     table = MeasuredTable(input_mm, 5.0 + 2.0 * input_mm + error_mm + noise_mm, None, time_s, runs, names)

@@ -1,4 +1,4 @@
-"""The next run: what it is promised to gain comes, and what no motion tells apart is said."""
+"""The proposed next run: the predicted gain is reached, and effects that no motion can distinguish are reported."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ BACK = np.concatenate([np.linspace(1.4, -0.4, 20), np.linspace(-0.4, 1.4, 20)])
 
 
 def measured(u: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Left and right of fingers of which one opens more than the other."""
+    """Positions of the left and right finger; one finger opens more than the other finger."""
     opening = 7.0 * u
     left, right = (side * (2.0 + 0.5 * opening) + SHARE * opening for side in (-1.0, 1.0))
     return left + EDGE_MM * rng.standard_normal(u.size), right + EDGE_MM * rng.standard_normal(u.size)
@@ -108,7 +108,8 @@ def test_exact_look_alikes_get_advice_and_no_run(tmp_path: Path) -> None:
     assert sentence.startswith("input_scale or lever_ratio_error: measure the stage's travel with a gauge")
 
 
-# The exact confoundings of a straight line, and those of the camera's stage with the mechanism's.
+# Pairs of effects that are identical for a straight model line, and pairs of an effect of the camera and one of the
+# mechanism.
 LOOK_ALIKES = [
     ("rest_gap_error", "edge_bias"), ("lever_ratio_error", "scale_error"), ("rest_gap_error", "scale_error"),
     ("assembly_asymmetry", "camera_tilt"), ("assembly_asymmetry", "camera_drift"), ("end_stop", "finger_contact"),
@@ -129,9 +130,10 @@ def test_drawn_noise_is_spread_as_a_variance_of_so_few_samples_is() -> None:
     aside = [np.zeros(40, dtype=bool)] * 2
     noises = drawn_noises(white, (slice(0, 40),), aside, 2000, rng)
     level = np.array([noise[0].total_mm for noise in noises if noise[0].correlation < 0.01])
-    # White noise is what half of the prior says, and nothing in the data speaks against it.
+    # The prior probability of white noise is one half, and the data do not contradict it.
     assert level.size > 1000
-    # The relative standard deviation of an estimated one is 1 / sqrt(2 (n - 2)); 2000 draws know it to a few per cent.
+    # The relative standard deviation of an estimated standard deviation is 1 / sqrt(2 (n - 2)); 2000 draws determine it
+    # to a few per cent.
     assert np.std(level) / np.mean(level) == pytest.approx(1.0 / np.sqrt(2.0 * 38.0), rel=0.15)
 
 

@@ -1,4 +1,4 @@
-"""Noise whose truth is known: its power where it is slow decides what counts as evidence."""
+"""Estimates of simulated noise: its power at low frequencies determines the thresholds for evidence."""
 
 import numpy as np
 import pytest
@@ -13,9 +13,11 @@ from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
 SEED = 3
 DRAWS = 30
 BIAS = 0.12
-"""Mean of the logarithm over 30 draws; one draw scatters by 0.1 to 0.3 (README), 30 of them by a fifth of that."""
+"""Tolerance of the mean logarithm over 30 draws: one draw scatters by 0.1 to 0.3 (README), the mean by a fifth of
+that."""
 DOUBTED = 0.45
-"""A standard deviation of 30 draws is known to 13 %; the doubt is of one frequency, the deviation of zero."""
+"""Tolerance of a standard deviation from 30 draws, which is known to 13 %. The stated uncertainty is for one frequency,
+the scatter for zero frequency."""
 LOUDER = 2.0
 
 
@@ -77,7 +79,7 @@ def test_short_records_show_their_correlation_on_average(rho: float) -> None:
         found.append(
             noise_of_short_runs(pair, (slice(0, 30),), [none, none], [0.0, 0.0], explained=True)[0].correlation
         )
-    # The flat prior on 0 to 0.95 draws 60 samples' estimate towards its middle.
+    # The uniform prior from 0 to 0.95 shifts an estimate from 60 samples towards its middle.
     assert float(np.mean(found)) == pytest.approx(rho, abs=0.17)
 
 
@@ -100,7 +102,7 @@ def test_what_is_off_at_one_input_in_every_run_is_no_outlier() -> None:
     wild = rng.choice(np.flatnonzero(input_mm > 0.2), 4, replace=False)
     residual[wild] += 30.0
     assert np.array_equal(np.flatnonzero(gate(residual, input_mm, runs, True, 7.0)), np.sort(wild))
-    # The fingers meet in the first and last two samples of each run.
+    # The fingers touch in the first two and the last two samples of each run.
     touching = np.flatnonzero(input_mm < 0.04)
     residual[touching] += 40.0
     assert not np.any(gate(residual, input_mm, runs, True, 7.0)[touching])
@@ -119,7 +121,7 @@ def test_the_two_last_samples_at_the_end_of_the_range_are_no_outliers() -> None:
 
 
 def there_and_back(passes: int) -> NDArray[np.float64]:
-    """Input of a stage that waits, goes there and back, and waits."""
+    """Input of a stage that rests, moves to the end of the range and back, and rests."""
     way = np.linspace(0.0, 1.0, 60)
     return np.concatenate([np.zeros(20), *(way[:: 1 - 2 * (k % 2)] for k in range(passes)), np.full(20, passes % 2)])
 
@@ -127,7 +129,7 @@ def there_and_back(passes: int) -> NDArray[np.float64]:
 def test_what_every_pass_repeats_is_no_noise() -> None:
     rng = np.random.default_rng(SEED)
     at = there_and_back(2)
-    # A rough map of position errors: over time it looks like white noise, but in the holds.
+    # A rough map of position errors resembles white noise over time, except during rests.
     rough = np.interp(at, np.linspace(0.0, 1.0, 40), rng.standard_normal(40))
     most = most_noise(rough + 0.05 * rng.standard_normal(at.size), at, (slice(0, at.size),), 0.0)
     assert most < 0.3 * float(np.std(rough))

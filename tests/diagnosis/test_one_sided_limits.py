@@ -1,4 +1,4 @@
-"""A warming that is far from over at the end of a table is stated by limits, not by numbers."""
+"""If a warming is far from complete at the end of a table, its parameters are stated as limits, not as values."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ TAU = Parameter("tau_s", "s", 2.0, 3000.0, "thermal time constant", neutral=None
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_parameter_is_limited_on_the_side_away_from_which_the_open_one_leads_it(sign: float) -> None:
-    # Only the rate is known: 0.1 um per second, whatever the time constant between 1000 and 3000 s.
+    # Only the rate is known: 0.1 um per second for any time constant between 1000 and 3000 s.
     tau_s = np.linspace(1000.0, 3000.0, 401)
     amplitude = sign * 1e-4 * tau_s
     of_tau, of_amplitude = limited(3000.0, TAU, tau_s, tau_s), limited(0.3 * sign, AMPLITUDE, amplitude, tau_s)

@@ -1,4 +1,4 @@
-"""A screw's harmonics belong to the screw as long as they are small."""
+"""Small harmonics of a screw error are reported as a part of the screw error."""
 
 import re
 from pathlib import Path
@@ -14,11 +14,14 @@ from fingervision.storage.model_toml import read_model
 SEED = 3
 EDGE_MM, AMPLITUDE_MM, PERIOD_MM = 0.003, 0.012, 0.2
 SHARE_PERCENT, PROBED = 2.0, 0.1
-"""The share is linear in what is left, the amplitude was fitted without it; probes have ten periods in an octave."""
+"""Tolerances: the share is linear in the residual, and the amplitude is fitted without it; probes have ten periods per
+octave."""
 
 
 def screwed(folder: Path, harmonic: float) -> DiagnosisReport:
-    """Two runs there and back on a screw whose second harmonic is a share of its first."""
+    """Diagnose two runs to the end of the range and back, with a screw error whose second harmonic is a share of the
+    first.
+    """
     rng = np.random.default_rng(SEED)
     lines = []
     for run, speed in enumerate((0.05, 0.1)):
@@ -53,7 +56,7 @@ def test_a_large_harmonic_is_told(tmp_path: Path) -> None:
     assert report.verdict is Verdict.UNKNOWN
     told = re.search(r"a wave over the input with a period of ([\d.]+) mm", report.unknown or "")
     assert told is not None
-    # One of the two waves is named, and the other is told beside it.
+    # One of the two waves is named as an effect; the report also describes the other wave.
     named = [e.parameters["period_mm"].value for e in report.effects if "period_mm" in e.parameters]
     waves = sorted([float(told[1]), *named])
     assert waves == pytest.approx([0.5 * PERIOD_MM, PERIOD_MM], rel=PROBED)

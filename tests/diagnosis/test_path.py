@@ -1,4 +1,4 @@
-"""The input's path: what was not measured moves the play all the same, and readings at rest show no lag."""
+"""The path of the input: motions without measured gaps also move the play, and readings at rest show no lag."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ GAP_AT_ZERO_MM = 25.0
 
 
 def staged(folder: Path, *, play_mm: float, listed: bool, sign: float = 1.0, step_s: float = 28.0) -> Diagnosis:
-    """Five ISO 230-2 cycles of a stage whose play stands at an end; overshoots listed without a gap, or not at all."""
+    """Five ISO 230-2 cycles of a stage with engaged play; overshoots are rows without a gap, or are missing."""
     rng = np.random.default_rng(4)
     lines, clock = ["time_s,input_mm,gap_mm"], 0.0
     for _ in range(5):
@@ -101,7 +101,7 @@ def test_step_commands_are_no_encoder_and_their_dead_time_is_named(tmp_path: Pat
 
 
 def test_an_encoder_in_a_slow_motion_is_no_command() -> None:
-    """The record stands and jumps under both; under an encoder the gap moves on while it stands."""
+    """Records of an encoder and of a command are constant between jumps; the gap of an encoder changes in between."""
     true = np.linspace(0.0, 1.0, 1000)
     record = 0.05 * np.round(true / 0.05)
     runs = (slice(0, 1000),)

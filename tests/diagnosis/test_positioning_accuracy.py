@@ -1,4 +1,4 @@
-"""ISO 230-2 figures: published values of real stages, closed forms, an oracle of its own, symmetries, bad input."""
+"""Quantities of ISO 230-2: published values of real stages, closed formulas, a second program, symmetries, faults."""
 
 import csv
 import json
@@ -18,20 +18,20 @@ from fingervision.diagnosis.report.positioning_words import positioning_document
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
 DIGIT = 0.5e-5
-"""Half the last digit that the reports print, mm."""
-# Readings are in the tables to 10 nm. Errors of that rounding, drawn, scatter A by 4.4 nm: it lies at 0.1352625, and
-# one draw in four comes out at the report's 0.13527. All other figures are far enough from the next digit.
+"""Half of the last digit (mm) that the reports print."""
+# Readings in the tables are rounded to 10 nm. Random errors of this rounding make A scatter by 4.4 nm: A is 0.1352625,
+# and one draw in four gives the 0.13527 of the report. No other quantity is that close to a rounding limit.
 ROUNDED = {("ess_x_map_path", "A"): 3 * 4.4e-6}
 PUBLISHED = {
-    # Symbols of the reports on the left. Their B_avg has the other sign, and their E is that of one side: what they
-    # call forward is the approach from above. Their R is the larger one of the two sides', without the reversal.
+    # The keys are the symbols of the reports. Their B_avg has the opposite sign. Their E is that of the approach from
+    # above, which they call forward. Their R is the larger of the two unidirectional values, without the reversal.
     "ess_x_map_path": {"B_avg": 0.02537, "B": 0.03358, "R": 0.02831, "E": 0.09065, "M": 0.09365, "A": 0.13527},
     "muts_y50_map_path": {"B_avg": 0.01055, "B": 0.01859, "R": 0.09433, "E": 0.01514, "M": 0.00968, "A": 0.09668},
 }
 
 
 def cycles(targets: np.ndarray, count: int = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Target, direction and cycle of `count` cycles, ascending and back."""
+    """Target, direction and cycle number of `count` cycles up and down."""
     one = np.concatenate([targets, targets[::-1]])
     sides = np.repeat([1, -1], targets.size)
     return np.tile(one, count), np.tile(sides, count), np.repeat(np.arange(count), one.size)
@@ -118,18 +118,19 @@ def test_symmetries(seed: int, places: int, count: int) -> None:
     deviation = rng.normal(0.0, 0.01, target.size)
     plain = values(target, deviation, direction, cycle)
     swapped = {s.replace("up", "x").replace("down", "up").replace("x", "down"): v for s, v in plain.items()}
-    # The axis seen from its other end: lost motion stays lost motion, from below and from above are exchanged.
+    # If the axis is reversed, the lost motion is unchanged, and approaches from below and from above are exchanged.
     assert values(-target, -deviation, -direction, cycle) == pytest.approx(swapped, abs=1e-12)
-    # Directions exchanged in the table alone: the reversal has the wrong sign.
+    # If only the directions in the table are exchanged, the reversal has the wrong sign.
     exchanged = swapped | {"B_mean": -plain["B_mean"]}
     assert values(target, deviation, -direction, cycle) == pytest.approx(exchanged, abs=1e-12)
-    # Ranges and differences know no constant, all scale with the unit, and the order of rows means nothing.
+    # A constant does not change ranges and differences, all quantities scale with the unit, and the order of rows has
+    # no influence.
     assert values(target, deviation + 0.3, direction, cycle) == pytest.approx(plain, abs=1e-12)
     scaled = {symbol: 1e3 * value for symbol, value in plain.items()}
     assert values(1e3 * target, 1e3 * deviation, direction, cycle) == pytest.approx(scaled, abs=1e-9)
     order = rng.permutation(target.size)
     assert values(*(c[order] for c in (target, deviation, direction, cycle))) == pytest.approx(plain, abs=1e-12)
-    # An error of scale is no reversal and no scatter, and is systematic deviation.
+    # An error of scale changes neither reversal nor scatter; it increases the systematic deviation.
     tilted = values(target, deviation + 0.5 * target, direction, cycle)
     for symbol in ("B_mean", "B", "R_up", "R_down", "R"):
         assert tilted[symbol] == pytest.approx(plain[symbol], abs=1e-12)
@@ -137,7 +138,8 @@ def test_symmetries(seed: int, places: int, count: int) -> None:
 
 
 def test_the_interval_of_the_mean_reversal_covers_beside_a_wandering_zero() -> None:
-    # Zero wanders from cycle to cycle by ten times the readings' scatter: differences within a cycle do not know it.
+    # The zero varies between cycles by ten times the scatter of readings, which does not affect differences within a
+    # cycle.
     rng = np.random.default_rng(3)
     target, direction, cycle = cycles(np.linspace(0.0, 4.0, 5))
     hits, widths = 0, []
@@ -148,7 +150,7 @@ def test_the_interval_of_the_mean_reversal_covers_beside_a_wandering_zero() -> N
         figure = positioning_accuracy(target, deviation, direction, cycle).figures["B_mean"]
         hits += abs(figure.value_mm + 0.005) < figure.interval_mm
         widths.append(figure.interval_mm)
-    # Four standard deviations of a binomial share of 0.95.
+    # The tolerance is four standard deviations of a binomial proportion of 0.95.
     assert hits / draws == pytest.approx(0.95, abs=4 * math.sqrt(0.95 * 0.05 / draws))
     assert np.median(widths) < 0.001
 
@@ -219,7 +221,7 @@ def test_no_readings_and_unknown_directions_give_reasons() -> None:
 
 
 def _made_up() -> tuple[RepeatedTargets, np.ndarray, dict[str, np.ndarray]]:
-    """Play of 25 um, a map of 90 um and a drift of 40 um, and their parts."""
+    """Simulated readings with a play of 25 um, a map of 90 um and a drift of 40 um, and the contribution of each."""
     target, direction, cycle = cycles(np.linspace(0.0, 4.0, 5))
     parts = {
         "backlash": -0.5 * 0.025 * direction,
@@ -233,8 +235,8 @@ def test_shares_name_the_cause() -> None:
     visits, measured, parts = _made_up()
     report = positioning_report(visits, measured, 0.0 * measured, parts)
     shares = {name: report.share_mm(name, "B_mean") for name in parts}
-    # The reversal is linear in the deviations: its shares are exact and add up. The drift falls half a cycle later on
-    # the way back, 0.04 * 5 / 49 mm.
+    # The reversal is linear in the deviations, so that its shares are exact and add up. On average, the drift acts half
+    # a cycle longer on readings from above: 0.04 * 5 / 49 mm.
     assert shares["backlash"] == pytest.approx(-0.025)
     assert shares["thermal_drift"] == pytest.approx(-0.04 * 5 / 49)
     assert sum(shares.values()) == pytest.approx(report.measured.value_mm("B_mean"))

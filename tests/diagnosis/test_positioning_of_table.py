@@ -1,4 +1,4 @@
-"""From a table as it is read, with its model, to the figures of a published report and the causes of each."""
+"""From a table and its model to the quantities of a published report and the causes of each quantity."""
 
 import csv
 import json
@@ -52,7 +52,8 @@ def report(
 @pytest.mark.skipif(not RIGS.exists(), reason="the measured tables of real rigs are not here (../shared/real/rigs)")
 @pytest.mark.parametrize("name", ["ess_x_line", "ess_x_map_path"])
 def test_a_published_report_whatever_the_model(name: str) -> None:
-    # The ideal line without overshoots, or the axis's own map with them: the figures of the axis are the same.
+    # The quantities of the axis are the same for an ideal line without overshoots and for the map of the axis with
+    # overshoots.
     measured, model = columns(RIGS / name / "measured.csv"), columns(RIGS / name / "simulation.csv")
     read = np.isfinite(measured["gap_mm"])
     inputs = measured["input_mm"]
@@ -75,7 +76,7 @@ def test_a_published_report_whatever_the_model(name: str) -> None:
     assert found.share_mm("backlash", "B_mean") == pytest.approx(-0.0254)
     assert found.after.value_mm("B_mean") == pytest.approx(0.00003, abs=1e-5)
     if name == "ess_x_map_path":
-        # Its own map is what makes M, and all of it.
+        # The map of the axis is the whole cause of M.
         assert found.share_mm(MODEL, "M") == pytest.approx(0.09365, abs=2e-6)
         assert found.share_mm(MODEL, "B_mean") == pytest.approx(0.0, abs=1e-6)
     else:
@@ -99,7 +100,7 @@ def test_a_gripper_is_compared_with_its_model() -> None:
 @pytest.mark.parametrize("slope", [1.0, -1.0])
 @pytest.mark.parametrize("play_mm", [0.02, -0.02])
 def test_a_reversal_of_the_wrong_sign_is_asked_about(slope: float, play_mm: float) -> None:
-    # Play: the gap of a stage approached from below lags behind, whichever way the gap counts.
+    # With play, a stage that approaches from below lags; the gap may increase or decrease with the position.
     rng = np.random.default_rng(4)
     gap = 10.0 + slope * (PATH[MEASURED] - 0.5 * play_mm * SIDE) + rng.normal(0.0, 1e-3, SIDE.size)
     found = report(gap, lambda inputs: 10.0 + slope * inputs)
@@ -131,7 +132,7 @@ def test_a_sweep_has_no_figures_and_says_why() -> None:
 
 
 def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:
-    # Seven targets, five cycles, 20 um of play and 1 um of scatter, told as targets, cycles and directions.
+    # A table of seven targets and five cycles with directions, with 20 um of play and 1 um of scatter.
     rng = np.random.default_rng(8)
     lines = ["target_mm,cycle,direction,deviation_um"]
     for cycle in range(1, 6):
@@ -147,7 +148,7 @@ def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:
     found = positioning_of_data(done.data, answer)
     assert found.cycles == (5, 5)
     assert found.measured.value_mm("B_mean") == pytest.approx(-0.02, abs=0.001)
-    # Ranges over fourteen means of five readings, and scatter: 1 um each; five standard deviations.
+    # E is a range over fourteen means of five readings with 1 um of scatter; the tolerance is five times this scatter.
     assert found.measured.value_mm("E") == pytest.approx(0.02, abs=0.005)
     assert found.share_mm("backlash", "B_mean") == pytest.approx(-0.02, abs=0.002)
     assert "backlash" in found.without

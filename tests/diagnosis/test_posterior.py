@@ -1,4 +1,4 @@
-"""Uncertainties whose truth is known: a mean's, and that of a parameter whose best value lies at its bound."""
+"""Uncertainties with known true values: of a mean, and of a parameter whose best value lies at its bound."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,12 +19,12 @@ EDGE_MM = 0.01
 SAMPLES = 240
 SEED = 4
 WALK = 0.2
-"""A walk of a thousand steps knows a standard deviation to a tenth; twice that."""
+"""Relative tolerance: a random walk of a thousand steps determines a standard deviation to 10 %; twice that value."""
 
 
 @pytest.fixture
 def problem(tmp_path: Path) -> Problem:
-    """One run there and back, nothing hidden, the noise estimated beside nothing."""
+    """One run to the end of the range and back without an effect; the noise is estimated with no effect."""
     rng = np.random.default_rng(SEED)
     u = 0.5 * np.sin(np.linspace(0.0, 12.0, SAMPLES))
     left, right = (side * (2.0 + 3.5 * u) + EDGE_MM * rng.standard_normal(SAMPLES) for side in (-1.0, 1.0))
@@ -51,7 +51,7 @@ def test_an_offset_is_as_uncertain_as_a_mean(problem: Problem) -> None:
 def test_a_play_of_nothing_is_not_known_exactly(problem: Problem) -> None:
     answer, u = settle(problem, "backlash", "play_mm", 1e-4)
     play_mm = answer.values["backlash"]["play_mm"]
-    # Half a play moves the gap by 7 mm a mm, and the mean over some 200 moving samples shows a thousandth of a mm.
+    # Half of the play changes the gap by 7 mm per mm, and the mean over some 200 samples in motion shows 0.001 mm.
     assert 0.0 <= play_mm < 1e-3
     assert 5e-5 < u < 1e-3
 
@@ -73,5 +73,6 @@ def test_the_record_of_an_encoder_widens_a_play_and_an_exact_one_does_not(tmp_pa
         best = replace(best, covariance=np.array([[1e-8]]))
         found[step_mm] = with_record_errors(data, problem, best, np.random.default_rng(SEED)).covariance[0, 0]
     assert found[0.0] == 1e-8
-    # The mean of a stroke's roundings is a play: of some ten lines a stroke a third of a rounding at most.
+    # The mean rounding error of a stroke resembles a play: with some ten encoder steps per stroke, it is at most a
+    # third of the largest rounding error.
     assert 1e-8 + (0.03 / 300.0) ** 2 < found[0.03] < (0.03 / 6.0) ** 2

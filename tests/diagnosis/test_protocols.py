@@ -1,4 +1,4 @@
-"""Runs that are proposed: the motion that a recipe's steps stand for, as a bed drives it."""
+"""Proposed runs: the motion that results from the steps of a recipe on a test bed."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Cycles are recognised in the path that the stage went, and motions are not taken for them."""
+"""Cycles of target visits are recognised in the path of the stage, and continuous motions are not taken for cycles."""
 
 import csv
 import re
@@ -19,7 +19,7 @@ PLACES = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
 def path(
     count: int = 5, *, overshoot_mm: float | None = 0.1, rows: int = 1, places: np.ndarray = PLACES
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Input, measured flags, and the truth's directions, of `count` cycles with or without rows beyond the ends."""
+    """Input, flags of measured rows, and true directions of `count` cycles, with or without rows beyond the ends."""
     inputs: list[float] = []
     sides: list[int] = []
     for _ in range(count):
@@ -63,7 +63,8 @@ def test_recorded_inputs_that_scatter_about_the_targets_are_gathered() -> None:
 
 @given(st.integers(0, 10**6), st.integers(3, 30), st.integers(2, 6), st.booleans(), st.integers(1, 5))
 def test_any_cycle_is_recognised(seed: int, places: int, count: int, overshoots: bool, rows: int) -> None:
-    # Uneven spacing, inputs that scatter by up to a hundredth of it, 3 % of the readings missing, a run a cycle or one.
+    # Uneven spacing, inputs that scatter by up to 1 % of the spacing, 3 % of the readings missing, one run per cycle or
+    # one run in all.
     rng = np.random.default_rng(seed)
     spacing = 10.0 ** rng.uniform(-2.0, 1.0)
     targets = (np.arange(places) + rng.uniform(-0.3, 0.3, places)) * spacing
@@ -80,7 +81,8 @@ def test_any_cycle_is_recognised(seed: int, places: int, count: int, overshoots:
 
 
 def test_a_turn_that_lacks_a_row_has_no_side() -> None:
-    # No rows beyond the ends, and one of the two readings at a turn is not in the table: which one, nobody knows.
+    # There are no rows beyond the ends, and one of the two readings at a reversal is missing: the table does not show
+    # which one.
     inputs, _, truth = path(overshoot_mm=None)
     at = 14
     inputs, truth = np.delete(inputs, at), np.delete(truth, at)
@@ -115,7 +117,8 @@ def test_runs_of_one_direction_come_from_beyond_the_end() -> None:
 
 
 def test_a_staircase_that_turns_at_its_ends_has_one_direction_there() -> None:
-    # One rest at each end: its first visit has no side, all others at an end came from within.
+    # There is one rest at each end: the first visit has no direction, and all later visits of an end came from within
+    # the range.
     inputs = np.concatenate([[0.0], np.tile([1.0, 2.0, 3.0, 2.0, 1.0, 0.0], 4)])
     out = found(inputs, np.ones(inputs.size, dtype=bool), (slice(0, inputs.size),))
     assert out.direction[0] == 0
@@ -164,7 +167,7 @@ def test_times_tell_a_motion_from_rests() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_triangle_recorded_by_an_encoder_is_no_cycle(seed: int) -> None:
-    # 20 Hz, 30 um steps, 3 um of jitter: the steps repeat, and the stage never rests.
+    # Samples at 20 Hz with encoder steps of 30 um and a jitter of 3 um: values repeat, although the stage never rests.
     rng = np.random.default_rng(seed)
     times = np.arange(0.0, 40.0, 0.05)
     travelled = np.abs((0.25 * times + 1.0) % 2.0 - 1.0)

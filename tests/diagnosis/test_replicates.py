@@ -1,4 +1,4 @@
-"""Pure error is the scatter of visits to the same place from the same side, and of nothing else."""
+"""Pure error is the scatter of visits to the same position from the same direction."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,15 @@ from fingervision.diagnosis.noise.residual_scatter import most_noise
 SCATTER_MM = 0.003
 TARGETS = np.arange(-20.0, 21.0, 5.0)
 CYCLES = 40
-"""So many that a standard deviation is known to 2 %."""
+"""Number of cycles, large enough to determine a standard deviation to 2 %."""
 KNOWN = 0.06
-"""Three standard uncertainties of that standard deviation."""
+"""Relative tolerance: three standard uncertainties of the standard deviation over all cycles."""
 
 
 def cycles(overshoot_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Path of ISO 230-2 cycles and which of its rows are read; without overshoots the ends are read once."""
+    """Path of ISO 230-2 cycles and the numbers of its measured rows; without overshoots, each end is measured once per
+    visit.
+    """
     path, read = [], []
     for _ in range(CYCLES):
         for targets in (TARGETS, TARGETS[::-1]):
@@ -107,7 +109,8 @@ def test_the_digits_of_a_reading_are_found_and_noise_has_none() -> None:
 
 
 def test_readings_at_evenly_spaced_targets_have_the_digits_of_their_file() -> None:
-    # One visit of thirty places 1.545 mm apart: nearly multiples of 1.545, but not to the digits of the file.
+    # One visit each of thirty positions 1.545 mm apart: nearly multiples of 1.545 mm, but not to all digits of the
+    # file.
     places = np.linspace(2.24, 47.04, 30)
     gaps = np.round(places + 1e-3 * np.random.default_rng(2).normal(size=places.size), 6)
     assert resolution(gaps) <= 1e-6
@@ -115,13 +118,14 @@ def test_readings_at_evenly_spaced_targets_have_the_digits_of_their_file() -> No
 
 
 def test_a_scatter_that_cannot_be_told_is_no_scatter_of_the_last_digit() -> None:
-    # A hold has no second pass over a place, and its readings have seven decimals.
+    # A rest contains no second visit of a position, and its readings have seven decimals.
     noise = np.round(1e-3 * np.random.default_rng(3).normal(size=300), 7)
     assert most_noise(noise, np.zeros(300), (slice(0, 300),), 3e-8) > 1e-3
 
 
 def test_a_drift_that_few_visits_hide_shows_in_readings_that_follow_one_another() -> None:
-    # Five cycles over ten places: within a place five readings say little, a hundred in a row say much.
+    # Five cycles over ten positions: five readings at one position show little of a drift, a hundred successive
+    # readings show much.
     label = np.tile(np.r_[np.arange(10), 19 - np.arange(10)], 5)
     row, told = np.arange(100), {"drift": 0, "wandering": 0}
     for seed in range(40):

@@ -1,4 +1,4 @@
-"""The page and the figures of a report: self-contained, vector, and with the numbers that report.json holds."""
+"""The page and figures of a report are self-contained vector graphics with the numbers of report.json."""
 
 import json
 import re
@@ -25,8 +25,8 @@ from fingervision.effects import catalogue
 CHROMIUM = shutil.which("chromium")
 PLAY_MM = 0.05
 PATIENCE_MS = 120_000
-"""For a browser on a machine that has much else to do."""
-# What a name may hold: it begins an element wherever it is not written as text.
+"""Time limit for a browser on a loaded computer."""
+# A file name with HTML markup, which would start an element wherever it is not escaped.
 MARKUP = "<img src=x onerror=alert(1)><script>alert(1)<"
 MEASURED, STRAIGHT = f"measured {MARKUP}.csv", f"straight {MARKUP}.csv"
 
@@ -37,7 +37,7 @@ def run(*words: object) -> Result:
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A straight model, one that is off by a tenth in slope, and a measurement with play in it."""
+    """Tables of a straight model, a model with a slope 10 % wrong, and a measurement with play."""
     folder = tmp_path_factory.mktemp("rig <b>")
     rng = np.random.default_rng(11)
     turns = np.concatenate([np.linspace(0, 1, 80), np.linspace(1, 0, 80)])
@@ -140,7 +140,7 @@ def test_dashes_stay_dashes_where_the_input_goes_forth_and_back() -> None:
     curves = GapCurves(input_mm, predictions["loop"], zero, opens, None, (slice(0, 180),), predictions)
     lines = {line.get_label(): line for line in gap_against_input(curves, "").axes[0].get_lines()}
     assert np.all(np.diff(lines["static"].get_xdata()) >= 0.0)
-    # A loop has two branches: both are drawn.
+    # Both branches of a loop are drawn.
     np.testing.assert_array_equal(lines["loop"].get_xdata(), input_mm)
 
 
@@ -157,7 +157,7 @@ def test_several_models_stand_in_one_table(rig: Path, answer: Path) -> None:
     page = (out / "compare.html").read_text(encoding="utf-8")
     assert all(escape(name) in page for name in rms)
     check_markup_is_text(page)
-    # A diagnosis may share the folder: no name is one of its own.
+    # A comparison and a diagnosis may be written to the same folder, so that their file names must differ.
     of_answer = {each.name for each in answer.iterdir() if each.is_file() and each.name.startswith(("gap_", "resid"))}
     assert of_answer
     assert not of_answer & {each.name for each in out.iterdir()}
@@ -184,22 +184,22 @@ def test_turning_points_are_found_and_their_frames_shown(tmp_path: Path) -> None
     table = tmp_path / "gaps" / "gaps.csv"
     turns = turning_rows(table)
     drive = np.genfromtxt(sample / "drive.csv", delimiter=",", names=True)["input_mm"]
-    # The drive opens, closes and comes back.
+    # The drive opens the gripper, closes it and returns.
     assert [turn.input_mm for turn in turns[1:3]] == pytest.approx([drive.max(), drive.min()], abs=0.02)
     strip = strip_html(table)
     assert strip.count("<img") == len(turns)
     assert f"gap {turns[1].gap_mm:.3f} mm" in strip
-    # Moved away from the recording, the table still knows where it was measured.
+    # A table that was moved away from the recording still contains the path of the recording.
     elsewhere = tmp_path / "results" / "of" / "today"
     shutil.copytree(table.parent, elsewhere)
     assert strip_html(elsewhere / "gaps.csv") == strip
     recording.write_bytes(recording.read_bytes()[:-1])
-    assert "<img" not in strip_html(table)  # another file of the same name is no witness
+    assert "<img" not in strip_html(table)  # a different file of the same name is not used
 
 
 @pytest.fixture(scope="module")
 def pages(rig: Path, answer: Path) -> list[Path]:
-    """A diagnosis, a comparison of several models, and the figures of ISO 230-2."""
+    """Pages of a diagnosis, of a comparison of several models, and of a report with ISO 230-2 quantities."""
     words = [word for name in ("steep.csv", STRAIGHT) for word in ("--model", rig / name)]
     assert run("compare", rig / MEASURED, *words, "--out", rig / "several").exit_code == 0
     rng = np.random.default_rng(8)
@@ -254,7 +254,7 @@ def test_a_browser_shows_it_without_a_word_or_a_request(
         for value, text, unit in shown:
             assert float(value) in known
             held = float(value) * (100.0 if unit.strip().startswith("%") else 1.0)
-            # What is read is what the report holds, rounded to the digits that are shown.
+            # The displayed number is that of the report, rounded to the displayed digits.
             digits = len(text.partition(".")[2]) if "e" not in text else 0
             assert float(text) == pytest.approx(held, rel=5.1e-4, abs=0.51 * 10.0**-digits)
         assert said == []

@@ -1,4 +1,4 @@
-"""The sentence of a result stays short however many effects it has; their sizes stand in lines of their own."""
+"""The sentence of a result stays short for any number of effects; sizes of effects are printed in separate lines."""
 
 from fingervision.diagnosis.report.sentences import answer, detail_lines
 from fingervision.domain.parameter import Estimate
@@ -8,7 +8,7 @@ NAMES = ("backlash", "hinge_stiffness_error", "thermal_drift")
 EFFECTS = tuple(NamedEffect(name, "drive", {"size_mm": Estimate(0.123, 0.004, "mm")}) for name in NAMES)
 DISAGREEMENT = Disagreement(0.4, 0.01, 0.005, None, None, {})
 SHORT = 250
-"""Characters: three lines of a terminal 80 wide."""
+"""Largest number of characters: three lines of a terminal with 80 columns."""
 
 
 def test_a_set_of_many_explanations_is_counted_and_listed() -> None:

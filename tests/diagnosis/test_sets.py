@@ -1,4 +1,4 @@
-"""Sets: what these data cannot tell apart, however the search came upon it."""
+"""Sets of effects that the data cannot distinguish, independent of the order of the search."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ SPEEDS_MM_S = (0.1, 0.2, 0.3)
 
 
 def way(time_s: Array, seconds: float) -> Array:
-    """There and back twice, with corners that take the stage half a second."""
+    """Two motions to the end of the range and back; each reversal takes half a second."""
     shifts = np.linspace(-0.25, 0.25, 21)
     shares = [np.clip((time_s + shift) / seconds, 0.0, 1.0) for shift in shifts]
     return np.asarray(np.mean([0.4 - np.abs((3.2 * share) % 1.6 - 0.8) for share in shares], axis=0))
@@ -37,9 +37,9 @@ def answered(
     offset_mm: float = 0.0,
     runs: int = 3,
 ) -> DiagnosisReport:
-    """Triangles at several speeds; hidden are a delay, an arc, a motion out of the plane, an offset of the gap.
+    """Diagnose triangles at several speeds with a delay, an arc, a motion out of the plane, and an offset of the gap.
 
-    `straight` has the stage go along straight lines between its samples.
+    If `straight`, the stage moves along straight lines between its samples.
     """
     rng = np.random.default_rng(SEED)
     lines = []
@@ -79,14 +79,16 @@ def test_a_model_with_the_delay_disagrees_nowhere(tmp_path: Path) -> None:
 
 
 def test_an_arc_beside_another_effect_is_found_from_where_the_pair_puts_it(tmp_path: Path) -> None:
-    # Alone it is fitted too far out for a search of both to find back; the lever's pair was then missing.
+    # If the arc is fitted alone, its parameters are too far from those of the pair for the search to return to them.
+    # The pair with the lever ratio was then missing.
     sets = answered(tmp_path, curve=0.05, away=0.004).alternatives
     assert ("large_deflection", "out_of_plane_motion") in sets
     assert ("lever_ratio_error", "large_deflection") in sets
 
 
 def test_what_gains_from_noise_alone_is_no_member(tmp_path: Path) -> None:
-    # Two runs tell an offset from their scatter by a chi-square of some twenty only: a wave of noise gains a third.
+    # With two runs, an offset gains a chi-square of only some 20 over the scatter of runs, and a wave in the noise
+    # gains a third of that.
     sets = answered(tmp_path, offset_mm=0.01, runs=2).alternatives
     assert {("rest_gap_error",), ("edge_bias",), ("input_offset",)} >= set(sets)
     assert len(sets) >= 2

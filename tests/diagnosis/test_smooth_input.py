@@ -1,4 +1,4 @@
-"""The input's own error: what is left after smoothing is as large as it is said to be."""
+"""The error of the recorded input: after smoothing, it is as large as stated."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,8 @@ RATE_HZ = 8.0
 SIGMA_MM = 1e-3
 STEP_MM = 2e-3
 HONEST = (0.6, 1.3)
-"""Squared error over the leverage's claim: windows are chosen by what they show, and one claim is for all motions."""
+"""Limits of the squared error divided by the error stated from the leverage: windows are selected from the data
+themselves, and one formula is used for all motions."""
 
 
 def _time_s(seconds: float) -> Array:
@@ -57,18 +58,20 @@ def test_leverage_is_true_of_an_encoder(name: str) -> None:
         recorded = STEP_MM * np.round(moved / STEP_MM)
         sigma, step = input_sigma(recorded, (slice(0, t.size),))
         if name == "a hold":
-            sigma, step = STEP_MM / np.sqrt(12.0), STEP_MM  # one value says nothing of its steps
+            sigma, step = STEP_MM / np.sqrt(12.0), STEP_MM  # one constant value does not show the step
         assert step == pytest.approx(STEP_MM)
         found, leverage = smoothed(recorded, t, (slice(0, t.size),), sigma, step)
         errors.append(np.mean((found - moved) ** 2) / (STEP_MM**2 / 12.0))
         claims.append(np.mean(leverage) * sigma**2 / (STEP_MM**2 / 12.0))
-    # A long line averages roundings out better than independent errors: less is left than is claimed, never more.
+    # On a long line, rounding errors average out better than independent errors: the error is smaller than stated,
+    # never larger.
     assert 0.3 < np.mean(errors) / np.mean(claims) < HONEST[1]
 
 
 def test_samples_that_are_rounded_alike_are_not_averaged() -> None:
     t = _time_s(8.0)
-    # Five steps and a hundredth from sample to sample: over the whole record the rounding drifts by two thirds.
+    # The position advances by 5.01 steps per sample, so that the rounding error drifts by two thirds of a step over the
+    # whole record.
     true = STEP_MM * (5.01 * np.arange(t.size) - 0.3)
     recorded = STEP_MM * np.round(true / STEP_MM)
     _, leverage = smoothed(recorded, t, (slice(0, t.size),), STEP_MM / np.sqrt(12.0), STEP_MM)
@@ -120,7 +123,7 @@ def test_blending_keeps_lines_and_takes_out_the_zigzag_of_an_encoder() -> None:
     t = np.cumsum(rng.uniform(0.05, 0.2, 300))
     whole = (slice(0, 300),)
     assert blended(0.3 * t, 0.3 * t, t, whole, np.full(300, 0.05)) == pytest.approx(0.3 * t, abs=1e-12)
-    # Half a step a sample: the rounding alternates, and the selected windows with it.
+    # At half a step per sample, the rounding error alternates, and so do the selected windows.
     t = np.arange(300.0)
     true = 0.503 * STEP_MM * t
     recorded = np.round(true / STEP_MM) * STEP_MM

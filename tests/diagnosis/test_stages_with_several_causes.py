@@ -1,4 +1,4 @@
-"""Stages against a laser with several causes at once, drawn by arithmetic of this file alone."""
+"""Stages measured with a laser, with several causes of error at once; the data are computed in this file alone."""
 
 from pathlib import Path
 
@@ -17,7 +17,9 @@ CYCLES = 5
 
 
 def driven_mm(play_mm: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, which of them are read, and where a stage with play stands: 0.5 mm beyond each end, then back."""
+    """Commanded positions, flags of measured rows, and actual positions of a stage with play that overshoots each end
+    by 0.5 mm.
+    """
     up = [(TARGETS_MM[0] - 0.5, False), *((x, True) for x in TARGETS_MM)]
     down = [(TARGETS_MM[-1] + 0.5, False), *((x, True) for x in TARGETS_MM[::-1])]
     cycle = CYCLES * (up + down)
@@ -56,7 +58,7 @@ def test_play_beside_a_map_an_offset_and_a_ratio_is_no_creep(tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_a_drift_is_found_that_needs_an_offset_beside_it(tmp_path: Path) -> None:
-    # Against the mean of the readings, as reports tabulate it: the drift's own mean is an offset.
+    # The simulation is the mean of the readings, as in published reports; the mean of the drift is then an offset.
     position, read, stands = driven_mm(0.024)
     share = np.arange(stands.size) / stands.size
     noise = np.random.default_rng(3).normal(0.0, NOISE_MM, stands.size)

@@ -1,4 +1,4 @@
-"""A stage that is still on its way after each step of a command is no gross error."""
+"""Samples of a stage that is still moving after each step of a command are not gross errors."""
 
 from pathlib import Path
 
@@ -28,10 +28,10 @@ def diagnosed(folder: Path, gap_of: np.ndarray, input_mm: np.ndarray) -> Diagnos
 def test_two_late_samples_after_each_step_are_a_finding(
     tmp_path: Path, levels_mm: tuple[float, ...], names: tuple[str, ...]
 ) -> None:
-    # Of equal steps each is late by the same time, which a delay alone explains; of unequal ones the long take longer.
+    # Equal steps are all late by the same time, which a delay explains; of unequal steps, long ones take longer.
     command = np.repeat(levels_mm, HOLD)
     rng = np.random.default_rng(5)
-    # The stage leaves 70 ms late and goes at 18 mm/s: two samples of 44 show it.
+    # The stage starts 70 ms late and moves at 18 mm/s, which two of 44 samples show.
     fine_s = np.arange(command.size * 50) / (50 * RATE_HZ)
     asked = command[np.clip(((fine_s - 0.07) * RATE_HZ).astype(int), 0, None)]
     place = np.empty_like(fine_s)
@@ -75,7 +75,8 @@ def test_a_square_wave_shows_dead_time_and_highest_speed(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_the_size_of_jumps_is_found_between_the_sizes_that_signatures_try(tmp_path: Path) -> None:
-    # Each jump comes at the sample that it is due at: the score has a basin of 0.6 %, and signatures are 2.3 % apart.
+    # Each jump occurs at a definite sample: the minimum of the score is 0.6 % wide, while the sizes tried by signatures
+    # are 2.3 % apart.
     time = np.arange(500) / 10.0
     ramp = 1.5 - 1.5 * np.cos(2.0 * np.pi * time / 20.0)
     place, stands = np.empty_like(ramp), ramp[0]

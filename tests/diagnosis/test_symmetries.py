@@ -1,4 +1,4 @@
-"""What does not change the bench does not change the answer: order of rows and columns, names of runs, a mirror."""
+"""The diagnosis does not depend on the order of rows and columns, the names of runs, or a mirrored picture."""
 
 import json
 from pathlib import Path
@@ -17,13 +17,13 @@ from fingervision.storage.report_json import report_document
 EDGE_MM = 0.004
 SEED = 5
 MIRRORED = 1e-3
-"""The fit of a mirrored table takes other roundings on its way; it stops within a thousandth of the same place."""
+"""Relative tolerance: rounding differs in the fit of a mirrored table, which converges to 0.1 % of the same values."""
 COLUMNS = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm")
 Row = tuple[str, ...]
 
 
 def rows(mirror: bool) -> list[Row]:
-    """Two runs of a gripper that opens less than simulated, its play hidden in the reversals."""
+    """Two runs of a gripper with play that opens less than simulated."""
     rng = np.random.default_rng(SEED)
     out: list[Row] = []
     for run in range(2):
@@ -52,7 +52,7 @@ def asked(folder: Path, table: list[Row], columns: tuple[str, ...] = COLUMNS) ->
 
 
 def told(report: DiagnosisReport) -> str:
-    """The whole report but its seconds."""
+    """The report document without the processing time."""
     return json.dumps({k: v for k, v in report_document(report, None, None).items() if k != "seconds"}, sort_keys=True)
 
 

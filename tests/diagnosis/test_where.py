@@ -1,4 +1,4 @@
-"""Regions: noise alone names none, a disagreement is named once, in its channel and its place."""
+"""Regions of disagreement: noise alone gives none, and a disagreement is reported once, with its channel and range."""
 
 import numpy as np
 import pytest
@@ -10,11 +10,12 @@ from fingervision.domain.effect import Array, History
 
 NOISE_MM = 0.001
 NULLS, FALSE_ALARMS = 200, 6
-"""The threshold is the 99 % quantile of the maximum: two false alarms in 200 on average, more than six in 0.5 %."""
+"""The threshold is the 99 % quantile of the maximum: 200 tests give two false alarms on average, and more than six with
+a probability of 0.5 %."""
 
 
 def swept(runs: int = 2) -> History:
-    """Triangles of the input, a run each."""
+    """History with one triangle of the input in each run."""
     time_s = np.arange(400) / 25.0
     input_mm = np.tile(np.interp(time_s % 8.0, [0.0, 4.0, 8.0], [-0.4, 1.4, -0.4]), runs)
     clock_s = np.concatenate([time_s + 20.0 * k for k in range(runs)])
@@ -68,5 +69,5 @@ def test_a_step_at_the_reversal_is_no_noise() -> None:
     noise = NOISE_MM * rng.standard_normal(history.input_mm.size)
     step = 0.1 * np.sign(np.gradient(history.input_mm))
     left_over = np.std(rough(noise + step, history))
-    # A line from reversal to reversal takes up to 8 % of the noise's variance with it; the step is 100 times the noise.
+    # A line fitted between reversals removes up to 8 % of the variance of the noise; the step is 100 times the noise.
     assert 0.9 * NOISE_MM < left_over < 1.1 * NOISE_MM

@@ -1,4 +1,4 @@
-"""Which hinge, link or pivot: answers of changed places, tables with poses, the place named or the set."""
+"""Which hinge, link or pivot: responses to changes of each, tables with poses, and the place or set that is named."""
 
 import csv
 import json
@@ -31,7 +31,7 @@ def answers() -> PlaceAnswers:
 
 
 def truth(tables: dict, kind: type = MechanismPlate) -> dict[str, float]:
-    """Poses about the drawn reference points, gap and force by 1 mm of input, by a model of its own mesh."""
+    """Poses about the drawn reference points, gap and force at 1 mm of input, by a model with a different mesh."""
     drawn = {body.name: body.centroid_mm for body in MechanismFrame(mechanism_from_tables(TABLES, "drawn")).bodies}
     state = kind(mechanism_from_tables(tables, "truth"))
     bodies = {body.name: body.centroid_mm for body in state.bodies}
@@ -67,7 +67,7 @@ def test_another_thickness_answers_as_a_drawing_of_it(answers: PlaceAnswers, hin
                                                          "lever")))  # fmt: skip
     drawn, ours = by_name(answers), by_name(answers, PlaceChanges({hinge: 0.2}, {}, {}))
     for name in (*POSES, "force_n"):
-        # Bodies that are meshed anew differ by 1e-5 of a slope.
+        # Bodies that are meshed again differ by 1e-5 of a slope.
         scale = max(abs(rebuilt[n] - drawn[n]) + 2e-4 * abs(drawn[n]) for n in drawn if n[-4:] == name[-4:])
         assert ours[name] - drawn[name] == pytest.approx(rebuilt[name] - drawn[name], abs=0.05 * scale)
 
@@ -90,7 +90,7 @@ def test_a_pin_follows_its_load_and_stops_at_the_side_of_its_hole(answers: Place
     assert slip[0] == pytest.approx(-slip[-1])
     free = np.linalg.solve(answer.slip_stiffness[0], answer.load_by_input[0]) * 1e-5
     assert slip[3] == pytest.approx(free, rel=1e-2)
-    # Within the hole no other place has less energy.
+    # No other position of the pin within the clearance of the hole has less energy.
     force, stiffness = answer.load_by_input[0] * u[-1], answer.slip_stiffness[0]
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
     rim = 0.01 * np.stack([np.cos(angle), np.sin(angle)])
@@ -140,7 +140,9 @@ def test_poses_and_gauges_row_by_row_are_refused_with_what_to_give(tmp_path: Pat
 
 
 def check_sketch(page: str, slopes: dict[str, float]) -> None:
-    """The page's drawing goes through the recording in time and shows the difference to the drawing, magnified."""
+    """Check that the sketch on the page follows the recording over time and shows the magnified difference from the
+    drawing.
+    """
     data = json.loads(re.search(r'id="mechanism-data">(.*?)</script>', page).group(1))
     magnified = float(re.search(r"magnified ([\d.e+]+) times", page).group(1))
     frames, finger = data["frames"], data["names"].index("finger")

@@ -1,6 +1,6 @@
-"""The truths of tests/benchmarks/world: what its generator draws is what it says.
+"""The true values of tests/benchmarks/world: the data of its generator agree with the stated effects.
 
-The figures come from `python -m tests.benchmarks.world.run`; here nothing is asked of the tool.
+`python -m tests.benchmarks.world.run` prints the results of the benchmark; these tests make no diagnosis.
 """
 
 import ast
@@ -23,7 +23,7 @@ from tests.benchmarks.world.rows.catalogue import ROWS
 SEED = 6001
 BENCHMARK = Path(__file__).resolve().parents[1] / "benchmarks" / "world"
 EXACT_MM = 1e-9
-"""Rounding of double numbers over metres of travel."""
+"""Rounding error of double-precision numbers over metres of travel."""
 PLAY_MM = 0.02
 
 
@@ -51,7 +51,7 @@ def stage(parts: Parts, *, simulation: str = "line", zeroed: bool = False, noise
 
 
 def by_direction(rig: Rig) -> tuple[np.ndarray, np.ndarray]:
-    """Difference from the simulation without noise, on the way up and on the way down."""
+    """Differences from the simulation without noise, for motion up and for motion down."""
     up = np.diff(rig.input_mm, prepend=rig.input_mm[0] - 1) > 0
     away = rig.clean_gap_mm - rig.simulation.gap(rig.input_mm)
     return away[rig.read & up], away[rig.read & ~up]
@@ -60,7 +60,7 @@ def by_direction(rig: Rig) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("start", [-1.0, 0.3, 1.0])
 def test_a_play_that_is_engaged_gives_a_reversal_of_its_width(start: float) -> None:
     up, down = by_direction(stage(Parts(play_mm=PLAY_MM, start=start)))
-    # The stage comes from an overshoot at every end, so nothing is left of where it started.
+    # The stage overshoots at every end, so that its initial position has no influence.
     assert up == pytest.approx(-PLAY_MM / 2, abs=EXACT_MM)
     assert down == pytest.approx(PLAY_MM / 2, abs=EXACT_MM)
 
@@ -74,7 +74,7 @@ def test_a_reference_that_is_zeroed_shifts_everything_by_half_the_play() -> None
 def test_the_mean_of_the_readings_as_simulation_leaves_the_reversal_alone() -> None:
     bent = draw_map(np.random.default_rng(1), np.linspace(0.0, 50.0, 6), 0.01, 3)
     up, down = by_direction(stage(Parts(play_mm=PLAY_MM, error_map=bent), simulation="map"))
-    # The map is steep by at most some parts in a thousand, over half a play.
+    # The slope of the map is at most some parts in a thousand, which acts over half of the play.
     assert up == pytest.approx(-PLAY_MM / 2, rel=5e-3)
     assert down == pytest.approx(PLAY_MM / 2, rel=5e-3)
 
@@ -101,7 +101,7 @@ def test_the_judges_plays_and_sliders_are_the_generators(start: float) -> None:
     path = InputPath.of_rows(np.arange(400.0), u, np.zeros(400, dtype=np.int64), at_rest=False)
     play = definitions.driven(path, {"backlash": np.array([2.5])}, np.array([start]))
     assert play == pytest.approx(physics.play(u, 2.5, start), abs=EXACT_MM)
-    # A slider strained to its reach stands where upward motion has left a play.
+    # An elastic slider at its limit corresponds to a play engaged by upward motion.
     loop = definitions.driven(path, {"friction_hysteresis": np.array([0.3, 4.0])}, np.array([start]))
     assert loop == pytest.approx(physics.friction_loop(u, 0.3, 4.0, -start), abs=EXACT_MM)
 

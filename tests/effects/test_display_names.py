@@ -1,4 +1,6 @@
-"""Parameters have display names: declared in the effect's own file, read in sentences; files keep the keys."""
+"""Parameters have display names: they are declared in the effect's own file and used in sentences, while files keep the
+keys.
+"""
 
 import pytest
 

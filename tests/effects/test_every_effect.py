@@ -1,4 +1,4 @@
-"""Every effect keeps the contract; and what holds for some: play, map, limits of speed, creep, resonance."""
+"""Every effect passes the contract tests; further tests of play, map, slew limit, creep and resonance."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -14,8 +14,8 @@ from fingervision.testing import EffectContract, NotApplicable, checks_of
 from fingervision.testing.effect_contract import MODEL, bench
 
 ROUNDING_MM = 1e-9
-"""A few operations on numbers of some millimetres."""
-# effects.md, in its order: what other programs rely on. What is added stands between them or behind.
+"""Tolerance for rounding errors of a few operations on numbers of some millimetres."""
+# Names in the order of the catalogue, on which other programs rely. New effects are inserted or appended.
 PUBLISHED = [
     "drive_lag", "input_offset", "input_scale", "encoder_cyclic_error", "end_stop", "position_error_map", "slew_limit",
     "backlash", "stick_slip", "friction_hysteresis", "lever_ratio_error", "large_deflection", "viscoelastic_creep",
@@ -50,7 +50,7 @@ def test_along_curves_an_effect_is_the_same_where_the_record_is_straight_and_kee
     curved = MeasuringChain(MODEL, bench(), {}, curved=True).respond(setting).gap_mm
     up = slice(4, 118)
     np.testing.assert_allclose(curved[up], straight[up], atol=ROUNDING_MM)
-    # At a corner Akima's curve leads beyond it by less than a tenth of what lies between two samples.
+    # At a corner, Akima's curve overshoots by less than a tenth of the step between two samples.
     assert curved.max() <= straight.max() + 0.1 * float(np.max(np.diff(straight)))
     assert curved[0] == pytest.approx(straight[0], abs=ROUNDING_MM)
 
@@ -102,7 +102,7 @@ def test_creep_reaches_the_simulation_under_a_held_input() -> None:
     history = replace(bench(), input_mm=u, time_s=time, runs=(slice(0, u.size),))
     settings = {"fraction_1s": 0.2, "fraction_4s": 0.0, "fraction_16s": 0.0, "fraction_64s": 0.0}
     gap = MeasuringChain(MODEL, history, {}).respond({"viscoelastic_creep": settings}).gap_mm
-    # The step is a ramp over one sample, whose low-pass lags by half of it.
+    # The step is a ramp over one sample, so that its low-pass response lags by half a sample.
     expected = 11.7 - 0.2 * 7.7 * np.exp(-(time[1:] - 0.02) / 1.0)
     np.testing.assert_allclose(gap[1:], expected, atol=1e-3)
 

@@ -1,4 +1,4 @@
-"""Which speeds a record can show to be the highest."""
+"""Speeds that a record can show to be the highest speed of a stage."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ RATE_HZ = 50.0
 
 
 def searched(input_mm: np.ndarray) -> tuple[float, float]:
-    """Lowest and highest speed that is tried, in mm/s."""
+    """Lowest and highest speed limit that is searched (mm/s)."""
     time_s = np.arange(input_mm.size) / RATE_HZ
     found = narrow(History(input_mm, time_s, (slice(0, input_mm.size),), 1.0, 5.0))
     assert not isinstance(found, str)
@@ -26,6 +26,6 @@ def test_under_step_commands_alone_any_slower_speed_is_possible() -> None:
 def test_beside_ramps_the_stage_went_as_fast_as_they_do() -> None:
     ramp = np.linspace(0.0, 4.0, 101)
     lowest, highest = searched(np.concatenate([np.zeros(50), ramp, np.full(50, 4.0), np.zeros(50)]))
-    # The slowest twentieth of the stretches stand at an end of the ramp, in part.
+    # The slowest twentieth of the stretches include rest at an end of the ramp.
     assert 0.2 * 0.04 * RATE_HZ < lowest <= 0.04 * RATE_HZ
     assert highest == pytest.approx(4.0 * RATE_HZ)

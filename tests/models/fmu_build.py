@@ -12,7 +12,7 @@ KINDS = {"cs": ("CoSimulation",), "me": ("ModelExchange",)}
 
 
 def can_build():
-    """Whether gcc and FMPy, whose list of functions the stubs are made from, are there."""
+    """Whether gcc and FMPy are installed; the stubs are made from FMPy's list of functions."""
     try:
         import fmpy  # noqa: F401
     except ImportError:
@@ -21,7 +21,7 @@ def can_build():
 
 
 def build_fmu(folder, version=2, kind="cs", name="gripper", more=(), platform=None, unit="m", extra=""):
-    """Compile the gripper and pack it; `more` are options of gcc."""
+    """Compile the gripper and pack it into an FMU; `more` are options of gcc."""
     library = _compiled(SOURCE, folder, version, name, more)
     here = platform or ("linux64" if version == 2 else "x86_64-linux")
     document = _fmi2(kind, unit, extra) if version == 2 else _fmi3(kind, unit, extra)

@@ -1,7 +1,7 @@
-"""Closed forms of the circular notch hinge from the literature, kept to compare; each with its error.
+"""Closed formulas of the circular notch hinge from the literature, for comparison, each with its error.
 
 Errors are those of the compliance against a plane-stress finite-element model with elastic end blocks, nu = 0.34;
-negative means that the formula is too stiff. `fingervision.models.hinge_correction` is what the models use.
+negative means that the formula is too stiff. The models use `fingervision.models.hinge_correction` instead.
 """
 
 from math import atan, pi, sqrt
@@ -16,7 +16,8 @@ _SMITH_RANGE = (0.2, 0.8)
 def paros_weisbord_bending(notch: Notch, material: Material) -> float:
     """Rotation per moment about z in rad/(N mm), in full: Paros and Weisbord, Machine Design 37 (1965) 151.
 
-    For any t / R; error -1.9 % at 0.05, -8.7 % at 0.25, -20 % at 0.8: beam theory.
+    The formula is beam theory and valid for any t / R. Its error is -1.9 % at t / R = 0.05, -8.7 % at 0.25 and -20 % at
+    0.8.
     """
     R, b = _radius_mm(notch), notch.plate_mm
     beta = notch.thickness_mm / (2.0 * R)
@@ -32,7 +33,7 @@ def paros_weisbord_bending(notch: Notch, material: Material) -> float:
 def paros_weisbord_simplified_bending(notch: Notch, material: Material) -> float:
     """Rotation per moment about z in rad/(N mm), for thin hinges: 9 pi sqrt(R) / (2 E b t^(5/2)).
 
-    Error -1.2 % at t / R = 0.05, -5.6 % at 0.25, -11 % at 0.8; better than the full form by luck.
+    Error -1.2 % at t / R = 0.05, -5.6 % at 0.25, -11 % at 0.8; by chance, this is better than the full formula.
     """
     return (
         9.0
@@ -43,9 +44,9 @@ def paros_weisbord_simplified_bending(notch: Notch, material: Material) -> float
 
 
 def wu_zhou_bending(notch: Notch, material: Material) -> float:
-    """Rotation per moment about z in rad/(N mm): Wu and Zhou, Rev. Sci. Instrum. 73 (2002) 3101.
+    """Rotation per moment about z in rad/(N mm): Wu and Zhou (2002).
 
-    With s = R / t; equal to Paros and Weisbord's full form, and as much too stiff.
+    The formula uses s = R / t. It equals the full formula of Paros and Weisbord, with the same error.
     """
     s = _radius_mm(notch) / notch.thickness_mm
     bracket = 2.0 * s**3 * (6.0 * s**2 + 4.0 * s + 1.0) / ((2.0 * s + 1.0) * (4.0 * s + 1.0) ** 2)
@@ -54,7 +55,7 @@ def wu_zhou_bending(notch: Notch, material: Material) -> float:
 
 
 def wu_zhou_axial(notch: Notch, material: Material) -> float:
-    """Lengthening per axial force in mm/N: the same integral in closed form; errors as of the simplified one."""
+    """Elongation per axial force (mm/N), by a closed formula; errors as for the simplified formula."""
     s = _radius_mm(notch) / notch.thickness_mm
     integral = 2.0 * (2.0 * s + 1.0) / sqrt(4.0 * s + 1.0) * atan(sqrt(4.0 * s + 1.0)) - pi / 2.0
     return integral / (material.youngs_modulus_mpa * notch.plate_mm)
@@ -78,7 +79,7 @@ def smith_bending(notch: Notch, material: Material) -> float:
     Raises
     ------
     FingervisionError
-        Outside that range.
+        If t / R is outside this range.
     """
     ratio = notch.thickness_mm / _radius_mm(notch)
     if not _SMITH_RANGE[0] <= ratio <= _SMITH_RANGE[1]:

@@ -1,4 +1,4 @@
-"""Kinds that differ by more than their errors are reported, with which to trust."""
+"""Kinds of model that differ by more than their errors are reported, with the kind to trust."""
 
 from fingervision.models.agreement import disagreements
 from fingervision.models.answer_figures import ModelFigures
@@ -28,6 +28,6 @@ def test_each_quantity_has_one_sentence_and_says_whom_to_trust() -> None:
 
 
 def test_stated_errors_widen_what_is_allowed() -> None:
-    # 13.5 % apart, errors of 2 % each: within 10 % beyond them.
+    # The kinds differ by 13.5 %, with errors of 2 % each: less than 10 % beyond the errors.
     assert disagreements({"lumped": figures(7.7, 2.27), "finite_element": figures(7.7, 2.0)}) == []
     assert disagreements({"lumped": figures(7.7, 2.30), "finite_element": figures(7.7, 2.0)}) != []

@@ -1,4 +1,4 @@
-"""Poses of bodies: exact for rigid motions, closed forms, and one kind of model against another."""
+"""Poses of bodies, compared with rigid motions, with closed formulas, and between kinds of model."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def test_a_rigid_motion_is_found_again(seed: int) -> None:
 
 
 def test_a_lever_turns_by_the_drive_over_its_arm() -> None:
-    """A thin notch is a pivot: the arm turns by u / 60 mm, and its centroid goes with it."""
+    """A thin notch is a pivot: the arm of 60 mm rotates by u / 60 mm, and its centroid moves accordingly."""
     model = MechanismFrame(mechanism_from_tables(LEVER, "here"))
     pose = model.state(0.1).bodies["long_arm"]
     assert pose.angle_mrad == pytest.approx(-100.0 / 60.0, rel=0.01)
@@ -63,7 +63,7 @@ def test_a_lever_turns_by_the_drive_over_its_arm() -> None:
     assert pose.x_mm == pytest.approx(-1e-3 * pose.angle_mrad * centroid[1], rel=0.01)
     assert abs(pose.y_mm) < 1e-4
     turned = model.state(10.0, large_rotation=True).bodies["long_arm"]
-    # On the arc the middle of the driven face keeps its distance from the pivot.
+    # In large rotation, the middle of the driven face keeps its distance from the pivot.
     assert turned.angle_mrad == pytest.approx(-1e3 * np.arcsin(10.0 / 60.0), rel=0.02)
 
 
@@ -89,14 +89,14 @@ def test_lumped_flexures_and_finite_elements_agree(name: str) -> None:
     way = max(np.hypot(pose.x_mm, pose.y_mm) for pose in plate.values())
     for body, pose in plate.items():
         other = frame[body]
-        # A parasitic motion is told to a part of the motion itself: both kinds have it to some per cent of its own.
+        # A parasitic motion is small; both kinds of model agree on it within some per cent.
         assert np.hypot(other.x_mm - pose.x_mm, other.y_mm - pose.y_mm) < 3e-4 * way
         assert abs(other.angle_mrad - pose.angle_mrad) < max(3e-4 * abs(pose.angle_mrad), 1e-5 * 1e3 * way)
 
 
 @pytest.mark.slow
 def test_every_kind_of_gripper_gives_the_same_poses() -> None:
-    """Bars are within their stated 1 % of finite elements; both are mirrored exactly."""
+    """Bars agree with finite elements within their stated 1 %; both models are exactly symmetric."""
     gripper = read_gripper(GRIPPER)
     answers = {kind: build_model(kind, gripper, LINEAR, HingeTheory.CORRECTED).body_poses(np.array([0.0, 1.0]))
                for kind in kinds()}  # fmt: skip

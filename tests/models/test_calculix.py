@@ -14,7 +14,8 @@ from fingervision.models.mesh_outline import PlaneMesh
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (Debian package calculix-ccx) is absent")
 
-# Plane stress against three dimensions: anticlastic bending stiffens the hinges by 3 %, the slope is geometry.
+# Tolerances of plane stress against three dimensions: anticlastic bending stiffens the hinges by 3 %; the slope depends
+# on geometry only.
 SLOPE = 1e-3
 FORCE = 0.04
 LAYERS = 2
@@ -22,7 +23,9 @@ ON_MM = 1e-6
 
 
 class Extruded:
-    """Ten-node tetrahedra through the plate's thickness: each prism becomes three, split alike on shared faces."""
+    """Ten-node tetrahedra through the plate's thickness: each prism is divided into three, in the same way on shared
+    faces.
+    """
 
     def __init__(self, mesh: PlaneMesh, plate_mm: float) -> None:
         self.plane, self.plate_mm = mesh, plate_mm

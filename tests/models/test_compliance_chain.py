@@ -24,7 +24,7 @@ def test_transforms_keep_reciprocity_and_work(gripper: Gripper, arm: np.ndarray,
     moved = transform @ compliance @ transform.T
     assert moved == pytest.approx(moved.T, rel=ROUNDING, abs=ROUNDING * np.abs(moved).max())
     load = np.random.default_rng(seed).standard_normal(6)
-    # The same load, carried back to the hinge, does the same work there.
+    # The same load, transferred back to the hinge, does the same work there.
     at_hinge = transform.T @ load
     assert load @ moved @ load == pytest.approx(at_hinge @ compliance @ at_hinge, rel=1e-7)
 
@@ -44,7 +44,8 @@ def test_maxwell_and_betti(gripper: Gripper) -> None:
 
 
 def test_guided_shuttle_is_much_stiffer_than_a_free_one(gripper: Gripper) -> None:
-    # Equation (15) holds with sideways motion and rotation held; 2 / C_yy, of a free shuttle, is another number.
+    # Equation (15) holds with sideways motion and rotation held; for a free shuttle, 2 / C_yy would be a different
+    # number.
     model = StiffnessMatrixGripper(gripper)
     free = 2.0 / model.drive_compliance[1, 1]
     assert model.input_stiffness_n_mm > 1.5 * free
@@ -57,13 +58,13 @@ def test_the_plane_and_the_space_do_not_mix(gripper: Gripper) -> None:
 
 def test_grip_force_starts_at_the_object(gripper: Gripper) -> None:
     model = StiffnessMatrixGripper(gripper)
-    # The corner, 0.3 mm above the measuring point, opens by a little more than it.
+    # The corner, 0.3 mm above the measuring point, moves a little more than the measuring point.
     touching = 0.25 * (model.first_touch_mm() or 0.0)
     assert model.grip_force_n(touching, Part(3.0)) == pytest.approx(0.0, abs=1e-12)
     assert model.grip_force_n(touching + 0.1, Part(3.0)) == 0.0
     expected = 0.1 * -2.0 / (model.first_touch_mm() or 0.0) * model.finger_stiffness_n_mm
     assert model.grip_force_n(touching - 0.1, Part(3.0)) == pytest.approx(expected)
-    # A part as stiff as both fingers one after the other halves the grip.
+    # A part as stiff as both fingers in series halves the grip.
     soft = Part(3.0, 0.5 * model.finger_stiffness_n_mm)
     assert model.grip_force_n(touching - 0.1, soft) == pytest.approx(0.5 * expected)
 
@@ -72,5 +73,5 @@ def test_gravity_sag_scales_with_density_and_plate(gripper: Gripper) -> None:
     sag, _ = StiffnessMatrixGripper(gripper).gravity_sag_mm()
     loose, _ = StiffnessMatrixGripper(gripper).gravity_sag_mm(drive_held=False)
     assert 0.0 < sag < loose
-    # Brick elements give 0.156 mm with the drive free out of the plane; bars joined at points come within a tenth.
+    # Brick elements give 0.156 mm with the drive free out of the plane; bars joined at points agree within a tenth.
     assert loose == pytest.approx(0.156, rel=0.1)

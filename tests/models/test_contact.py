@@ -1,4 +1,4 @@
-"""Contact of the fingers pressed hard together, against penalty solutions with solvers of their own."""
+"""Contact of fingers that are pressed together strongly, against penalty solutions by independent solvers."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from fingervision.models.physics import Physics
 from fingervision.models.static_answer import equilibria
 
 PENALTY_N_MM = 1e6
-"""Of each face point: a finger that is pressed with 18 N then sinks in by some 1e-6 mm."""
+"""Penalty stiffness of each face point: a finger that is pressed with 18 N penetrates by some 1e-6 mm."""
 WITHIN = 1e-4
 CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -44,7 +44,8 @@ def test_force_grip_and_stress_at_two_millimetres_of_closing(gripper: Gripper) -
     x, y = model.plate.nodes_mm[:, model.plate.corner_triangles]
     at_peak = np.hypot(x - state.place_mm[0], y - state.place_mm[1]) < 1e-9
     assert state.stress_mpa == pytest.approx(float(model.plate.von_mises_mpa(moved)[at_peak].max()), rel=WITHIN)
-    # Beyond the yield of 48 MPa, which the free gripper does not reach there; no point lies beyond the axis.
+    # The stress exceeds the yield stress of 48 MPa, which the free gripper does not reach at this input; no point
+    # penetrates the axis.
     assert state.stress_mpa > gripper.material.yield_mpa > 2.0 * model.peak_stress().mpa_per_mm
     pressed = model.equilibria([-2.0])[0].displacement_mm
     inner = model.plate.nodes_mm[0] + pressed[model.plate.x_dofs]
@@ -53,7 +54,9 @@ def test_force_grip_and_stress_at_two_millimetres_of_closing(gripper: Gripper) -
 
 @pytest.mark.slow
 def test_the_same_in_the_deformed_shape(gripper: Gripper) -> None:
-    """Elements, assembly and load steps of scikit-fem's own, a penalty for the axis; only the coarse mesh is shared."""
+    """Compared with elements, assembly and load steps of scikit-fem and a penalty at the axis; only the coarse mesh is
+    shared.
+    """
     mesh = mesh_outline(gripper, ElementSize(1.0, 9.0))
     model = FiniteElementGripper(gripper, Physics(large_rotation=True, contact=True), mesh=mesh, width_effect=False)
     half, material = model.half, gripper.material
@@ -114,7 +117,9 @@ def test_the_same_in_the_deformed_shape(gripper: Gripper) -> None:
 
 
 def test_far_jumps_into_deep_contact_are_followed(gripper: Gripper) -> None:
-    """From the first touch to a deep grip at once: the answer of many small steps, where a prediction is far off."""
+    """One step from first touch to a deep grip, for which the prediction is poor, gives the same result as many small
+    steps.
+    """
     inputs = np.array([-1.0, -0.52, 0.5])
     model = LumpedGripper(gripper, Physics(large_rotation=True, contact=True))
     small = model.respond(np.linspace(-1.0, 0.5, 151))

@@ -7,10 +7,10 @@ from scipy.sparse.linalg import splu
 from fingervision.models.corotational_frame import CorotationalFrame
 
 ELEMENTS = 16
-ELASTICA = 1e-3  # of the length; 16 elements
+ELASTICA = 1e-3  # as a share of the length, for 16 elements
 LOAD_STEPS = 20
 
-# End load F L^2 / EI: u / L, v / L, theta, by integrating the elastica's equation.
+# End load F L^2 / EI, with u / L, v / L and theta from integrating the equation of the elastica.
 CASES = {
     1.0: (0.05643, 0.30172, 0.46135),
     2.0: (0.16064, 0.49346, 0.78175),
@@ -20,7 +20,7 @@ CASES = {
 
 
 def cantilever(elements: int = ELEMENTS, shear: float = 0.0) -> CorotationalFrame:
-    """Unit length, bending stiffness 1, lengthening by 1e-5 of it per unit force: below the tolerances."""
+    """Cantilever of length 1 and bending stiffness 1; its elongation of 1e-5 per unit force is below the tolerances."""
     nodes = np.stack([np.linspace(0.0, 1.0, elements + 1), np.zeros(elements + 1)], axis=1)
     ends = np.stack([np.arange(elements), np.arange(1, elements + 1)], axis=1)
     h = 1.0 / elements
@@ -58,7 +58,7 @@ def test_a_moment_rolls_the_beam_into_an_arc(turns: float) -> None:
     load[-1] = angle = 2.0 * np.pi * turns
     moved = solve(frame, load)
     exact = (np.sin(angle) / angle - 1.0, (1.0 - np.cos(angle)) / angle)
-    # Chords instead of an arc: 16 elements of a full circle are a polygon that closes, of an arc one of 0.4 %.
+    # Chords replace an arc: 16 elements bent to a full circle form a closed polygon; the error for an arc is 0.4 %.
     assert moved[-3:-1] == pytest.approx(exact, abs=5e-3)
     assert moved[-1] == pytest.approx(angle, rel=1e-9)
 
@@ -79,7 +79,7 @@ def test_rigid_motion_costs_nothing_and_the_tangent_is_the_slope(angle: float, d
     moved = np.empty((5, 3))
     moved[:, :2] = frame.nodes_mm @ np.array([[c, s], [-s, c]]) - frame.nodes_mm + [dx, dy]
     moved[:, 2] = angle
-    stiffest = 4e5  # of the elements along their axes
+    stiffest = 4e5  # elements loaded along their axes
     _, force = frame.internal_force_n(moved.ravel())
     assert np.abs(force).max() < 1e-13 * stiffest
     bent = moved.ravel() + 1e-2 * np.random.default_rng(seed).standard_normal(15) * np.tile([0.0, 0.1, 1.0], 5)
@@ -94,9 +94,9 @@ def test_rigid_motion_costs_nothing_and_the_tangent_is_the_slope(angle: float, d
 def test_the_pseudo_rigid_body_of_a_cantilever() -> None:
     """Howell's constants of a beam pushed across at its end (Compliant Mechanisms, Wiley 2001, table 5.1, n = 0).
 
-    Its end moves as that of a rigid link of 0.8517 L within 0.5 % of L, up to 64.3 degrees (the definition of both
-    numbers); 2.67617 is the slope, through the origin, of F cos(angle) L^2 / EI over the angle, up to 58.5 degrees. A
-    fit depends on where its points lie, by about 1 %.
+    Up to 64.3 degrees, the end of the beam moves as that of a rigid link of 0.8517 L within 0.5 % of L, which defines
+    both numbers. The constant 2.67617 is the slope, through the origin, of F cos(angle) L^2 / EI over the angle up to
+    58.5 degrees. The fitted slope depends on the choice of points by about 1 %.
     """
     gamma, stiffness = 0.8517, 2.67617
     frame = cantilever(32)

@@ -1,4 +1,6 @@
-"""Out of the plane in three dimensions: a cantilever by beam theory, torsion by Saint-Venant, the sample by bricks."""
+"""Out of the plane in three dimensions: a cantilever against beam theory, torsion against Saint-Venant, the published
+sample against brick elements.
+"""
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ STEEL = Material("steel", 210000.0, 0.3, 7850.0, 400.0)
 PLAIN = Material("without cross contraction, as a beam is", 210000.0, 0.0, 7850.0, 400.0)
 LENGTH_MM, GRAVITY_MM_S2 = 100.0, 9806.65
 BEAM = 5e-3
-"""Of Euler's beam at a length over depth of 20 and more: what shear adds."""
+"""Relative contribution of shear to Euler's beam at a ratio of length to depth of 20 and more."""
 
 
 def cantilever(
@@ -43,8 +45,8 @@ def test_a_cantilever_s_first_mode_and_sag(width: float, depth: float) -> None:
 def test_torsion_of_a_deep_bar() -> None:
     """Saint-Venant's constant of a rectangle 4 to 1 is 0.281 b t^3 (Timoshenko and Goodier, article 109).
 
-    The clamp keeps its section from warping, which takes sqrt(E I_w / (G J)) off the length (Vlasov, Thin-Walled
-    Elastic Beams, chapter 2), with I_w = b^3 t^3 / 144.
+    The clamp prevents warping of its section, which shortens the effective length by sqrt(E I_w / (G J)) (Vlasov,
+    Thin-Walled Elastic Beams, chapter 2), with I_w = b^3 t^3 / 144.
     """
     width, depth = 2.0, 8.0
     plate, held = cantilever(width, depth, order=5)
@@ -74,7 +76,9 @@ def test_a_rigid_lift_costs_nothing() -> None:
 
 @pytest.mark.slow
 def test_the_sample_by_calculix(gripper: Gripper) -> None:
-    """CalculiX's wedges (`tests/benchmarks/models_three_dimensions.py`) have 61.79 and 352.94 Hz, bricks 0.105 mm."""
+    """CalculiX's wedge elements (`tests/benchmarks/models_three_dimensions.py`) give 61.79 and 352.94 Hz, brick
+    elements 0.105 mm of sag.
+    """
     found = out_of_plane(half_mechanism(gripper), 2)
     assert found.modes_hz == pytest.approx((61.79, 352.94), rel=5e-3)
     assert found.sag_mm["tip"] == pytest.approx(0.105, rel=0.01)

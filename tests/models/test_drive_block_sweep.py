@@ -1,4 +1,4 @@
-"""A sweep's interpolated drive block: the drawings answered one by one."""
+"""The interpolated drive block of a sweep, compared with drawings that are computed one by one."""
 
 import pytest
 
@@ -9,7 +9,8 @@ from fingervision.models.parameter_sweep import parse_variation, sweep_answers, 
 from fingervision.models.static_answer import gap_per_input
 
 SAME = {0: 3e-4, 1: 2e-3, 2: 2e-3}
-"""Gap per input, force, stress: the sweep changes the meshed finger's answers in the ratio in which its bars change."""
+"""Gap per input, force, stress: tolerances, because the sweep scales the response of the meshed finger by that of its
+bars."""
 
 
 def test_a_sweep_of_a_block_s_length_is_that_of_its_drawings(gripper: Gripper) -> None:

@@ -1,4 +1,4 @@
-"""Models that are functions of time: FMUs and Python files, each in a process of its own."""
+"""Models that are functions of time: FMUs and Python files, each in a separate process."""
 
 import zipfile
 from pathlib import Path
@@ -22,7 +22,7 @@ INPUT_MM = np.interp(TIME_S, [0.0, 0.5, 0.6, 1.2, 1.3, 2.0], [0.1, 0.1, 0.6, 0.6
 
 
 def truth_mm():
-    """The gripper of fmu_gripper.c, by scipy."""
+    """Response of the gripper of fmu_gripper.c, computed by scipy."""
     system = ([7.7 * OMEGA**2], [1.0, 2.0 * DAMPING * OMEGA, OMEGA**2])
     _, moved, _ = lsim(system, INPUT_MM - INPUT_MM[0], TIME_S)
     return 1.2 + 7.7 * INPUT_MM[0] + moved
@@ -41,7 +41,7 @@ def python_model(folder, text):
 def test_an_fmu_answers_as_its_equations_do(tmp_path, version, kind):
     model = read_model(build_fmu(tmp_path, version, kind)).base
     (answer,) = model.simulate([(TIME_S, INPUT_MM)])
-    # A co-simulation holds its input over a quarter of a sample, 1.25 ms of a motion of 38 mm/s.
+    # A co-simulation keeps its input constant for a quarter of a sample, 1.25 ms of a motion at 38 mm/s.
     assert np.max(np.abs(answer.gap_mm - truth_mm())) < (0.002 if kind == "me" else 0.02)
 
 
@@ -62,7 +62,7 @@ def test_an_fmu_for_another_system_is_refused(tmp_path):
 
 @needs_gcc
 def test_an_fmu_that_nothing_drives_is_refused(tmp_path):
-    # As BouncingBall, VanDerPol and Stair of the Reference FMUs, which have no input.
+    # Like BouncingBall, VanDerPol and Stair of the Reference FMUs, these models have no input.
     packed, changed = build_fmu(tmp_path), tmp_path / "changed.fmu"
     with zipfile.ZipFile(packed) as old, zipfile.ZipFile(changed, "w") as new:
         for name in old.namelist():
@@ -93,7 +93,7 @@ def test_two_inputs_ask_which_one_and_a_model_toml_says_it(tmp_path):
         '<Real start="0"/></ScalarVariable>'
     )
     path = build_fmu(tmp_path, extra=second)
-    assert FunctionModel(path).simulate([(TIME_S, INPUT_MM)])  # u is a usual name
+    assert FunctionModel(path).simulate([(TIME_S, INPUT_MM)])  # u is a usual name of an input
     document = tmp_path / "model.toml"
     document.write_text('schema = 1\nbase = "gripper.fmu"\ninput = "nothing"\n')
     with pytest.raises(FingervisionError, match="must have the variable nothing"):
@@ -165,7 +165,7 @@ def test_a_gap_that_stands_or_never_settles_is_refused(tmp_path):
 @pytest.mark.slow
 @needs_gcc
 def test_hidden_backlash_and_resonance_beside_an_fmu_are_named(tmp_path):
-    """The plant has the FMU's physics behind a play of 40 um, and rings at 6 Hz besides."""
+    """The simulated plant has the FMU's physics, a play of 40 um at its input, and a resonance at 6 Hz."""
     rng = np.random.default_rng(3)
     time_s = np.arange(0.0, 13.5, 1e-3)
     corners_s = [0, 1, 2.5, 3.5, 4.2, 5.2, 6.0, 7.5, 8.0, 9.2, 10, 11.5, 13]

@@ -14,7 +14,7 @@ from tests.models import hinge_closed_forms as closed
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 
-QUADRATURE = 1e-9  # closed form against Gauss points: rounding
+QUADRATURE = 1e-9  # rounding difference of closed formula and Gauss quadrature
 POINTS = 0.5  # percentage points, the width to which the table of errors is known
 ENTRY = 0.01  # of an entry of the three-dimensional table
 
@@ -136,7 +136,7 @@ def segment_sum(segments: int) -> float:
 
 def test_segments_of_middle_height_converge_to_the_integral() -> None:
     errors = {segments: segment_sum(segments) for segments in (4, 5, 6, 8, 10)}
-    # Printed with two digits: half a unit of the last.
+    # The values are printed with two digits: half a unit of the last digit.
     expected = {4: -7.6, 5: 2.3, 6: -0.6, 8: -0.01, 10: 0.02}
     assert [errors[n] for n in (4, 5, 6)] == pytest.approx([expected[n] for n in (4, 5, 6)], abs=0.05)
     assert [errors[n] for n in (8, 10)] == pytest.approx([expected[n] for n in (8, 10)], abs=0.006)

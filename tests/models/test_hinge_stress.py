@@ -1,4 +1,4 @@
-"""Nominal stress in the hinges: against a bar's own, finite elements, and the scaling laws of elasticity."""
+"""Nominal stress in the hinges: against the stress of a bar, finite elements, and scaling laws of elasticity."""
 
 from dataclasses import replace
 
@@ -14,9 +14,9 @@ from fingervision.models.redrawn import redrawn
 from fingervision.models.skeleton import skeleton_of
 
 NOTCH = 0.02
-"""Neuber's factor of a deep notch at t / R = 0.25 against finite elements, and the frame's force."""
+"""Tolerance of Neuber's factor for a deep notch at t / R = 0.25, and of the frame's force, against finite elements."""
 SEGMENTS = 1e-3
-"""The frame's own answer with ten segments against forty."""
+"""Tolerance of the frame with ten segments against the frame with forty."""
 
 
 def test_the_thinnest_section_carries_what_finite_elements_find(
@@ -26,7 +26,7 @@ def test_the_thinnest_section_carries_what_finite_elements_find(
     assert peak.mpa_per_mm == pytest.approx(refined.mpa_per_mm, rel=NOTCH)
     middles = [np.array(lumped.gripper.lever.hinge1_mm), np.array(lumped.gripper.lever.hinge2_mm)]
     off = min(float(np.hypot(*(np.array(peak.place_mm) - middle))) for middle in middles)
-    # On the surface beside the neck: the moment grows along the hinge while the section hardly does.
+    # The largest stress is beside the neck, because the moment grows along the hinge while the section hardly grows.
     assert off == pytest.approx(0.5 * lumped.gripper.hinge.thickness_mm, rel=0.03)
 
 
@@ -44,7 +44,7 @@ def test_stress_goes_with_the_modulus_and_not_with_the_plate_of_a_beam(gripper: 
 
 
 def test_a_rotation_of_one_hinge_is_its_bending_moment(gripper: Gripper) -> None:
-    """Everything beyond hinge 1 turned by a small angle: M = angle / C, all along the hinge."""
+    """If everything beyond hinge 1 rotates by a small angle, the moment is angle / C along the whole hinge."""
     skeleton = skeleton_of(gripper, HingeTheory.BEAM, 40)
     angle = 1e-3
     members = [place for place, member in enumerate(skeleton.members) if member.name == "hinge 1"]
@@ -55,7 +55,7 @@ def test_a_rotation_of_one_hinge_is_its_bending_moment(gripper: Gripper) -> None
         member = skeleton.members[place]
         length = np.hypot(*np.subtract(member.end_mm, member.start_mm))
         before = displacement[member.parent + 1]
-        # Under a pure moment every segment turns by C M and its end moves aside by the coupling term.
+        # Under a pure moment M, every segment rotates by C M, and its end moves sideways by the coupling term.
         aside, turn = member.compliance[[1, 5], 5] * moment
         displacement[place + 1] = before + np.array([-before[2] * length - aside, 0.0, turn])
     still = replace(skeleton, members=skeleton.members[: members[-1] + 1])

@@ -1,4 +1,4 @@
-"""What every parametric model must be, whichever there are."""
+"""Requirements on every parametric model, including models that are added later."""
 
 from contextlib import suppress
 

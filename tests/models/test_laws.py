@@ -1,4 +1,4 @@
-"""Laws of a drawn gripper against the changed gripper itself, built and run."""
+"""Formulas of effects for a drawn gripper, compared with models of the changed gripper itself."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -24,15 +24,18 @@ from tests.benchmarks.own_physics import longer_lever
 
 LAWS = {"lever_ratio_error", "large_deflection", "assembly_asymmetry", "finger_contact", "hinge_stiffness_error"}
 INTERPOLATED_MM, INTERPOLATED = 5e-4, 1e-4
-"""Interpolation in the laws, a tenth of an edge's noise and less; and the same relative to the force."""
+"""Tolerances for interpolation in the formulas: at most a tenth of an edge's noise, and the same relative to the
+force."""
 BENT_MM, BENT = 1e-3, 5e-4
-"""The arc's reach and height come from a least-squares fit to the equilibria, whose own spline has eleven nodes."""
+"""Tolerances for the arc: its reach and height are fitted by least squares to equilibria, whose spline has eleven
+nodes."""
 RATIO_MM, RATIO = 1.5e-3, 1e-3
-"""Laws change the model's answer in the ratio in which its bars alone change: beside a changed drawing whose finger is
-meshed anew, within 2e-4 of the travel of 7 mm and 6e-4 of the force for changes of 0.1 mm."""
+"""Formulas scale the response of the model by that of a bar model. Compared with a changed drawing whose finger is
+meshed again, the error is within 2e-4 of the travel of 7 mm and 6e-4 of the force for changes of 0.1 mm."""
 ROUNDING_MM = 1e-9
 SPLINE = 1e-5
-"""Splines of both ratios over the change are good to 1e-6; of one over the other, ten times that at their ends."""
+"""Splines of both ratios over the change are accurate to 1e-6; a spline of one ratio over the other is accurate to ten
+times that value at its ends."""
 INPUT = np.linspace(-0.6, 1.8, 97)
 
 
@@ -71,7 +74,7 @@ def agree(a: Response, b: Response, within_mm: float, within: float) -> None:
 def test_every_kind_obeys_the_same_laws_and_all_are_effects_of_the_catalogue(gripper: Gripper) -> None:
     assert set(catalogue()) >= LAWS
     for kind in kinds():
-        if kind != "finite_element":  # half a minute of equilibria; its own answers are tested beside its model
+        if kind != "finite_element":  # the equilibria take half a minute; they are tested with the model itself
             drawn = PhysicalGripper(gripper, kind)
             closes = float(drawn.respond(np.array([drawn.input_range_mm[0]])).gap_mm[0]) <= 0.0
             assert set(drawn.laws) == (LAWS if closes else LAWS - {"finger_contact"})
@@ -119,7 +122,7 @@ def test_thinner_hinges_are_their_ratio_in_gap_and_force(drawn: PhysicalGripper,
     assert thin.force_n is not None
     assert bare.force_n is not None
     ratio = float(thin.force_n[-1] / bare.force_n[-1]) - 1.0
-    assert ratio == pytest.approx(-0.22, abs=0.01)  # mechanics of the paper's sample, section 5: -22 % of force
+    assert ratio == pytest.approx(-0.22, abs=0.01)  # docs/explanation/mechanics.md: -22 % of the force
     settings = {"hinge_stiffness_error": {"ratio": ratio, "thickness_share": 1.0}}
     agree(obeying(drawn, settings), thin, RATIO_MM, RATIO)
 
@@ -143,7 +146,7 @@ def test_contact_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper
 
 def test_large_rotation_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper: Gripper) -> None:
     bent = LumpedGripper(gripper, Physics(large_rotation=True)).respond(INPUT)
-    # The arc nearest to the equilibria over the inputs that the drawn body is meant for.
+    # The circular arc nearest to the equilibria over the valid inputs of the drawn body.
     inputs = np.linspace(*LumpedGripper(gripper).input_range_mm, 201)
     straight_mm = LumpedGripper(gripper).respond(inputs).gap_mm - 4.0
     bent_mm = LumpedGripper(gripper, Physics(large_rotation=True)).respond(inputs).gap_mm - 4.0
@@ -195,7 +198,9 @@ def test_a_name_that_is_no_number_of_the_drawing_is_said(gripper: Gripper) -> No
 
 
 def test_ratios_that_turn_back_are_no_law(gripper: Gripper) -> None:
-    """A changed height of hinge 1 adds force whichever way it goes: its ratio does not say which."""
+    """A change of hinge 1's height increases the force for either sign, so that the force ratio does not determine the
+    change.
+    """
     theory = HingeTheory.CORRECTED
     assert ratio_curves(gripper, theory, lambda by: redrawn(gripper, "lever.l1_mm", by), -2.0, 2.0) is None
     assert ratio_curves(gripper, theory, lambda by: redrawn(gripper, "lever.l2_mm", by), 0.0, 0.0) is None
@@ -211,7 +216,7 @@ def test_curves_are_as_fine_as_they_say(gripper: Gripper, name: str, low: float,
         changed = small_answer(redrawn(gripper, name, low + share * (high - low)), theory)
         gap = changed.gap_per_input / bare.gap_per_input
         force = changed.force_per_input_n_mm / bare.force_per_input_n_mm
-        if name == "lever.l2_mm":  # the way in which each is asked
+        if name == "lever.l2_mm":  # sign of the requested change
             assert curves.force_at_gap(gap) == pytest.approx(force, abs=SPLINE)
         else:
             assert curves.gap_at_force(force) == pytest.approx(gap, abs=SPLINE)

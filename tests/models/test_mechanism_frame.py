@@ -1,4 +1,6 @@
-"""Lumped mechanisms of any topology: against finite elements of the same drawing, the paper's matrix, invariances."""
+"""Lumped mechanisms of any topology: against finite elements of the same drawing, the published stiffness matrix, and
+invariances.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,10 +24,10 @@ from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.models_sway_table import stiffnesses
 
 SLOPE = 5e-4
-"""Of bodies condensed to frames: ten times better than the bar that the lumped model is held to."""
+"""Tolerance of the slope for condensed bodies: a tenth of the tolerance for the lumped model of bars."""
 FORCE = 0.01
 SAME_DRAWING = 2e-4
-"""Two meshes of one outline: the packaged one and the one that the mechanism makes."""
+"""Difference of two meshes of one outline: the packaged mesh and the mesh of the mechanism."""
 
 
 def test_the_template_has_the_gripper_s_figures(gripper: Gripper, finite_element: FiniteElementGripper) -> None:
@@ -54,7 +56,9 @@ def test_lumped_half_beside_finite_elements(gripper: Gripper, thickness: float, 
 
 @pytest.mark.slow
 def test_contact_and_large_rotation(gripper: Gripper) -> None:
-    """Pushed 1.5 mm beyond the first touch, in the deformed shape: the gripper's own finite elements and both kinds."""
+    """At 1.5 mm beyond first touch, in the deformed shape, both kinds of mechanism agree with the gripper's finite
+    elements.
+    """
     ours = FiniteElementGripper(gripper, Physics(large_rotation=True, contact=True)).loaded([-2.0])[0]
     half = half_mechanism(gripper)
     for kind, stress in ((MechanismPlate, FORCE), (MechanismFrame, 0.1)):
@@ -87,7 +91,7 @@ def test_a_loop_is_no_chain(gripper: Gripper) -> None:
 
 
 def stiff_triangle() -> CorotationalBody:
-    """Three frames with a random positive definite law between them."""
+    """Three coordinate frames, coupled by a random positive definite stiffness."""
     random = np.random.default_rng(4)
     places = np.array([[0.0, 0.0], [3.0, 1.0], [-1.0, 4.0]])
     motions = np.zeros((9, 3))
@@ -119,7 +123,7 @@ def test_the_tangent_is_the_slope_of_the_forces() -> None:
 
 @pytest.mark.slow
 def test_stress_at_fillets_is_that_of_finite_elements() -> None:
-    # Neither radius is one of the table's; the elements are within 0.1 % of a mesh three times as fine.
+    # Neither radius is a node of the table; the mesh is within 0.1 % of a mesh three times as fine.
     drawing = read_drawing(Path(__file__).parents[1] / "benchmarks" / "mechanisms" / "filleted_lever.toml")
     mechanism = drawing.mechanism()
     for radii in ((1.5, 1.0), (0.2, 0.3)):
@@ -134,7 +138,7 @@ def test_stress_at_fillets_is_that_of_finite_elements() -> None:
     ("thickness", "poisson", "depth"), [(0.35, 0.45, 10.0), (1.8, 0.2, 10.0), (6.5, 0.3, 10.0), (1.0, 0.3, 5.0)]
 )
 def test_a_notch_between_guided_blocks_is_as_stiff_as_elements(thickness: float, poisson: float, depth: float) -> None:
-    """Between the nodes of the table, with another material, and an elliptic cut: across 1 %, along 3 %."""
+    """Between nodes of the table, for another material and an elliptic cut, errors are 1 % across and 3 % along."""
     for direction, within in (((0, 1), 0.01), ((1, 0), 0.03)):
         plate, frame = stiffnesses(thickness, direction, poisson=poisson, depth_mm=depth)
         assert frame == pytest.approx(plate, rel=within)

@@ -1,4 +1,4 @@
-"""Weight, warmth and a part between two probes of a mechanism, against springs, loads and levers of their own."""
+"""Weight, temperature and a part between two probes of a mechanism, against springs, loads and levers."""
 
 import tomllib
 from dataclasses import replace
@@ -69,7 +69,7 @@ def model() -> MechanismPlate:
 
 
 def test_a_part_is_a_spring_between_the_probes(model: MechanismPlate) -> None:
-    """The spring's matrix is added to the plate's, and all is solved at once."""
+    """The stiffness matrix of a spring is added to that of the plate, and both are solved together."""
     part = Part(1.9, 300.0)
     pressed = GrippedPair(model, "gap").at(0.1, part)
     plate = model.plate
@@ -82,7 +82,7 @@ def test_a_part_is_a_spring_between_the_probes(model: MechanismPlate) -> None:
     moved = np.zeros(plate.unknowns)
     moved[driven] = 0.1
     free = np.setdiff1d(np.arange(plate.unknowns), np.concatenate([driven, plate.x_dofs[foot], plate.y_dofs[foot]]))
-    # The part is touched after 0.1 mm of closing: the spring pulls from there.
+    # The part is touched after 0.1 mm of closing: the spring acts from this point.
     load = part.stiffness_n_mm * (part.width_mm - 2.0) * rows - stiffness @ moved
     moved[free] = spsolve(stiffness[free][:, free].tocsc(), load[free])
     assert pressed.grip_n == pytest.approx(-part.stiffness_n_mm * (2.0 + rows @ moved - part.width_mm), rel=1e-6)
@@ -92,7 +92,7 @@ def test_a_part_is_a_spring_between_the_probes(model: MechanismPlate) -> None:
 
 
 def test_a_lever_s_advantage_is_the_ratio_of_its_arms() -> None:
-    """Driven along its end, which may turn: what is missing bends the pivot."""
+    """The drive acts along the lever's end, which may rotate; the missing force bends the pivot."""
     text = LEVER.replace(
         f"box_mm = [{-ARM_MM - 1.0}, {-ARM_MM + 1.0}, 30, 30]", f"box_mm = [{-END_MM}, {-END_MM}, 10, 30]"
     )
@@ -102,7 +102,7 @@ def test_a_lever_s_advantage_is_the_ratio_of_its_arms() -> None:
 
 
 def test_warmth_is_the_thermal_strain_of_the_elements(model: MechanismPlate) -> None:
-    """A load of scikit-fem's own, the drive and the foot in their places."""
+    """Compared with a thermal load by scikit-fem, with fixed drive and foot."""
     plate, material = model.plate, model.mechanism.material
     nu, E, expansion = material.poisson_ratio, material.youngs_modulus_mpa, material.thermal_expansion_per_k or 0.0
     bare = MechanismPlate(model.mechanism, width_effect=False, refine=0.6)
@@ -131,7 +131,7 @@ def test_warmth_is_the_thermal_strain_of_the_elements(model: MechanismPlate) -> 
 
 
 def test_a_cantilever_hangs_by_its_weight() -> None:
-    """w L^4 / 8 E I of a bar driven along itself at its root, where nothing moves it."""
+    """Deflection w L^4 / (8 E I) of a bar whose root is driven along the bar and at rest."""
     bar = (
         LEVER[: LEVER.index("[[body]]")]
         + """

@@ -1,4 +1,4 @@
-"""Mechanisms drawn by bodies in motion: adaptive integration, full matrices, the kinds beside one another."""
+"""Mechanisms in motion, against adaptive integration and full matrices, and between kinds of model."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +42,7 @@ def struck(model: ModalModel, size_mm: float) -> tuple[DriveHistory, tuple[float
 
 
 def integrated(model: ModalModel, ratios: np.ndarray, drive: DriveHistory, kinks: tuple[float, float]) -> np.ndarray:
-    """Modal coordinates by scipy's DOP853, the drive's kinks as jumps of speed."""
+    """Modal coordinates by scipy's DOP853, with kinks of the drive as jumps of speed."""
     kept = ratios.size
     w, participation = model.rad_s[:kept], model.participation[:kept]
 
@@ -79,7 +79,7 @@ def test_lumped_motion_against_an_adaptive_integration(bridge: MechanismFrame, d
 
 
 def test_lumped_frequency_response_against_the_full_matrices(arms: MechanismFrame) -> None:
-    """(K - w^2 M) u = f of all frames and own modes, next to undamped, drives held and free."""
+    """Compared with (K - w^2 M) u = f for all frames and own modes, nearly undamped, with drives held and free."""
     vibration = arms._vibration(10)
     K, M, free, by = vibration.stiffness_n_mm, vibration.mass_t, vibration.free, vibration.by_input
     model, loose = arms.modal_model(10), arms.free_modes(10)
@@ -91,7 +91,7 @@ def test_lumped_frequency_response_against_the_full_matrices(arms: MechanismFram
         moved = by.copy()
         moved[free] = np.linalg.solve(dynamic[np.ix_(free, free)], -(dynamic @ by)[free])
         assert found.per_input["tip_x_mm"][place].real == pytest.approx(observed["tip"][0] @ moved, rel=HALF_PERCENT)
-        # The drives free: by their own force, all of them moving in their ratio.
+        # With free drives, the force acts on the drives, which move in their ratio.
         force = by @ dynamic @ moved
         assert found.drive_per_force_mm_n[place].real == pytest.approx(1.0 / force, rel=HALF_PERCENT)
 
@@ -111,7 +111,9 @@ def test_two_drives_in_motion_are_the_sum_of_each_alone(arms: MechanismFrame) ->
 
 @pytest.mark.slow
 def test_lumped_motion_is_that_of_finite_elements() -> None:
-    """Modes within 1 %, and a struck drive's vibration at the same phase of the first mode within 3 %."""
+    """Modes agree within 1 %; the vibration after a sudden motion of the drive, at the same phase of the first mode,
+    within 3 %.
+    """
     mechanism = read_mechanism(DRAWN / "four_bar_gripper.toml")
     answers = []
     for kind in (MechanismPlate, MechanismFrame):

@@ -1,4 +1,4 @@
-"""Drawn mechanisms against closed forms that share no code with them."""
+"""Mechanisms from drawings, against closed formulas that share no code with the models."""
 
 import itertools
 import shutil
@@ -26,12 +26,12 @@ both_kinds = pytest.mark.parametrize("kind", KINDS, ids=["finite_element", "lump
 
 
 def build(kind: Kind, name: str) -> MechanismPlate | MechanismFrame:
-    """In plane stress: the closed forms are those of narrow beams."""
+    """Build a model in plane stress, because the closed formulas are those of narrow beams."""
     return kind(read_mechanism(DRAWN / f"{name}.toml"), width_effect=False)
 
 
 def root_compliance(E: float, b: float, t: float) -> float:
-    """Rotation per moment of the block that a leaf stands on: 16.67 / (pi E b t^2), O'Donnell, 1960."""
+    """Rotation per moment of the block at a leaf's root: 16.67 / (pi E b t^2), O'Donnell, 1960."""
     return 16.67 / (pi * E * b * t**2)
 
 
@@ -46,26 +46,31 @@ def leaf_stiffness(E: float, b: float, t: float, length: float) -> np.ndarray:
 @pytest.mark.slow
 @both_kinds
 def test_parallel_leaf_stage(kind: Kind) -> None:
-    """24 E I / L^3 with the leaves' roots; the first mode by the stage's mass; parasitic motion 3 u^2 / (5 L)."""
+    """Stiffness 24 E I / L^3 including the roots of the leaves; first mode from the stage's mass; parasitic motion 3
+    u^2 / (5 L).
+    """
     stage = build(kind, "parallel_leaf_stage")
     E, b, t, length = 210e3, 0.5, 0.4, 40.0
     guided = 2.0 * leaf_stiffness(E, b, t, length)[0, 0]
     assert stage.stiffness_n_mm == pytest.approx(guided, rel=ONE_PERCENT)
     assert guided == pytest.approx(24 * E * b * t**3 / 12 / length**3, rel=0.03)
-    # Stage of 40 by 12 mm and 13/35 of either leaf.
+    # The moving mass is that of the stage of 40 by 12 mm and 13/35 of each leaf.
     mass_t = 7850e-12 * b * (40.0 * 12.0 + 2 * 13 / 35 * length * t)
     assert stage.modes_hz(drive_held=False, count=1)[0] == pytest.approx(
         sqrt(guided / mass_t) / (2 * pi), rel=ONE_PERCENT
     )
     moved = stage.state(2.0, large_rotation=True)
-    # 3/5 of u^2 / L over a leaf that is as long as it is soft: the roots lengthen it by the cube root of their share.
+    # 3/5 of u^2 / L for a leaf of the length that corresponds to its stiffness: the roots increase the effective length
+    # by the cube root of their share.
     soft = length * (24 * E * b * t**3 / 12 / length**3 / guided) ** (1 / 3)
     assert -moved.probes_mm["stage"][1] == pytest.approx(0.6 * 2.0**2 / soft, rel=2 * ONE_PERCENT)
 
 
 @both_kinds
 def test_bridge_amplifier(kind: Kind) -> None:
-    """A rigid-link quarter on two notches of Paros and Weisbord's compliance, its arm stretched too."""
+    """A quarter with rigid links and two notches with the compliance of Paros and Weisbord, including elongation of the
+    arm.
+    """
     bridge = build(kind, "bridge_amplifier")
     E, b, t, r, lx, ly, arm = 71700.0, 0.2, 0.3, 3.0, 30.0, 5.0, 6.0
     height = lambda a: t + 2 * r * (1 - cos(a))  # noqa: E731
@@ -75,7 +80,8 @@ def test_bridge_amplifier(kind: Kind) -> None:
     expected = lx * ly * stretch / (turn + stretch * ly**2)
     assert expected < lx / ly
     assert bridge.state(1.0).probes_mm["output"][1] == pytest.approx(expected, rel=0.002)
-    # Beam theory of the notch is 4 % too stiff at t / R = 0.1 (mechanics.md, by plane stress): its table has 3.8 %.
+    # Beam theory of the notch is 4 % too stiff at t / R = 0.1 compared with plane stress (mechanics.md); the table has
+    # 3.8 %.
     stiff = stretch - (stretch * ly) ** 2 / (turn / 1.038 + stretch * ly**2)
     assert bridge.stiffness_n_mm == pytest.approx(stiff, rel=ONE_PERCENT)
 
@@ -87,19 +93,22 @@ def test_four_bar_gripper(kind: Kind) -> None:
     guided = 2.0 * leaf_stiffness(2200.0, 0.8, 0.8, 30.0)[0, 0]
     assert jaw.stiffness_n_mm == pytest.approx(guided, rel=ONE_PERCENT)
     state = jaw.state(1.0)
-    # The finger's tip lies 26 mm above its foot: what it moves more is the jaw's turn.
+    # The fingertip lies 26 mm above the foot: the difference of their motions is due to the jaw's rotation.
     assert state.probes_mm["tip"][0] == pytest.approx(-1.0, rel=ONE_PERCENT)
-    # Bending stress at a leaf's root: 3 E t u / L^2, less what the roots yield; half a thickness away from the sharp
-    # corners, where stress has no limit, it is lower by the way and higher by the corner.
+    # Bending stress at a leaf's root: 3 E t u / L^2, reduced by the compliance of the roots. At half a thickness from
+    # the sharp corners, where the stress is singular, it is lower because of the distance and higher because of the
+    # corner.
     assert state.stress_mpa == pytest.approx(0.93 * 3 * 2200.0 * 0.8 / 30.0**2, rel=0.1)
 
 
 @both_kinds
 def test_trapezoid_pivot(kind: Kind) -> None:
-    """Two leaves about a centre: 2 (4 E I / L)(3 l^2 + 3 l + 1) with elastic roots; the centre stays."""
+    """Two leaves whose axes meet in a centre: stiffness 2 (4 E I / L)(3 l^2 + 3 l + 1) with elastic roots; the centre
+    does not move.
+    """
     pivot = build(kind, "trapezoid_pivot")
     E, b, t, length, near, lever = 113800.0, 0.3, 0.3, 30.0, 15.0, 30.0
-    # A turn by 1 rad about the centre moves the leaf's inner end across by the way to it.
+    # A rotation by 1 rad about the centre moves the leaf's inner end sideways by its distance from the centre.
     motion = np.array([near, -1.0])
     turning = 2.0 * motion @ leaf_stiffness(E, b, t, length) @ motion
     rigid = 4 * E * b * t**3 / 12 / length * (3 * 0.25 + 3 * 0.5 + 1)
@@ -112,13 +121,14 @@ def test_trapezoid_pivot(kind: Kind) -> None:
 
 @both_kinds
 def test_butterfly_pivot(kind: Kind) -> None:
-    """Two trapezoids in series about one centre: half the stiffness of one, and the hub stays where it is."""
+    """Two trapezoid pivots in series with one centre: half the stiffness of one, and the hub does not move."""
     pivot = build(kind, "butterfly_pivot")
     E, b, t, length, near = 113800.0, 0.3, 0.3, 30.0, 15.0
     motion = np.array([near, -1.0])
     half = 2.0 * motion @ leaf_stiffness(E, b, t, length) @ motion
     lever = (near + length) * cos(radians(30.0)) + 20.0
-    # Beside the turn the four leaves yield along their axes to the force itself: E b t / L each, 60 degrees from it.
+    # In addition to the rotation, the force stretches the four leaves along their axes: stiffness E b t / L each, at 60
+    # degrees to the force.
     across = 2.0 * E * b * t / length * sin(radians(30.0)) ** 2
     assert pivot.stiffness_n_mm == pytest.approx(1.0 / (lever**2 * 2.0 / half + 2.0 / across), rel=ONE_PERCENT)
     state = pivot.state(1.0)
@@ -135,12 +145,12 @@ def test_one_number_changes_the_drawing(tmp_path: Path) -> None:
 
 
 NECK = {"t": 0.4, "a": 4.0, "depth": 3.0, "fillet": 1.0, "reach": 60.0, "foot": 14.0}
-"""A lever on one flexure, turned by its far end: millimetres."""
+"""Dimensions (mm) of a lever on one flexure that is driven at its far end."""
 STEEL = (210e3, 0.3)
 
 
 def lever_on(kind: str, folder: Path) -> Mechanism:
-    """The lever's drawing: 0.3 mm of steel."""
+    """Drawing of the lever, from 0.3 mm of steel."""
     shape = f"half_length_mm = {NECK['a']}\ndepth_mm = {NECK['depth']}"
     shape += f"\nfillet_mm = {NECK['fillet']}" if kind == "filleted" else ""
     (folder / "m.toml").write_text(
@@ -171,7 +181,9 @@ across = "free"
 
 
 def test_an_elliptic_flexure_by_quadrature(tmp_path: Path) -> None:
-    """Bending of the section that the drawing says, and what the table of test_hinge.py adds to beam theory."""
+    """Bending of the section in the drawing by quadrature, with the correction of beam theory from the table of
+    test_hinge.py.
+    """
     model = MechanismPlate(lever_on("elliptic", tmp_path), width_effect=False)
     t, a, depth, reach, foot = (NECK[name] for name in ("t", "a", "depth", "reach", "foot"))
 
@@ -202,7 +214,8 @@ def mapped_neck(thickness: int = 6, beside: int = 5) -> tuple[dict[tuple[float, 
         return 0.5 * t + r * (1.0 - sqrt(max(1.0 - within**2, 0.0)))
 
     def midway(x0: float, x1: float) -> float:
-        # On a fillet amid the angles, so that the edge's middle lies on the arc where the edge is evenly divided.
+        # On a fillet, midside nodes are placed at the mean angle, so that they lie on the arc and divide the edge
+        # evenly.
         if max(abs(x0), abs(x1)) <= a and min(abs(x0), abs(x1)) >= a - r - 1e-9:
             first, second = (asin(min(1.0, (abs(x) - (a - r)) / r)) for x in (x0, x1))
             return float(np.copysign(a - r + r * sin(0.5 * (first + second)), x0 + x1))
@@ -240,7 +253,7 @@ def mapped_neck(thickness: int = 6, beside: int = 5) -> tuple[dict[tuple[float, 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (Debian package calculix-ccx) is absent")
 @both_kinds
 def test_a_filleted_flexure_by_calculix(tmp_path: Path, kind: Kind) -> None:
-    """The same lever by another program, on a mapped mesh that shares nothing with ours.
+    """The same lever computed by CalculiX, on an independent mapped mesh.
 
     CalculiX expands plane-stress elements into bricks, which leaves its forces within 0.4 % of true plane stress where
     the plate is thin (mechanics of the paper's sample, section 3): 0.5 % for both meshes together.

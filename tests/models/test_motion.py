@@ -1,4 +1,4 @@
-"""Motion in time and by frequency, against integrations and solutions that share nothing with it but the matrices."""
+"""Motion in time and over frequency, against independent integrations and solutions that share only the matrices."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +33,9 @@ def steps(*corners: tuple[float, float], rows: int = 400) -> DriveHistory:
 
 @pytest.mark.parametrize("damping", [ModalDamping(0.025), LossFactor(0.1), PaperDamping()], ids=["modal", "loss", "4"])
 def test_step_response_against_an_adaptive_integration(lumped: LumpedGripper, damping: Damping) -> None:
-    """A step of 0.5 mm within 2 ms: scipy's DOP853 on the modes' equations, the drive's kinks as jumps of speed."""
+    """A step of 0.5 mm within 2 ms, compared with scipy's DOP853 on the modes' equations, with kinks of the drive as
+    jumps of speed.
+    """
     model = gripper_modes(lumped.half, 3)
     drive = steps((0.0, 0.0), (0.002, 0.5), (0.03, 0.5))
     found = modal_motion(model, drive, damping)
@@ -60,7 +62,7 @@ def test_step_response_against_an_adaptive_integration(lumped: LumpedGripper, da
 
 @pytest.mark.parametrize("ratio", [0.005, 0.025, 0.1])
 def test_logarithmic_decrement_is_the_damping_asked_for(lumped: LumpedGripper, ratio: float) -> None:
-    """Peak to peak of what a struck gripper rings down by, read off its gap."""
+    """Ratio of successive peaks of the gap while a gripper vibrates freely after a sudden motion."""
     period = 1.0 / lumped.modes_hz(drive_held=True)[0] / np.sqrt(1 - ratio**2)
     peaks = 0.001 + 0.37 * period + np.arange(8) * period
     drive = DriveHistory(np.concatenate([[0.0, 0.001], peaks]), np.array([0.0, 0.1, *[0.1] * 8]))
@@ -71,7 +73,7 @@ def test_logarithmic_decrement_is_the_damping_asked_for(lumped: LumpedGripper, r
 
 
 def test_force_of_a_sine_is_the_dynamic_stiffness(lumped: LumpedGripper) -> None:
-    """The force in time against the full matrices at one frequency, without damping but the modes' own."""
+    """Force over time against the full matrices at one frequency, with modal damping only."""
     frequency, half = 120.0, lumped.half
     time_s = np.arange(0.0, 0.5, 5e-5)
     drive = DriveHistory(time_s, 0.1 * np.sin(2 * np.pi * frequency * time_s))
@@ -83,7 +85,7 @@ def test_force_of_a_sine_is_the_dynamic_stiffness(lumped: LumpedGripper) -> None
     moved[half.driven] = 1.0
     inside = np.ix_(half.free, half.free)
     moved[half.free] = np.linalg.solve(dynamic[inside], -(dynamic @ moved)[half.free])
-    # The last quarter is steady; the inertia that no mode carries meets the drive in its kinks alone.
+    # The last quarter is steady; the inertia outside the modes acts on the drive at kinks only.
     steady = time_s > 0.375
     model = gripper_modes(half, 8)
     rest_t = model.mass_t - float(np.sum(model.participation**2))
@@ -94,7 +96,7 @@ def test_force_of_a_sine_is_the_dynamic_stiffness(lumped: LumpedGripper) -> None
 
 
 def test_frequency_response_against_the_full_matrices(lumped: LumpedGripper) -> None:
-    """(K - w^2 M + i w C) u = f of the whole frame, C of all its modes, held and free."""
+    """Compared with (K - w^2 M + i w C) u = f of the whole frame, with C from all modes, drive held and free."""
     half, ratio = lumped.half, 0.025
     at = np.array([5.0, 45.0, 46.06, 47.0, 200.0, 340.0, 347.0, 354.0, 450.0])
     found = frequency_response(gripper_modes(half, 12), gripper_free_modes(half, 12), at, ModalDamping(ratio))
@@ -109,7 +111,7 @@ def test_frequency_response_against_the_full_matrices(lumped: LumpedGripper) -> 
     for place, f in enumerate(at):
         w = 2 * np.pi * f
         inside = np.ix_(half.free, half.free)
-        # Damping acts on what moves beside the static shape.
+        # Damping acts on the motion relative to the static shape.
         dynamic = K - w**2 * M + 1j * w * held
         beside = np.zeros(half.unknowns, complex)
         beside[half.free] = np.linalg.solve(dynamic[inside], (w**2 * M @ static)[half.free])
@@ -139,13 +141,13 @@ def test_half_power_width_is_the_damping_asked_for(lumped: LumpedGripper) -> Non
 
 def test_equation_4_describes_the_lowest_modes_alone(lumped: LumpedGripper) -> None:
     found = modal_motion(gripper_modes(lumped.half, 8), steps((0.0, 0.0), (0.01, 0.1)), PaperDamping())
-    # zeta(1) = 0.045 gamma by the dimensionless equation, gamma 0.5; the second mode would have 0.45.
+    # zeta(1) = 0.045 gamma by the dimensionless equation, with gamma = 0.5; the ratio of the second mode would be 0.45.
     assert found.damping_ratios == pytest.approx([0.0225], rel=0.01)
     assert found.modes_hz.size == 1
 
 
 def test_time_steps_and_modes_agree(gripper: Gripper) -> None:
-    """Contact that never comes: the same linear body, once by modes and once by steps in time."""
+    """Without contact during the motion, modes and time steps describe the same linear body."""
     drive = steps((0.0, 0.0), (0.005, 0.2), (0.02, 0.2), rows=200)
     modal = gripper_motion(LumpedGripper(gripper), drive)
     stepped = gripper_motion(LumpedGripper(gripper, Physics(contact=True)), drive)
@@ -193,7 +195,9 @@ def test_heavier_material_vibrates_slower(gripper: Gripper) -> None:
 
 @pytest.mark.slow
 def test_stage_on_two_leaves_vibrates_as_mass_and_spring() -> None:
-    """Pushed by a force: 1 / (k - m w^2) below its first mode, the mass from the mode, the spring from statics."""
+    """Response to a force: 1 / (k - m w^2) below the first mode, with the mass from the mode and the stiffness from
+    statics.
+    """
     plate = MechanismPlate(read_mechanism(STAGE))
     frequency = 2 * np.pi * plate.modes_hz(drive_held=False, count=1)[0]
     at = np.linspace(0.1, 0.9, 5) * frequency / (2 * np.pi)

@@ -1,4 +1,4 @@
-"""Grip, leverage, weight, warmth and endurance, against closed forms and against solutions of other code."""
+"""Grip, leverage, weight, temperature and endurance, against closed formulas and independent code."""
 
 from dataclasses import replace
 from math import inf, log
@@ -21,7 +21,7 @@ ONE_PERCENT = 0.01
 
 @pytest.mark.parametrize("stiffness", [inf, 50.0, 1.0])
 def test_grip_is_the_least_energy(lumped: LumpedGripper, stiffness: float) -> None:
-    """Scipy's SLSQP on the energy of finger and part, the face's points kept outside the squeezed part."""
+    """Compared with scipy's SLSQP on the energy of finger and part; the face's points are outside the squeezed part."""
     half, width, input_mm = lumped.half, 3.0, -0.3
     state = grip_equilibrium(half, input_mm, Part(width, stiffness))
     compliance = half.face_displacement_mm[half.face]
@@ -53,7 +53,7 @@ def test_grip_is_that_of_finite_elements(gripper: Gripper, cross_bar_mm: float) 
 
 
 def test_kinds_grip_alike(gripper: Gripper) -> None:
-    """One corner touches: the stiffness matrix's finger and that of bars alone are the same bars."""
+    """If one corner touches, the stiffness-matrix model and the bar model describe the same bars."""
     lumped = LumpedGripper(gripper, bars_alone=True)
     for part in (Part(3.0), Part(3.0, 20.0)):
         by_matrix = StiffnessMatrixGripper(gripper).grip_force_n(-0.2, part)
@@ -61,9 +61,10 @@ def test_kinds_grip_alike(gripper: Gripper) -> None:
 
 
 def test_mechanical_advantage_is_reciprocal(lumped: LumpedGripper) -> None:
-    """Betti: pressing on the tips with the drive held pulls the drive by the gap's own ratio.
+    """By Betti's theorem, a force on the tips with the drive held acts on the drive by the ratio of gap to input.
 
-    Then grip by force = (a / c) / (k + 2 a^2 / c) with a the tip's motion by input, c its compliance, drive held.
+    The ratio of grip to force is therefore (a / c) / (k + 2 a^2 / c), with the tip's motion a per input, its compliance
+    c with the drive held, and the stiffness k.
     """
     half = lumped.half
     place = int(np.argmin(half.face_gap_mm(-0.5 * half.unit_displacement_mm)))
@@ -74,7 +75,9 @@ def test_mechanical_advantage_is_reciprocal(lumped: LumpedGripper) -> None:
 
 
 def test_tip_moves_and_turns_as_a_lever(lumped: LumpedGripper) -> None:
-    """Rigid links turn by 1 / l2 by input about hinge 1: the tip goes along by its distance from it across."""
+    """Rigid links rotate by 1 / l2 per input about hinge 1: the motion of the tip along the finger is its distance from
+    hinge 1 across the finger times this angle.
+    """
     own, lever = operating_figures(lumped.gripper, lumped.half), lumped.gripper.lever
     turn = 1.0 / lever.l2_mm
     assert np.radians(own.tip_turn_deg_per_mm) == pytest.approx(turn, rel=0.03)
@@ -88,7 +91,7 @@ def test_weight_is_that_of_the_density_and_kinds_agree(
     assert gap_by_weight_mm(LumpedGripper(heavy).half) == pytest.approx(2.0 * gap_by_weight_mm(lumped.half), rel=1e-9)
     for of in (gap_by_weight_mm, midline_by_weight_mm):
         assert of(lumped.half) == pytest.approx(of(finite_element.half), rel=0.07)
-    # Rayleigh: one mode carries the swaying, so that the shift is about g / w^2 of it.
+    # By Rayleigh's quotient, a single swaying mode dominates, so that the shift is about g / w^2.
     (first,) = lumped.swaying_modes_hz()
     assert midline_by_weight_mm(lumped.half) == pytest.approx(9806.65 / (2 * np.pi * first) ** 2, rel=0.6)
 
@@ -100,16 +103,16 @@ def test_a_body_whose_supports_grow_too_only_grows(finite_element: FiniteElement
     moved, force = thermal_displacement_mm(half, 1e-3, grown)
     assert moved == pytest.approx(grown, abs=1e-12)
     assert np.abs(force).max() < 1e-8
-    # The gap then grows by its own strain.
+    # The gap then grows by the thermal strain.
     assert 2.0 * (half.measured_mm(moved) - half.measured_rest_mm) == pytest.approx(4e-3, rel=1e-6)
 
 
 def test_thermal_growth_by_a_second_way(gripper: Gripper, finite_element: FiniteElementGripper) -> None:
-    """Clamp and drive face stay: the free body grows, then the clamp's face is pressed back and the drive is pushed."""
+    """Clamp and drive face stay in place: the body first expands freely; then clamp and drive face are moved back."""
     warm = replace(gripper, material=replace(gripper.material, thermal_expansion_per_k=1e-4))
     own = operating_figures(warm, finite_element.half)
-    # Growing about the clamp's middle puts the drive's face 2.57 mm up and both pillars 35.5 mm out, by their strain;
-    # brought back along the drive that costs its slope, and back across the pillars' own way, in the gap.
+    # Expansion about the middle of the clamp moves the drive face by 2.57 mm, and both pillars by 35.5 mm, times the
+    # strain. Moving them back changes the gap by the slope along the drive, and directly across the pillars.
     slope = 7.7196
     expected = 1e-4 * (4.0 - 2.57 * slope)
     pillars_mm = 1e-4 * 2.0 * 35.5
@@ -120,7 +123,7 @@ def test_thermal_growth_by_a_second_way(gripper: Gripper, finite_element: Finite
 
 @pytest.mark.parametrize("low", [-20.0, -5.0, 0.0])
 def test_endurance_on_the_line(gripper: Gripper, low: float) -> None:
-    """Basquin's line through two points, Soderberg for the mean, worked out by hand."""
+    """Basquin's line through two points, with Soderberg's correction for the mean stress, computed by hand."""
     material = replace(gripper.material, sn_line=SNLine((1e3, 1e6), (40.0, 10.0)))
     found = endurance(material, low, 25.0)
     amplitude, mean = (25.0 - low) / 2, (25.0 + low) / 2
@@ -132,7 +135,7 @@ def test_endurance_on_the_line(gripper: Gripper, low: float) -> None:
 
 def test_endurance_beyond_the_line_is_a_limit(gripper: Gripper) -> None:
     material = replace(gripper.material, sn_line=SNLine((1e3, 1e6), (40.0, 10.0), 0.0))
-    # The pulsating line's own points give its own cycles.
+    # The points of the line for pulsating stress give the stated numbers of cycles.
     end = endurance(material, 0.0, 20.0)
     assert end is not None
     assert end.cycles == pytest.approx(1e6)
@@ -141,6 +144,6 @@ def test_endurance_beyond_the_line_is_a_limit(gripper: Gripper) -> None:
     assert much is not None
     assert (little.cycles, little.at_least) == (None, 1e6)
     assert "more than 1e+06 cycles" in little.words
-    # Pulsating to 80 MPa lies beyond the yield stress: no amplitude is beyond such a line's beginning.
+    # Pulsating stress up to 80 MPa exceeds the yield stress, so that no amplitude lies before the start of this line.
     assert much.cycles is not None
     assert endurance(gripper.material, 0.0, 5.0) is None

@@ -70,7 +70,7 @@ def test_contact_patch_presses_evenly() -> None:
 
 def test_timoshenko_cantilever() -> None:
     length, height, force = 20.0, 2.0, 1.0
-    # No Poisson's ratio, so that the clamp does not hold back a swelling of which the formula knows nothing.
+    # Poisson's ratio is 0, because the formula does not include the restraint of lateral contraction by the clamp.
     plate = PlaneStressPlate(rectangle(length, height, 40, 4), replace(STEEL, poisson_ratio=0.0), PLATE_MM)
     x, y = plate.nodes_mm
     inertia, area, shear = PLATE_MM * height**3 / 12, PLATE_MM * height, 500.0
@@ -103,7 +103,7 @@ def test_hole_in_a_wide_plate_trebles_the_stress() -> None:
             load[plate.x_dofs[node]] += abs(y[a] - y[b]) * PLATE_MM * weight
     held = np.concatenate([plate.x_dofs[np.abs(x) < 1e-6], plate.y_dofs[np.abs(y) < 1e-6]])
     stress = plate.von_mises_mpa(solve(plate, held, np.zeros(held.size), load))
-    # Of an infinite plate; one of forty radii has 0.2 % more.
+    # The factor is that of an infinite plate; a plate of forty radii has 0.2 % more.
     assert plate.at_corners(stress).max() == pytest.approx(3.0, rel=0.01)
 
 
@@ -117,7 +117,7 @@ def test_cantilever_modes() -> None:
     squared = np.sort(eigsh(K, 3, M, sigma=0.0, return_eigenvectors=False, v0=np.ones(free.size)))
     beta = np.array([1.8751, 4.6941, 7.8548])
     expected = (beta / length) ** 2 * np.sqrt(1000.0 * height**2 / (12.0 * STEEL.density_t_mm3))
-    # Slender: shear and rotational inertia lower the third by 0.1 %.
+    # The beam is slender: shear and rotational inertia lower its third frequency by 0.1 %.
     assert np.sqrt(squared) == pytest.approx(expected, rel=2e-3)
 
 

@@ -1,4 +1,4 @@
-"""A point's motion is that of the element that it lies in."""
+"""The motion of a point is that of the element in which the point lies."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from fingervision.models.triangulate import triangulate
 
 
 def test_a_quadratic_field_is_met_on_curved_elements_and_beside_a_slit() -> None:
-    """A frame with a slit of 0.1 mm, far finer than its elements: what lies across it moves otherwise."""
+    """A frame with a slit of 0.1 mm, much finer than its elements: the two sides of the slit move differently."""
     steps = ((True, box(0, 40, 0, 40)), (False, Ellipse((20.0, 20.0), (6.0, 6.0), 0.0)), (False, box(-1, 13, 10, 10.1)))
     mesh = triangulate(PlanarRegion(steps), 1.0, 4.0)
     x, y = mesh.nodes_mm

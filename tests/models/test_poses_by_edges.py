@@ -1,4 +1,4 @@
-"""How a body that bends moves its edges otherwise than its area, beside finite elements of the whole mechanism."""
+"""Difference of the motions of edges and area of a body that bends, against finite elements of the whole mechanism."""
 
 import numpy as np
 import pytest
@@ -33,6 +33,6 @@ def test_edges_of_a_bending_body_move_as_finite_elements_say() -> None:
         # The lumped model cuts the flexures' own flanks off its bodies.
         assert y - pose.y_mm == pytest.approx(told[f"{body.name}.y_mm"], rel=0.4, abs=1e-4)
         assert 1e3 * turn - pose.angle_mrad == pytest.approx(told[f"{body.name}.angle_mrad"], abs=5e-3)
-    # The bar that the sample is driven by bends by some micrometres to 1 mm of input; its fingers hardly do.
+    # The driven bar of the sample bends by some micrometres per 1 mm of input; its fingers hardly bend.
     assert -4e-3 < told["drive.y_mm"] < -1e-3
     assert abs(told["left_finger.y_mm"]) < 2e-4

@@ -1,4 +1,4 @@
-"""Every Python block of the models' README runs as it stands."""
+"""Every Python block in the README of `models` runs without change."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""FMUs with the variables and equations of the Reference FMUs (Modelica Association), written anew and built by gcc.
+"""FMUs with the variables and equations of the Reference FMUs (Modelica Association), written independently and built
+by gcc.
 
 The published archives are in no package index; the variables are those of their modelDescription.xml.
 """
@@ -46,7 +47,7 @@ NOTHING_DRIVES = {
 def test_feedthrough_gives_its_continuous_input_among_others_of_other_kinds(tmp_path, kind):
     model = read_model(pack_fmu2(tmp_path, "Feedthrough", FEEDTHROUGH, kind)).base
     (answer,) = model.simulate([(TIME_S, INPUT_MM)])
-    # A co-simulation holds its input over a quarter of a sample, 2.5 ms of 2 mm/s.
+    # A co-simulation keeps its input constant for a quarter of a sample, 2.5 ms at 2 mm/s.
     assert np.max(np.abs(answer.gap_mm - INPUT_MM)) < (1e-6 if kind == "me" else 0.006)
 
 

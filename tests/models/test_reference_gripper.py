@@ -1,4 +1,4 @@
-"""The paper's sample against figures computed beforehand by other meshes and programs."""
+"""The published sample, against values computed by other meshes and programs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,12 +18,12 @@ from fingervision.models.redrawn import redrawn
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper
 
-SLOPE_MM = 0.01  # per mm of input; of the mesh limit 7.7212
+SLOPE_MM = 0.01  # per mm of input, relative to the mesh limit 7.7212
 FORCE = 0.005
 STRESS = 0.02
 MODES = 0.01
 TOUCH = 0.002
-CLOSED = 0.03  # of the contact force: it is what the last 0.05 mm of 0.57 mm press
+CLOSED = 0.03  # of the contact force, which is due to the last 0.05 mm of 0.57 mm
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_large_rotation_opens_a_little_more(plane_stress: FiniteElementGripper) 
     state = large_path(half, 1.8)[-1]
     gap_mm = 2.0 * half.measured_mm(state.displacement_mm)
     linear_mm = 2.0 * half.measured_mm(1.8 * half.unit_displacement_mm)
-    # The material point opens by 0.057 mm more than linear, whose own slope ends at 17.898 mm.
+    # The material point opens by 0.057 mm more than in the linear model, which gives 17.898 mm.
     assert gap_mm == pytest.approx(17.955, abs=0.01)
     assert gap_mm - linear_mm == pytest.approx(0.057, abs=0.005)
     assert state.force_n == pytest.approx(3.824, rel=0.01)
@@ -67,7 +67,7 @@ def test_the_width_of_the_hinges_gives_the_force_of_three_dimensions(finite_elem
 
 
 def test_the_micro_design_in_three_dimensions(gripper: Gripper) -> None:
-    # Width over thickness 10: bricks 10.04 N/mm, plane stress 9.24.
+    # For a width of 10 times the thickness, brick elements give 10.04 N/mm, plane stress 9.24 N/mm.
     micro = read_gripper(Path(__file__).parents[2] / "fingervision" / "models" / "micro_gripper.toml")
     assert FiniteElementGripper(micro).half.equilibrium(1.0).force_n == pytest.approx(10.04, rel=FORCE)
 
@@ -79,7 +79,7 @@ def test_the_top_corner_touches_first_in_large_rotation_too(finite_element: Fini
     gaps = half.face_gap_mm(touch.displacement_mm)
     assert touch.input_mm == pytest.approx(-0.517, rel=TOUCH)
     assert half.face[np.argmin(gaps)] in finite_element.plate.x_dofs[finite_element.plate.nodes_mm[1] > 100.0 - 1e-6]
-    # Where the corners touch, the measuring points 0.3 mm below are still apart.
+    # When the corners touch, the measuring points 0.3 mm below the corners are still apart.
     assert 2.0 * half.measured_mm(touch.displacement_mm) == pytest.approx(0.016, abs=0.0015)
     pressed = large_equilibrium(half, -0.57, touch, contact=True)
     assert pressed.contact_n.sum() == pytest.approx(0.54, rel=CLOSED)
@@ -119,7 +119,8 @@ def coarse_mesh() -> PlaneMesh:
 
 
 def test_slope_is_the_published_comsol_slope_by_construction(plane_stress: FiniteElementGripper) -> None:
-    # No validation: a link length was chosen so. All but the first row, which the paper's own line misses by 0.4 mm.
+    # This is no validation, because a link length was chosen to match. The first row is left out, because it differs
+    # from the published line by 0.4 mm.
     gap_mm = plane_stress.respond(INPUT_MM[1:]).gap_mm
     assert gap_mm == pytest.approx(COMSOL_MM[1:], abs=0.001)
 
@@ -157,7 +158,8 @@ def test_stiffness_matrix_is_near_finite_elements(gripper: Gripper) -> None:
 
 def test_the_first_mode_out_of_the_plane_is_as_much_too_high_as_the_sag_is_too_small(gripper: Gripper) -> None:
     ours = StiffnessMatrixGripper(gripper)
-    # Bricks: 62 Hz and 0.105 mm. Bars joined at points miss some of the compliance; of one compliance, omega^2 sag = g.
+    # Bricks: 62 Hz and 0.105 mm. Bars joined at points lack some of the compliance; for a single compliance, omega^2
+    # sag = g.
     sag_mm, _ = ours.gravity_sag_mm()
     missing = np.sqrt(0.105 / sag_mm)
     assert ours.out_of_plane_modes_hz()[0] == pytest.approx(62.0 * missing, rel=0.02)
@@ -173,7 +175,8 @@ def test_modes_out_of_the_plane_scale_with_modulus_and_density(gripper: Gripper)
 
 
 def test_stiffness_matrix_and_bars_are_the_same_body(gripper: Gripper) -> None:
-    # One by flexibilities in six dimensions, one by stiffnesses in the plane; ten segments, joints of finite stiffness.
+    # One model uses flexibilities in six dimensions, the other stiffnesses in the plane; ten segments, joints of finite
+    # stiffness.
     matrix, frame = StiffnessMatrixGripper(gripper).figures(), LumpedGripper(gripper, bars_alone=True).figures()
     assert matrix.gap_per_input == pytest.approx(frame.gap_per_input, rel=1e-4)
     assert matrix.input_stiffness_n_mm == pytest.approx(frame.input_stiffness_n_mm, rel=1e-3)

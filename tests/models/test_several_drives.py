@@ -1,4 +1,4 @@
-"""Several driven faces: superposition, rigid motions, reciprocity, and the three kinds beside one another."""
+"""Several driven faces: superposition, rigid motions, reciprocity, and agreement of the three kinds of model."""
 
 import csv
 import json
@@ -38,7 +38,7 @@ def moving(mechanism: Mechanism, *per_input: float) -> Mechanism:
 
 
 def both_ends_driven(base: float, stage: float) -> Mechanism:
-    """The packaged stage with its ground driven too, along the same direction."""
+    """The packaged stage, with its ground driven too in the same direction."""
     single = drawn(STAGE)
     ground = Drive(single.fixed[0], (1.0, 0.0), "held", base)
     return replace(single, fixed=(), drives=(ground, replace(single.drives[0], per_input=stage)))
@@ -55,7 +55,8 @@ def test_two_drives_are_the_sum_of_each_alone(kind: type[MechanismModel]) -> Non
         assert both.probes_mm[name] == pytest.approx(expected, rel=ROUNDING, abs=ROUNDING)
     for name in both.drives_n:
         assert both.drives_n[name] == pytest.approx(0.7 * lower.drives_n[name] - 0.4 * upper.drives_n[name], rel=1e-6)
-    # The force of the input does the work of both, and Betti: what one drive does to the other is mutual.
+    # The force of the input does the work of both drives; by Betti's theorem, the effect of one drive on the other is
+    # mutual.
     assert both.force_n == pytest.approx(0.7 * both.drives_n["lower"] - 0.4 * both.drives_n["upper"], rel=ROUNDING)
     assert lower.drives_n["upper"] == pytest.approx(upper.drives_n["lower"], rel=1e-6)
     for ours, alone in zip(model.drive_states(), (lower, upper), strict=True):
@@ -63,7 +64,7 @@ def test_two_drives_are_the_sum_of_each_alone(kind: type[MechanismModel]) -> Non
 
 
 def test_the_kinds_agree_and_rigid_arms_are_kinematics() -> None:
-    """Two arms on a neck each: ideal joints at 10 and 40 mm turn by what the driven heights of 30 and 70 mm move."""
+    """Two arms, each on one neck: ideal joints at 10 and 40 mm rotate according to the driven heights 30 and 70 mm."""
     arms = drawn(ARMS)
     plate, frame, chain = (kind(arms).state(1.0) for kind in KINDS)
     for name in plate.drives_n:
@@ -79,7 +80,7 @@ def test_the_kinds_agree_and_rigid_arms_are_kinematics() -> None:
 
 @pytest.mark.parametrize("kind", [pytest.param(MechanismPlate, marks=pytest.mark.slow), MechanismFrame])
 def test_ends_driven_apart_are_one_driven_twice_as_far(kind: type[MechanismPlate | MechanismFrame]) -> None:
-    """No fixed face is needed: the driven ground is guided. In large rotation too."""
+    """The driven ground is guided, so that no fixed face is needed, also in large rotation."""
     alone, apart = kind(drawn(STAGE)), kind(both_ends_driven(-1.0, 1.0))
     assert apart.stiffness_n_mm == pytest.approx(4.0 * alone.stiffness_n_mm, rel=1e-5)
     for large in (False, True):
@@ -120,7 +121,7 @@ def test_figures_of_a_single_drive_name_no_drives() -> None:
 
 
 LOWER = 'name = "lower"\nbox_mm = [7, 14, 30, 30]\ndirection = [1.0, 0.0]\nacross = "free"\n'
-# What is replaced by what, and what the sentence must name.
+# Replaced text, its replacement, and the word that the message must contain.
 WRONG = [
     ("per_input = -0.5", "per_input = nan", "drive upper.per_input"),
     ("per_input = -0.5", "per_input = true", "drive upper.per_input"),
@@ -158,7 +159,7 @@ def test_a_drawing_without_a_drive_is_refused() -> None:
 
 @pytest.mark.parametrize("kind", [pytest.param(MechanismPlate, marks=pytest.mark.slow), MechanismFrame])
 def test_drives_that_do_not_hold_it_are_refused(kind: type[MechanismPlate | MechanismFrame]) -> None:
-    """Two faces driven in the mean along x leave it free along y."""
+    """Two faces whose mean is driven along x leave the mechanism free along y."""
     loose = ARMS.replace('[[fixed]]\nname = "foot"\nbox_mm = [-6, 6, 0, 0]\n', "")
     with pytest.raises(FingervisionError, match="must be held by its fixed faces, but can move freely"):
         _ = kind(drawn(loose)).stiffness_n_mm

@@ -1,4 +1,4 @@
-"""How the plate's width holds a leaf back: limits, and a plate of scikit-fem's Morley elements."""
+"""Restraint of a leaf by the plate's width, against limits and a plate of scikit-fem's Morley elements."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,8 @@ from fingervision.models.strip_width import stretched_share, strip_share
 
 NU = 0.34
 MORLEY = 0.04
-"""Of the share, by sixty of these elements along: they converge from below, in proportion to their size."""
+"""Tolerance of the share for sixty Morley elements along the strip, which converge from below in proportion to their
+size."""
 
 
 def test_narrow_strips_are_free_and_wide_ones_held() -> None:
@@ -48,7 +49,9 @@ def test_the_share_is_that_of_a_clamped_plate(width: float) -> None:
 
 @pytest.mark.parametrize("width", [0.3, 1.0, 4.0])
 def test_a_stretched_strip_is_held_back_at_its_ends(width: float) -> None:
-    """Quadratic elements of scikit-fem's in plane stress, clamped at one end and pulled as a whole at the other."""
+    """Compared with scikit-fem's quadratic elements in plane stress, clamped at one end and pulled uniformly at the
+    other.
+    """
     mesh = skfem.MeshTri.init_tensor(np.linspace(0.0, 1.0, 33), np.linspace(0.0, width, 33))
     basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP2()))
 

@@ -1,4 +1,4 @@
-"""Thin necks: the lumped notch against closed forms and quadrature that share no code with it."""
+"""Thin necks: the lumped notch against closed formulas and quadrature that share no code with it."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -22,11 +22,11 @@ from tests.models import hinge_closed_forms as closed
 
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 ROUNDING = 1e-10
-COARSE = 0.005  # of the bricks: two across the neck are as much too stiff
+COARSE = 0.005  # of the brick elements: two elements across the neck are too stiff by as much
 
 
 def series(notch: Notch, segments: int) -> float:
-    """Rotation per moment of segments in a row: that of the whole, if each is right."""
+    """Rotation per moment of segments in series: equal to that of the whole notch if each segment is correct."""
     parts = [beam_compliance(notch, PA2200, span)[5, 5] for span in pairwise(notch.stations_mm(segments).tolist())]
     return float(np.sum(parts))
 
@@ -56,7 +56,7 @@ def test_a_notch_that_leaves_its_web_early_is_only_as_long_as_the_web_has_it() -
 
 
 def test_a_whole_gripper_with_thin_necks_is_as_soft_as_finite_elements(gripper: Gripper) -> None:
-    # R 4, t 0.05: ten equal segments of middle height had it 100 % too stiff.
+    # For R = 4 and t = 0.05, ten equal segments with their mean heights are 100 % too stiff.
     thin = replace(gripper, hinge=replace(gripper.hinge, thickness_mm=0.05))
     lumped, plane = LumpedGripper(thin), FiniteElementGripper(thin)
     assert lumped.half.equilibrium(1.0).force_n == pytest.approx(plane.half.equilibrium(1.0).force_n, rel=0.002)
@@ -66,7 +66,7 @@ def test_a_whole_gripper_with_thin_necks_is_as_soft_as_finite_elements(gripper: 
 @pytest.mark.slow
 @pytest.mark.parametrize(("nu", "width"), [(0.2, 5.5), (0.42, 5.5), (0.34, 18.0)])
 def test_the_width_effect_between_the_tables_nodes_and_for_other_materials(nu: float, width: float) -> None:
-    """Bricks at width over thickness, and a Poisson's ratio, that no table has: bending as sure as is said."""
+    """Brick elements at a width and Poisson's ratio that are in no table: bending is within the stated uncertainty."""
     material = replace(PA2200, poisson_ratio=nu)
     notch = circular_notch(1.0, 0.16, 0.16 * width)
     bricks = solid_compliance(notch, material, along=24, across=2, through=4)
@@ -78,7 +78,9 @@ def test_the_width_effect_between_the_tables_nodes_and_for_other_materials(nu: f
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [20.0, 100.0])
 def test_torsion_of_wide_hinges(width: float) -> None:
-    """Beam theory alone is off by 2.8 and 19 times and more; bricks between rigid planes within 5 %."""
+    """Beam theory alone is wrong by factors of 2.8 and 19; agreement with brick elements between rigid planes is within
+    5 %.
+    """
     notch = circular_notch(4.0, 1.0, width)
     bricks = solid_compliance(notch, PA2200, along=24, across=2, through=6)
     corrected = corrected_compliance(notch, PA2200)
@@ -91,7 +93,7 @@ def test_between_plane_stress_and_plane_strain() -> None:
         E, nu = held_moduli(PA2200, np.array(share))
         assert float(E) == pytest.approx(modulus)
         assert float(nu) == pytest.approx(ratio)
-        # The shear modulus does not know what happens across the plate.
+        # The shear modulus does not depend on the restraint across the plate.
         assert float(E / (1.0 + nu)) == pytest.approx(1650.0 / 1.34)
 
 

@@ -1,4 +1,4 @@
-"""Outlines and meshes of plane bodies: closed forms for areas, and convergence rates of the elements on them."""
+"""Outlines and meshes of plane bodies: closed formulas for areas, and convergence rates of elements."""
 
 from dataclasses import replace
 
@@ -17,7 +17,8 @@ from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import LEAST_QUALITY, PlaneMesh, triangulate
 
 AREA = 1e-6
-"""Relative: quadratic edges follow an arc to 1e-5 of its radius, and an arc is a part of the outline."""
+"""Relative tolerance of areas: quadratic edges follow an arc to 1e-5 of its radius, and arcs are a part of the
+outline."""
 
 
 def region(*steps: tuple[bool, Shape]) -> PlanarRegion:
@@ -63,7 +64,8 @@ def test_area_and_loops_and_quality(name: str) -> None:
 @pytest.mark.parametrize("axis_deg", [100.0, 150.0])
 @pytest.mark.parametrize("beside_mm", [-3e-6, -1e-5, 1e-5])
 def test_a_slot_that_passes_close_by_a_corner_closes_the_outline(axis_deg: float, beside_mm: float) -> None:
-    # The corner of the box and the disc's cut, and the side of the slot, leave a piece of outline finer than is told.
+    # The corner of the box and the disc's cut, and the side of the slot, leave a piece of outline that is too short to
+    # be resolved.
     across = np.array([np.cos(np.radians(axis_deg)), np.sin(np.radians(axis_deg))])
     along = np.array([-across[1], across[0]])
     middle = np.array([1.0, 4.0]) + (beside_mm - 0.25) * across
@@ -90,7 +92,7 @@ def test_thin_necks_are_fine_and_the_rest_is_not(gripper: Gripper, ratio: float)
 
 
 def test_the_sample_meshed_anew_is_at_the_limit(gripper: Gripper) -> None:
-    """At the limit of finer meshes, by another mesher: 7.7212, 2.0014 N/mm, 19.07 MPa/mm."""
+    """Compared with the limit of fine meshes by another mesh generator: 7.7212, 2.0014 N/mm, 19.07 MPa/mm."""
     mesh = mesh_outline(gripper, ElementSize(0.2, 2.5))
     model = FiniteElementGripper(gripper, mesh=mesh, width_effect=False)
     assert model.respond(np.array([1.0])).gap_mm - 4.0 == pytest.approx([7.7212], rel=2e-5)
@@ -99,7 +101,7 @@ def test_the_sample_meshed_anew_is_at_the_limit(gripper: Gripper) -> None:
 
 
 def manufactured_errors(body_mm: float) -> tuple[float, float]:
-    """Errors in L2 and H1 of a chosen smooth displacement, its body force applied, on a plate with a round hole."""
+    """Errors in L2 and H1 for a chosen smooth displacement, with its body force on a plate with a round hole."""
     E, nu = 1000.0, 0.3
     mesh = triangulate(region((True, box(0, 2, 0, 2)), (False, Ellipse((1, 1), (0.5, 0.5)))), 1.0, body_mm)
     plate = PlaneStressPlate(mesh, Material("unit", E, nu, 1.0, 1.0), 1.0)

@@ -1,4 +1,4 @@
-"""Propagated uncertainties against plain Monte Carlo of closed forms and of the frame."""
+"""Propagated uncertainties against plain Monte Carlo simulation of closed formulas and of the frame."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -36,7 +36,7 @@ def test_a_straight_figure_is_propagated_linearly() -> None:
 
 
 def test_a_bent_figure_is_sampled() -> None:
-    """x^-2.5 with 10 %: by two million draws of numpy's normal numbers."""
+    """x^-2.5 with 10 % uncertainty, compared with two million normal draws of numpy."""
     found = propagate(lambda by: {"y": (1.0 + by.get("x", 0.0)) ** -2.5}, {"x": Estimate(1.0, 0.1)}, samples=512)["y"]
     many = (1.0 + 0.1 * np.random.default_rng(5).standard_normal(2_000_000)) ** -2.5
     assert found.sampled
@@ -46,7 +46,7 @@ def test_a_bent_figure_is_sampled() -> None:
 
 
 def test_a_figure_at_its_extreme_has_an_uncertainty() -> None:
-    """x^2 at 0 has no slope: u^2 sqrt(2), all of it from bending."""
+    """x^2 at 0 has no slope: its uncertainty u^2 sqrt(2) comes from the curvature alone."""
     found = propagate(lambda by: {"y": 7.0 + by.get("x", 0.0) ** 2}, {"x": Estimate(0.0, 0.3)}, samples=1024)["y"]
     assert found.sampled
     assert found.u == pytest.approx(0.09 * np.sqrt(2.0), rel=0.1)
@@ -73,7 +73,7 @@ def test_numbers_that_leave_no_drawing_are_refused() -> None:
 
 @pytest.mark.slow
 def test_linear_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -> None:
-    """Gap and force by input, 600 drawings whose four numbers are changed by hand."""
+    """Gap and force per input, for 600 drawings with four randomly changed dimensions."""
     u = {"hinge.thickness_mm": 0.03, "hinge.radius_mm": 0.1, "material.youngs_modulus_mpa": 80.0, "body.plate_mm": 0.05}
     found = gripper_uncertainty(replace(gripper, uncertainties=MappingProxyType(u)), ENDS)
     rng = np.random.default_rng(11)
@@ -88,7 +88,7 @@ def test_linear_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -
         answer = small_answer(drawn, HingeTheory.CORRECTED)
         rows.append((answer.gap_per_input, answer.force_per_input_n_mm))
     gap, force = np.std(rows, axis=0)
-    # 600 draws know a standard deviation within 2.9 %.
+    # 600 draws determine a standard deviation within 2.9 %.
     assert found["gap_per_input"].u == pytest.approx(gap, rel=0.1)
     assert found["input_stiffness_n_mm"].u == pytest.approx(force, rel=0.1)
     assert not found["input_stiffness_n_mm"].sampled
@@ -98,11 +98,11 @@ def test_linear_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -
 @pytest.mark.slow
 @pytest.mark.long
 def test_sampled_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -> None:
-    """A printed hinge of 1.0 +- 0.1 mm: the compliance goes with t^-2.5 and is far from linear."""
+    """A printed hinge of 1.0 +- 0.1 mm: the compliance is proportional to t^-2.5, far from linear."""
     u = MappingProxyType({"hinge.thickness_mm": 0.1})
     found = gripper_uncertainty(replace(gripper, uncertainties=u), ENDS)["midline_by_weight_mm"]
     assert found.sampled
-    # The middles of 60 equal slices of the normal distribution: what many draws come to.
+    # The midpoints of 60 intervals of equal probability of the normal distribution replace many draws.
     shifts = [
         midline_by_weight_mm(
             LumpedGripper(replace(gripper, hinge=replace(gripper.hinge, thickness_mm=1.0 + 0.1 * z))).half

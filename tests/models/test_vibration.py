@@ -50,7 +50,7 @@ def modal_gap_mm(body: DrivenBody, drive: DriveHistory, damping: Damping | None 
 
 
 def oscillator(steps: int, radius: float = 0.8, ratio: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """One period of a unit mass on a unit spring, released from 1."""
+    """One period of a unit mass on a unit spring, released from a displacement of 1."""
     one = csr_matrix(np.eye(1))
     step_s = 2.0 * np.pi / steps
     motion = integrate(
@@ -80,7 +80,7 @@ def test_energy_dies_away_and_never_grows() -> None:
 
 
 def test_stepped_frame_and_modes_vibrate_alike(lumped: LumpedGripper) -> None:
-    """A ramp of 4 ms, then free vibration of the held body: modes against time steps in the deformed shape."""
+    """A ramp of 4 ms, then free vibration with held drive: modes against time steps in the deformed shape."""
     half = lumped.half
     step_s, rise_s = 5e-5, 4e-3
     time_s = np.arange(241) * step_s
@@ -121,13 +121,14 @@ def test_struck_gripper_rings_down_at_its_damping(lumped: LumpedGripper) -> None
 
 @pytest.mark.slow
 def test_fingers_driven_together_do_not_pass_through(gripper: Gripper) -> None:
-    half = LumpedGripper(gripper, bars_alone=True).half  # a third of the time of a meshed finger
+    half = LumpedGripper(gripper, bars_alone=True).half  # takes a third of the time of a meshed finger
     time_s = np.linspace(0.0, 0.06, 121)
     drive = DriveHistory(time_s, np.interp(time_s, [0.0, 0.02, 0.06], [0.0, -0.57, -0.57]))
     law = ModalDamping(0.1)
     gap, force = stepped_motion(half, drive, Physics(large_rotation=True, contact=True), law, 1e-4)
     through, _ = stepped_motion(half, drive, Physics(large_rotation=True), law, 1e-4)
-    # The penalty, 20 times the finger's own 2.6 N/mm, lets each finger sink in by its grip over 52 N/mm.
+    # With a penalty of 20 times the finger's stiffness of 2.6 N/mm, each finger penetrates by its grip divided by 52
+    # N/mm.
     assert gap.min() > -0.03
     assert force[-1] < -2.0
     assert through[-1] == pytest.approx(4.0 - 0.57 * 7.73, abs=0.05)

@@ -1,4 +1,4 @@
-"""Every test sees the installed plug-ins anew, and leaves none behind."""
+"""Fixture: every test searches for installed plug-ins again, and removes those that it adds."""
 
 import sys
 from collections.abc import Iterator

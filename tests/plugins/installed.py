@@ -34,12 +34,12 @@ def install(
     name: str = "fv-demo",
     requires: str = "fingervision",
 ) -> None:
-    """Put a distribution on the path.
+    """Put a distribution on the import path.
 
     Parameters
     ----------
     points : dict of str to dict of str to str
-        Entry points: by group, what each name stands for.
+        Entry points: by group, the object of each name.
     modules : dict of str to str
         Source of each module.
     """

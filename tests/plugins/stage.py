@@ -1,4 +1,4 @@
-"""A stage as its maker would plug it in: goes straight at the asked speed, on the bed's own clock."""
+"""A stage as a plug-in of its maker: it moves at the requested speed, on the test bed's clock."""
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section

@@ -1,4 +1,4 @@
-"""The contracts as an author of a plug-in meets them: sentences for what is wrong, nothing of pytest at import."""
+"""Contract tests from the view of a plug-in's author: failures are sentences, and pytest is not imported."""
 
 import subprocess
 import sys
@@ -124,7 +124,7 @@ def test_the_diagnosis_names_an_effect_of_ones_own(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("starts", [1, 12])
 def test_a_period_with_one_start_is_found_out(starts: int) -> None:
-    """A wave over the input: with one start its period is never found, and another effect is named instead."""
+    """For a wave over the input, one starting value is not enough to find the period, and another effect is named."""
 
     def act(input_mm, history, values):
         return input_mm + values["height_mm"] * np.sin(2.0 * np.pi * input_mm / values["period_mm"]) ** 3

@@ -1,4 +1,4 @@
-"""Stages, cameras and models of other distributions and of files; sources and parts of the report."""
+"""Stages, cameras and models of other distributions and of files; also frame sources and report sections."""
 
 import json
 from pathlib import Path

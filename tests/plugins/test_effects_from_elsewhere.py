@@ -1,4 +1,4 @@
-"""Effects of other distributions, of files and of this session: found, named, refused in a sentence."""
+"""Effects from other distributions, from files and from this session: found, named, or refused with a sentence."""
 
 import subprocess
 import sys

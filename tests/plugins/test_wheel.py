@@ -1,4 +1,4 @@
-"""A plug-in's wheel beside the project's: its effect found, named by diagnose; its stage driven by bed run."""
+"""A plug-in's wheel installed with that of the project: `diagnose` names its effect, and `bed run` drives its stage."""
 
 import csv
 import importlib.util
@@ -53,7 +53,7 @@ cycles = 2
 
 
 def built(source: Path, out: Path) -> Path:
-    """Build a wheel, without the network where the build backend is here."""
+    """Build a wheel, without network access if the build backend is installed."""
     isolation = ["--no-build-isolation"] if importlib.util.find_spec("hatchling") else []
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", *isolation, "-w", str(out), str(source)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -65,7 +65,7 @@ def built(source: Path, out: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give the command in an environment that holds both wheels, and borrows this one's libraries."""
+    """Return the command in an environment with both wheels, which uses the libraries of the present environment."""
     if importlib.util.find_spec("pip") is None:
         pytest.skip("pip is not here")
     folder = tmp_path_factory.mktemp("wheels")
@@ -89,7 +89,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def call(python: Path, folder: Path, *words: str) -> str:
-    """Run the command far from the sources."""
+    """Run the command in a folder outside the sources."""
     clean = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
     command = [str(python), "-m", "fingervision", *words]
     done = subprocess.run(command, cwd=folder, env=clean, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""Beds with the emulated board: its wiring, the steps in its motor controller, and their configuration."""
+"""Configuration files of test beds with the emulated board: wiring, steps of the motor controller, and the bed."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -38,7 +38,7 @@ newtons = [0.0, 5.0]
 force_n = 3.0
 upper_mm = 9.5
 """
-# What the contract of an actuator asks for; step n has code n, homing code 0. Step 8 is for jogs.
+# Steps for all motions in the contract tests of actuators; step n has code n, homing code 0. Step 8 is for jogs.
 SPEEDS = ((0.0, 2.0), (0.5, 2.0), (-0.2, 2.0), (1.0, 2.0), (0.7, 2.0), (0.5, 1.0), (1.0, 1.0), (5.0, 0.5))
 CONTRACT_STEPS = "schema = 1\n" + "".join(
     f"[[step]]\ntarget_mm = {target_mm}\nload_kg = 0.1\nspeed_mm_s = {speed_mm_s}\nacceleration_mm_s2 = 1000.0\n"
@@ -48,7 +48,7 @@ CONTRACT_STEPS = "schema = 1\n" + "".join(
 
 
 def written_bed(folder: Path, port: str, steps: str, lower_mm: float = 0.0) -> Path:
-    """Write the files of a bed; give its configuration."""
+    """Write the files of a test bed; return the path of its configuration."""
     (folder / "steps.toml").write_text(steps, encoding="utf-8")
     (folder / "board.toml").write_text(BOARD.format(port=port), encoding="utf-8")
     (folder / "bed.toml").write_text(BED.format(lower_mm=lower_mm), encoding="utf-8")
@@ -56,7 +56,7 @@ def written_bed(folder: Path, port: str, steps: str, lower_mm: float = 0.0) -> P
 
 
 def times_of(path: Path) -> Callable[[int], float]:
-    """How long a motor controller with these steps is busy with each code, from wherever it stands."""
+    """Duration for which a motor controller with these steps is busy with each code, from its present position."""
     data: StepData = read_steps(path)
     at_mm = data.start_mm
 

@@ -1,4 +1,4 @@
-"""Boards for the tests of the bed: the real sketch, emulated."""
+"""Fixtures for tests of the test bed: boards that run the real sketch on an emulated chip."""
 
 from collections.abc import Iterator
 from io import StringIO
@@ -13,7 +13,7 @@ from fingervision.testbed.manual import manual_control
 from tests.testbed.board_bed import CONTRACT_STEPS, times_of, written_bed
 from tests.testbed.emulated_board import EmulatedBoard, MotorController, compiled, missing_tools, running
 
-# In slow motion, so that a loaded machine is fast enough for the emulated board.
+# Factor by which the emulated board runs slower than real time, so that a loaded computer is fast enough for it.
 SLOWER = 3
 
 
@@ -28,7 +28,7 @@ def sketch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 @pytest.fixture
 def emulated(sketch: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> Iterator[EmulatedBoard]:
-    """A board that was just switched on; its time stands while a byte is under way."""
+    """A board that was just switched on; its time stops while a byte is being transferred."""
     with running(sketch, SLOWER) as board:
         opened = "fingervision.testbed.board.board.opened_port"
         monkeypatch.setattr(opened, lambda name: board.shared.counted(opened_port(name)))
@@ -37,7 +37,7 @@ def emulated(sketch: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> Iter
 
 @pytest.fixture
 def homed_board_bed(emulated: EmulatedBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bed]:
-    """A bed whose motor controller behind the board stands at its reference; who uses it closes it."""
+    """A test bed with an emulated board whose stage is at its reference; the test closes the bed."""
     monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: emulated.clock)
     bed_toml = written_bed(tmp_path, emulated.port, CONTRACT_STEPS, lower_mm=-1.0)
     controller = MotorController(emulated, times_of(tmp_path / "steps.toml"))
@@ -49,7 +49,7 @@ def homed_board_bed(emulated: EmulatedBoard, tmp_path: Path, monkeypatch: pytest
 
 @pytest.fixture
 def hand_screw_bed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bed:
-    """A bed with a hand screw and somebody who always turns it to where it is wanted."""
+    """A test bed with a hand screw and a simulated user who always turns it to the requested position."""
     (tmp_path / "bed.toml").write_text('schema = 1\n[actuator]\nkind = "hand_screw"\nlower_mm = -1.0\nupper_mm = 6.0\n')
     monkeypatch.setattr("sys.stdin", StringIO("\n" * 100))
     return open_bed(str(tmp_path / "bed.toml"))

@@ -1,4 +1,4 @@
-"""The real sketch on an emulated ATmega328P, with a motor controller and a force on its pins."""
+"""The real sketch on an emulated ATmega328P, with a motor controller and a force signal on its pins."""
 
 import shutil
 import subprocess
@@ -23,9 +23,10 @@ CORE_FILES = (
     "abi.cpp", "new.cpp", "WString.cpp",
 )  # fmt: skip
 HERTZ = 16_000_000
-# What the force sensor's amplifier gives without a load: a live zero.
+# Output of the force sensor's amplifier without a load (live zero).
 UNLOADED_MV = 500
-# The host's clock began at another time than the board's, whose resonator is fast by as much as one may be.
+# Offset of the host's clock from the board's clock, and host seconds per board second: the board's resonator is slow by
+# its largest tolerance.
 BEGAN_S, CRYSTAL_SLOW_BY = 5000.0, 1.005
 
 WIRING = {
@@ -40,7 +41,7 @@ WIRING = {
 
 
 def missing_tools() -> str | None:
-    """Why the sketch cannot be run here; None if it can."""
+    """Reason why the sketch cannot be run on this computer; None if it can."""
     tools = [tool for tool in ("gcc", "avr-gcc", "avr-g++") if shutil.which(tool) is None]
     if not ARDUINO.is_dir():
         tools.append("arduino-core-avr")
@@ -50,12 +51,12 @@ def missing_tools() -> str | None:
 
 
 def compiled(folder: Path) -> tuple[Path, Path]:
-    """The host that runs a sketch, and the sketch."""
+    """Compile the emulator program and the sketch; return the paths of both."""
     host, elf = folder / "avrhost", folder / "board.elf"
     _run("gcc", "-O2", "-I/usr/include/simavr", "-o", host, HERE / "avrhost.c", "-lsimavr", "-lelf", "-lutil")
     common = (
         "-mmcu=atmega328p", f"-DF_CPU={HERTZ}UL", "-DARDUINO=10819", "-DARDUINO_AVR_UNO", "-DARDUINO_ARCH_AVR",
-        # gcc-avr 5 lacks the name that WString.cpp uses.
+        # gcc-avr 5 does not define this name, which WString.cpp uses.
         "-DDECIMAL_DIG=__DECIMAL_DIG__", f"-I{ARDUINO}/cores/arduino", f"-I{ARDUINO}/variants/standard", "-Os",
         "-ffunction-sections", "-fdata-sections", "-c",
     )  # fmt: skip
@@ -81,7 +82,7 @@ def _run(*words: str | Path) -> None:
 class Edge:
     """A change of a port's registers.
 
-    `host_s` is the time of it on the host's clock.
+    `host_s` is the time of the change on the host's clock.
     """
 
     cycle: int
@@ -90,18 +91,19 @@ class Edge:
     directions: dict[str, int]
 
     def level(self, pin: int) -> int | None:
-        """Level that the board drives a pin to; None if it is an input."""
+        """Level to which the board drives a pin; None if the pin is an input."""
         letter, bit = ("D", pin) if pin < 8 else ("B", pin - 8) if pin < 14 else ("C", pin - 14)
         return self.ports[letter] >> bit & 1 if self.directions[letter] >> bit & 1 else None
 
 
 class Shared:
-    """Numbers that emulator and computer share: the cycle, and how many bytes went out and in at either end.
+    """Numbers in memory shared by emulator and computer: the cycle, and the numbers of bytes sent and received at each
+    end.
 
     Parameters
     ----------
     path : Path
-        Of the file that both map.
+        File that the emulator and this process map into memory.
     """
 
     CYCLE, OUT, IN, READ, WRITTEN = range(5)
@@ -119,7 +121,7 @@ class Shared:
         self._shared[8 * which : 8 * which + 8] = value.to_bytes(8, "little")
 
     def counted(self, port: serial.Serial) -> serial.Serial:
-        """Count what goes through an open port from now on."""
+        """Count the bytes that pass an open port from now on; return this port."""
         self[self.READ], self[self.WRITTEN] = self[self.OUT], self[self.IN]
         read, write, close = port.read, port.write, port.close
 
@@ -142,41 +144,41 @@ class Shared:
 
 
 class EmulatedTime:
-    """A host's clock that goes with the emulated crystal, however fast the emulator gets on.
+    """A clock of the host that follows the emulated crystal, independent of the speed of the emulation.
 
     Parameters
     ----------
     shared : Shared
-        Where the emulator shows its cycle.
+        Shared memory to which the emulator writes its cycle.
     """
 
     def __init__(self, shared: Shared) -> None:
         self._shared = shared
 
     def now_s(self) -> float:
-        """Seconds."""
+        """Present time in seconds."""
         return self.at(self._shared[Shared.CYCLE])
 
     def wait_until(self, time_s: float) -> None:
-        """Sleep until then."""
+        """Sleep until a time of this clock."""
         while self.now_s() < time_s:
             sleep(1e-3)
 
     def at(self, cycle: int) -> float:
-        """Seconds at a cycle of the crystal."""
+        """Time of this clock at a cycle of the crystal."""
         return BEGAN_S + CRYSTAL_SLOW_BY * cycle / HERTZ
 
 
 class EmulatedBoard:
-    """A running board, wired as `WIRING` says.
+    """A running board with the wiring in `WIRING`.
 
     Parameters
     ----------
     host, elf : Path
-        As `compiled` makes them.
+        Paths returned by `compiled`.
     slower : int
-        How many times slower than in truth. Emulating takes most of a processor in real time; in slow motion, with the
-        computer's side of the connection living in `clock`, the same happens on a machine that has other work.
+        Factor by which the emulation is slower than real time. Emulation in real time takes most of a processor. If it
+        is slower, and the host uses `clock`, the sequence of events is the same on a loaded computer.
     """
 
     def __init__(self, host: Path, elf: Path, slower: int) -> None:
@@ -202,11 +204,11 @@ class EmulatedBoard:
         self._thread.start()
 
     def settings(self, **others: int) -> BoardSettings:
-        """Settings for it."""
+        """Settings with which the package opens this board."""
         return BoardSettings(port=self.port, lines=WIRING, **others)
 
     def say(self, words: str) -> int:
-        """Tell the host to change something outside; give the number of that command."""
+        """Send a command to the emulator program, to change an input of the board; return the number of the command."""
         assert self._process.stdin is not None
         with self._news:
             self._process.stdin.write(words + "\n")
@@ -214,18 +216,18 @@ class EmulatedBoard:
             return self._said - 1
 
     def done_s(self, command: int) -> float:
-        """Wait until a command was done; when that was, on the host's clock."""
+        """Wait until a command was executed; return the time on the host's clock."""
         with self._news:
             self._news.wait_for(lambda: len(self._done_s) > command)
             return self._done_s[command]
 
     def outside(self, role: Role, on: bool) -> None:
-        """Let a line from the motor controller say yes or no."""
+        """Set a line from the motor controller active or inactive."""
         line = WIRING[role]
         self.say(f"pin {line.pin} {int(on == line.active_high)}")
 
     def wait_for(self, edge: Callable[[Edge], bool], within_s: float = 5.0, since: int = 0) -> Edge:
-        """The first change from `since` on for which something holds."""
+        """First change, from index `since` on, that satisfies a condition."""
         until_s = self.clock.now_s() + within_s
         with self._news:
             while True:
@@ -236,7 +238,7 @@ class EmulatedBoard:
                 self._news.wait(0.05)
 
     def close(self) -> None:
-        """Switch it off."""
+        """Switch the board off."""
         self._process.kill()
         self._process.wait()
         self._thread.join()
@@ -277,14 +279,15 @@ class EmulatedBoard:
 
 
 class MotorController:
-    """Answers the drive line with busy, for a while, as a motor controller does; the force sensor is not loaded.
+    """Emulated motor controller: it sets the busy line for a while after the drive line was set; the force sensor has
+    no load.
 
     Parameters
     ----------
     board : EmulatedBoard
-        Whose lines it is on.
+        Board to which the motor controller is connected.
     seconds : callable
-        How long a step of a code takes.
+        Duration of the step with a given code, in seconds.
     """
 
     def __init__(self, board: EmulatedBoard, seconds: Callable[[int], float]) -> None:
@@ -307,7 +310,7 @@ class MotorController:
             self._begin(code)
         elif before.level(drive) == 1 and now.level(drive) != 1:
             with self._news:
-                if self._until_s is not None:  # the drive line was dropped in the middle of a motion
+                if self._until_s is not None:  # the board released the drive line during a motion
                     self._until_s = self._board.clock.now_s()
                     self._news.notify_all()
 
@@ -328,7 +331,7 @@ class MotorController:
                     self._news.wait(left_s)
 
     def close(self) -> None:
-        """End its thread."""
+        """End the thread of the motor controller."""
         with self._news:
             self._closed = True
             self._news.notify_all()
@@ -337,7 +340,7 @@ class MotorController:
 
 @contextmanager
 def running(host_and_sketch: tuple[Path, Path], slower: int = 1) -> Iterator[EmulatedBoard]:
-    """A board that is switched off at the end."""
+    """Context with a running board, which is switched off at the end."""
     board = EmulatedBoard(*host_and_sketch, slower)
     try:
         yield board

@@ -1,4 +1,4 @@
-"""Recipes and beds for the tests of runs."""
+"""Recipes and simulated test beds for tests of runs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.recipe_run import RunDone, run_recipe
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 
-# One second of motion, then a few points: the shortest run that has everything to break off in.
+# One second of motion, then a few points at rest: the shortest run with every kind of phase that can be interrupted.
 SHORT = """
 schema = 1
 name = "short"
@@ -46,7 +46,7 @@ def recipe_at(folder: Path, text: str = SHORT) -> Path:
 
 
 def steps(*tables: str) -> str:
-    """A recipe of steps, each `key = value` lines."""
+    """Text of a recipe; each step is given as lines `key = value`."""
     return "schema = 1\n" + "".join(f"\n[[step]]\n{table}\n" for table in tables)
 
 
@@ -57,7 +57,7 @@ def run(
     bed_name: str = "simulated",
     say: Callable[[str], None] = lambda words: None,
 ) -> RunDone:
-    """Run a recipe on a bed into a folder named run."""
+    """Run a recipe on a test bed and write the results to a folder named run."""
     bed = open_bed(bed_name, hidden)
     try:
         return run_recipe(read_recipe(recipe_at(folder, text)), bed, folder / "run", hidden, say=say)
@@ -83,7 +83,7 @@ upper_mm = 1.4
 
 
 def live_camera_at(folder: Path) -> Path:
-    """A bed with a simulated stage and a camera that goes on by itself, so that nothing of it can be played again."""
+    """A test bed with a simulated stage and a camera that runs continuously, so that a run cannot be replayed."""
     path = folder / "live.toml"
     path.write_text(LIVE_CAMERA, encoding="utf-8")
     return path

@@ -1,4 +1,4 @@
-"""What cannot be run is said in a sentence, and nothing moves."""
+"""A request that cannot be run is refused with one sentence, and nothing moves."""
 
 import json
 import shutil
@@ -140,7 +140,7 @@ def test_a_camera_that_sees_no_fingers_lets_nothing_move(tmp_path: Path) -> None
     with pytest.raises(DeviceError, match="The camera must show both fingers before anything moves, but does not"):
         run_recipe(read_recipe(recipe_at(tmp_path, steps(MOVE))), bed, tmp_path / "run")
     assert bed.actuator.readings()[-1].value == 0.0
-    # Nothing was recorded: with the view mended, the same folder will do.
+    # Nothing was recorded, so that the same folder can be used after the view was corrected.
     config.write_text(BED.format(camera="", gap_mm=0.0))
     assert run(tmp_path, steps(MOVE), bed_name=str(config)).resumed_after == 0
 
@@ -170,7 +170,7 @@ def test_a_stage_of_unknown_place_is_not_homed_before_the_fingers_were_seen(tmp_
 
 def test_a_gap_below_the_limit_stops_the_motor(tmp_path: Path) -> None:
     config = tmp_path / "narrow.toml"
-    # By the drawing the gap stays above; what is hidden is not foreseen.
+    # According to the drawing, the gap stays above the limit; the plan does not include added effects.
     config.write_text(BED.format(camera="", gap_mm=2.0))
     text = steps('kind = "move"\nto_mm = -0.25\nspeed_mm_s = 0.5')
     hidden = Hidden({"rest_gap_error": {"offset_mm": -0.5}})

@@ -1,4 +1,4 @@
-"""A run that is killed at any moment is valid, loses a second at most, and comes to the same end as a whole one."""
+"""A run that is killed at any moment is valid, loses at most a second, and ends with the results of a complete run."""
 
 import json
 import os
@@ -22,7 +22,7 @@ PATIENCE_S = 120.0
 
 
 def killed(recipe: Path, out: Path, after_s: float) -> int:
-    """Kill a run so long after its first frames; how many had been written when it was killed, at least."""
+    """Kill a run some time after its first frames; return the least number of frames that had been written by then."""
     words = [sys.executable, "-m", "fingervision", "bed", "run", str(recipe), "--out", str(out), *PACE]
     process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     until_s = time.monotonic() + PATIENCE_S
@@ -49,9 +49,11 @@ def test_a_killed_run_is_gone_on_with_to_the_same_end(tmp_path: Path, whole: byt
         folder.mkdir()
         in_video = killed(recipe_at(folder), folder / "run", float(rng.uniform(0.0, 2.0)))
         rows = read_samples(folder / "run" / "samples.csv")
-        # Rows wait half a second for company; their pictures are in the video by then.
+        # Rows are written in groups every half second; their frames are in the video before.
         assert in_video - len(rows) <= LOST_AT_MOST_S * 25.0
-        if not json.loads((folder / "run" / "run.json").read_text())["complete"]:  # a busy machine is late to kill
+        if not json.loads((folder / "run" / "run.json").read_text())[
+            "complete"
+        ]:  # on a loaded computer, the run may end before it is killed
             assert run(folder).resumed_after == min(len(rows), in_video)
         assert (folder / "run" / "samples.csv").read_bytes() == whole
         assert frames_in(folder / "run" / "video.mp4") == len(read_samples(folder / "run" / "samples.csv"))
@@ -76,7 +78,7 @@ def test_half_a_row_and_half_an_event_are_cut_off(tmp_path: Path, whole: bytes) 
 
 
 def test_ctrl_c_ends_a_run_in_a_sentence(tmp_path: Path) -> None:
-    # It never ends by itself before somebody has pressed.
+    # The run is so long that it does not end before a key is pressed.
     recipe = recipe_at(tmp_path, steps('kind = "hold"\nat_mm = 0.2\nseconds = 60.0'))
     words = [sys.executable, "-m", "fingervision", "bed", "run", str(recipe), "--out", str(tmp_path / "run"), *PACE]
     process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)

@@ -1,4 +1,6 @@
-"""Every actuator, force sensor and camera keeps its protocol; a part without hardware joins by being listed."""
+"""Contract tests for every actuator, force sensor and camera; a new part without hardware is tested if it is listed
+here.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -12,7 +14,7 @@ from fingervision.testbed.bed_factory import open_bed
 from fingervision.testing import ActuatorContract, CameraContract, ForceSensorContract, NotApplicable, checks_of
 from tests.testbed.simulated_beds import live_camera_at
 
-# A part is looked at through a bed that it belongs to.
+# A part is tested as a part of a test bed.
 BEDS: dict[str, Callable[[pytest.FixtureRequest], Bed]] = {
     "simulated": lambda request: open_bed("simulated"),
     "board": lambda request: request.getfixturevalue("homed_board_bed"),
@@ -23,7 +25,7 @@ BEDS: dict[str, Callable[[pytest.FixtureRequest], Bed]] = {
 
 @pytest.fixture
 def source_bed(tmp_path: Path) -> Bed:
-    """A camera that goes on by itself, on the host's clock."""
+    """A camera that runs continuously, with times on the host's clock."""
     return open_bed(str(live_camera_at(tmp_path)))
 
 

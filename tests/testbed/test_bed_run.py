@@ -1,4 +1,6 @@
-"""A run on the simulated bed: its table is true, its video gives the same numbers, and nothing depends on luck."""
+"""A run on the simulated test bed: the table is correct, its video gives the same values, and the results are
+repeatable.
+"""
 
 import json
 from pathlib import Path
@@ -17,9 +19,11 @@ from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.testbed.simulated_beds import recipe_at, run, steps
 
-# Frames of 640 columns with 2 grey levels of noise: 0.014 px of each gap, 0.4 um; five of them, and the stage's place.
+# Frames of 640 columns with noise of 2 grey levels: 0.014 px of each gap, 0.4 um. The tolerance is five times that, and
+# the uncertainty of the stage's position.
 GAP_MM = 0.004
-# Motions of a sine are too short for the stage's place between two steps of its encoder: one step, 7.75 mm a mm.
+# Motions of a sine are too short to interpolate the position between two steps of the encoder: one step, times 7.75 mm
+# of gap per mm.
 WITHIN_A_STEP_MM = 0.03 * 7.75
 
 
@@ -41,7 +45,7 @@ def test_runs_points_and_clocks_are_as_the_recipe_says(short: Path) -> None:
     rows = read_samples(short / "samples.csv")
     assert {row.run for row in rows} == {"1", "2 rezeroed"}
     assert [row.frame for row in rows] == list(range(len(rows)))
-    # Three levels with three frames each, once the picture was still.
+    # Three levels with three frames each, which are recorded after the picture came to rest.
     levels = [row for row in rows if row.step == 2]
     assert len(levels) == 9
     for k in range(3):
@@ -93,10 +97,11 @@ def test_every_kind_of_step_is_done(tmp_path: Path) -> None:
     assert np.max(np.abs(gaps - model.respond(inputs).gap_mm)) < WITHIN_A_STEP_MM
     assert {row.run for row in rows} == {"1", "2 turned", "4"}  # nothing was recorded in run 3
     (slot,) = json.loads((tmp_path / "run" / "run.json").read_text())["reference_slots"]
-    # 0.01 px of each edge, at 34 px/mm.
+    # An error of 0.01 px of each edge, at 34 px/mm.
     assert slot["measured_mm"] == pytest.approx(4.0, abs=5e-4)
     assert said == [f"The slot of 4 mm measures {with_uncertainty(slot['measured_mm'], slot['u_random_mm'])} mm."]
-    # Closed at 0.5 mm/s until the spring gave 0.5 N (2.08 N/mm): the stage stands within a frame's way of that.
+    # The gripper closed at 0.5 mm/s until the force was 0.5 N (2.08 N/mm): the stage is within the distance of one
+    # frame.
     assert rows[-1].input_mm == pytest.approx(-0.24, abs=0.05)
 
 
@@ -120,7 +125,7 @@ def test_what_is_hidden_acts_where_it_belongs(tmp_path: Path) -> None:
     drift = tables["camera_drift"]
     assert drift.midline_mm is not None
     assert drift.time_s is not None
-    # What drifts does so since the stage first moved; the first rows are at rest.
+    # The drift starts with the first motion of the stage; in the first rows the stage is at rest.
     moved = drift.time_s > 0.3
     assert np.polyfit(drift.time_s[moved], drift.midline_mm[moved], 1)[0] == pytest.approx(0.05, rel=0.02)
     assert np.median(drift.gap_mm - bare.gap_mm) == pytest.approx(0.0, abs=GAP_MM)
@@ -139,7 +144,7 @@ def test_a_run_that_follows_another_goes_on_on_its_clock(tmp_path: Path) -> None
     assert table.shared_clock
     assert table.time_s is not None
     assert table.midline_mm is not None
-    # The camera went on drifting in between.
+    # The camera also drifted between the runs.
     moved = table.time_s > 0.3
     assert np.polyfit(table.time_s[moved], table.midline_mm[moved], 1)[0] == pytest.approx(0.05, rel=0.02)
     assert (first / "samples.csv").read_bytes() != (second / "samples.csv").read_bytes()

@@ -1,4 +1,4 @@
-"""A motor controller behind the real sketch: what it is asked for, in which order, and what happens when it fails."""
+"""The actuator of the board with the real sketch: requests to the motor controller, their order, and faults."""
 
 import os
 import signal
@@ -17,9 +17,10 @@ from fingervision.testbed.bed_factory import open_bed
 from tests.testbed.board_bed import written_bed
 from tests.testbed.emulated_board import HERTZ, Edge, EmulatedBoard, MotorController
 
-# Every motion of these tests ends long before.
+# Time limit that is far longer than every motion in these tests.
 SOON_S = 5.0
-# A sample's age when it is read: 5 ms to the next one, 10 ms between looks, and what the wire and a busy host add.
+# Age of a sample when it is read: 5 ms to the next sample, 10 ms between queries, and delays of the line and of a
+# loaded host.
 MOST_DELAY_S = 0.05
 # Steps 1 to 6; step n has code n, homing code 0.
 STEPS = """schema = 1
@@ -81,14 +82,14 @@ def bed_toml(
 
 @pytest.fixture
 def bed(bed_toml: Path) -> Iterator[Bed]:
-    """A bed with that board."""
+    """A test bed with the emulated board."""
     bed = open_bed(str(bed_toml))
     yield bed
     bed.close()
 
 
 def stands(bed: Bed) -> float:
-    """Wait for the end of the motion; where it stands then."""
+    """Wait for the end of the motion; return the position."""
     until_s = bed.clock.now_s() + SOON_S
     while bed.actuator.busy:
         assert bed.clock.now_s() < until_s
@@ -125,10 +126,11 @@ def test_positions_follow_the_profile_of_the_step(bed: Bed) -> None:
     values = [reading.value for reading in readings]
     assert times == sorted(times)
     assert values == sorted(values)
-    # A triangle: half of the way at half of the time, a quarter of its half at a quarter.
+    # Triangular speed profile: half of the distance at half of the time, an eighth of the distance at a quarter of the
+    # time.
     at_half = next(reading for reading in readings if reading.value >= 4.5)
     at_eighth = next(reading for reading in readings if reading.value >= 9.0 / 8.0)
-    assert at_half.device_s - at_eighth.device_s == pytest.approx(0.1, abs=0.006)  # read every 5 ms
+    assert at_half.device_s - at_eighth.device_s == pytest.approx(0.1, abs=0.006)  # readings are 5 ms apart
 
 
 def test_a_move_that_no_step_makes_is_refused_before_anything_moves(bed: Bed, controller: MotorController) -> None:
@@ -189,7 +191,7 @@ def test_force_samples_keep_coming_while_a_stop_is_confirmed(bed: Bed, controlle
     began_s = bed.clock.now_s()
     bed.actuator.stop()
     while bed.clock.now_s() < began_s + 0.2:
-        # Answers to a stop in each turn of the link took 100 ms.
+        # Readings were delayed by 100 ms when the link answered a stop in each of its cycles.
         assert bed.clock.now_s() - bed.force_sensor.readings()[-1].got_s < MOST_DELAY_S
         bed.clock.wait_until(bed.clock.now_s() + 0.01)
 
@@ -233,8 +235,8 @@ def test_force_is_what_the_table_says_of_the_voltage(bed: Bed, emulated: Emulate
         wait_until(bed, lambda newton=newton: abs(bed.force_sensor.readings()[-1].value - newton) < 0.01)  # type: ignore[misc, union-attr]
     reading = bed.force_sensor.readings()[-1]
     assert reading.asked_s <= reading.got_s
-    # A step of 10 bits over 5 V is 6.1 mN with this table. Half of it is the most that the middle of a step errs, and
-    # the emulator counts 1023 steps where the chip has 1024, which is one more.
+    # One step of 10 bits over 5 V is 6.1 mN with this table. The middle of a step has an error of at most half a step.
+    # The emulator counts 1023 steps where the chip counts 1024, which adds one step.
     assert reading.value == pytest.approx(5.5, abs=0.0092)
 
 
@@ -242,7 +244,8 @@ def test_a_jog_repeats_relative_steps_until_the_limit_of_the_bed(bed_toml: Path,
     bed_toml.write_text(bed_toml.read_text(encoding="utf-8").replace("upper_mm = 9.5", "upper_mm = 4.0"))
     done = CliRunner().invoke(cli, ["bed", "jog", "20", "--home-first", "--bed", str(bed_toml)])
     assert done.exit_code == 0, done
-    # It is stopped a tenth of a second before 4 mm at 20 mm/s, in the step from 2 mm or, if late, in the next.
+    # The stage is stopped a tenth of a second before 4 mm at 20 mm/s, during the step from 2 mm or, on a loaded
+    # computer, during the next step.
     stood_mm = float(done.output.removeprefix("jogged: ").removesuffix(" mm\n"))
     assert 2.0 <= stood_mm <= 3.0
     assert set(controller.codes) == {0, 3}
@@ -277,7 +280,7 @@ def test_ctrl_c_stops_the_motor_before_anything_else(
     done = CliRunner().invoke(cli, ["bed", "move", "9", "--speed-mm-s", "50", "--bed", str(bed_toml)])
     assert str(done.exception).startswith("Stopped: the motor has stopped near ")
     down = emulated.wait_for(lambda edge: edge.cycle > began[0] and edge.level(6) == 0)
-    # The step takes 0.4 s; a word to the board some milliseconds.
+    # The step takes 0.4 s; a message to the board takes some milliseconds.
     assert (down.cycle - began[0]) / HERTZ < 0.2
 
 
@@ -301,7 +304,7 @@ def test_one_board_serves_both_parts_and_both_let_go(bed: Bed) -> None:
     assert isinstance(bed.actuator, BoardActuator)
     assert bed.force_sensor is not None
     bed.force_sensor.close()
-    bed.actuator.home()  # the board is still there
+    bed.actuator.home()  # the board is still connected
     assert stands(bed) == 0.0
 
 

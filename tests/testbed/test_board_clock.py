@@ -1,4 +1,4 @@
-"""The board's clock joined to the host's: true, and as sure as it says."""
+"""The board's clock converted to the host's clock: the times are correct within their stated uncertainty."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ ASK_EVERY_S = 0.02
 
 
 def joined(rng: np.random.Generator, seconds: float, *, least_s: float = 3e-4, mean_s: float = 2e-3) -> JoinedClock:
-    """A clock from exchanges whose delays either way are random above a least one."""
+    """Converted clock from message exchanges; the delay of each message is random above a minimum."""
     join = ClockJoin()
     for board_s in np.arange(0.0, seconds, ASK_EVERY_S):
         there_s, back_s = least_s + rng.exponential(mean_s, 2)
@@ -33,7 +33,7 @@ def test_the_truth_lies_within_the_bounds_and_within_two_milliseconds() -> None:
 
 
 def test_the_stated_uncertainty_covers() -> None:
-    """An even distribution lies within 1 u in 58 % of cases, within 2 u always; the bounds are wider than that."""
+    """A uniform distribution lies within 1 u in 58 % of cases and always within 2 u; the bounds are wider."""
     rng = np.random.default_rng(8)
     clocks = [joined(rng, 3.0) for _ in range(200)]
     within = [abs(each.host_at(3.0) - BEGAN_S - RATE * 3.0) <= each.u_at(3.0) for each in clocks]
@@ -75,7 +75,7 @@ def test_a_shift_of_either_clock_shifts_the_answer_by_as_much() -> None:
 
 
 def test_one_exchange_that_belies_all_others_changes_little() -> None:
-    """A host whose clock was set, or that slept."""
+    """The cause may be a host whose clock was set or that was suspended."""
     rng = np.random.default_rng(3)
     join = ClockJoin()
     for number in range(500):

@@ -1,4 +1,4 @@
-"""The board's sketch, run as it is on an emulated chip: what its pins do, and what it says."""
+"""The unchanged sketch of the board on an emulated chip: levels of its pins and its messages."""
 
 import re
 from collections.abc import Iterator
@@ -16,9 +16,9 @@ from tests.testbed.emulated_board import HERTZ, WIRING, Edge, EmulatedBoard, Mot
 
 SELECT_PINS = [WIRING[role].pin for role in SELECT]
 DRIVE_PIN, ENABLE_PIN, HOLD_PIN = WIRING[Role.DRIVE].pin, WIRING[Role.ENABLE].pin, WIRING[Role.HOLD].pin
-# The board's tick.
+# Period of the board's timer interrupt.
 TICK_S = 1e-3
-# The board's microseconds count in steps of 4, and an interrupt may wait for another.
+# The board counts microseconds in steps of 4, and an interrupt may wait for another interrupt.
 INTERRUPT_S = 50e-6
 
 
@@ -32,7 +32,7 @@ def controller(emulated: EmulatedBoard) -> Iterator[MotorController]:
 
 @pytest.fixture
 def board(emulated: EmulatedBoard, controller: MotorController) -> Iterator[Board]:
-    """The board, set up; with more patience than usual, since a loaded machine may keep it waiting."""
+    """The configured board, with a longer time limit than usual, because a loaded computer may answer late."""
     board = opened(emulated.settings(silence_ms=400), emulated.clock).hold()
     board.clear()
     yield board
@@ -41,7 +41,7 @@ def board(emulated: EmulatedBoard, controller: MotorController) -> Iterator[Boar
 
 @pytest.fixture
 def strict_board(emulated: EmulatedBoard, controller: MotorController) -> Iterator[Board]:
-    """The board with its usual patience."""
+    """The configured board with its usual time limit."""
     board = opened(emulated.settings(), emulated.clock).hold()
     board.clear()
     yield board
@@ -69,11 +69,11 @@ def test_select_lines_change_at_once_then_settle_then_drive(emulated: EmulatedBo
     board.run(0b1011, 1.0)
     drive = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 1, since=since)
     before = emulated.edges[since : emulated.edges.index(drive)]
-    # One write sets all select lines: no code in between is ever seen.
+    # One write sets all select lines, so that no intermediate code occurs.
     assert {selected(edge) for edge in before} <= {0, 0b1011}
     assert selected(drive) == 0b1011
     settled = next(edge for edge in before if selected(edge) == 0b1011)
-    # No shorter than was set, and no longer than by the tick under way.
+    # The settling time is at least the set value, and longer by at most one period of the timer.
     assert 5 * TICK_S - INTERRUPT_S <= (drive.cycle - settled.cycle) / HERTZ <= 6 * TICK_S + INTERRUPT_S
 
 
@@ -120,7 +120,7 @@ def test_a_silent_computer_loses_the_drive_line_within_a_tenth_of_a_second(
     monkeypatch.setattr(link, "_send", muted)
     since = len(emulated.edges)
     down = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 0, since=since)
-    # The last word before the first that was not sent is one period of asking older.
+    # The last message that was sent is one polling period older than the first message that was not sent.
     assert down.host_s - sent_s[0] <= 0.1
     assert emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 0, since=since).cycle - down.cycle < HERTZ * TICK_S
     monkeypatch.setattr(link, "_send", send)
@@ -134,13 +134,15 @@ def test_a_silent_computer_loses_the_drive_line_within_a_tenth_of_a_second(
 def test_a_silent_computer_loses_the_standing_motor_too_but_later(
     emulated: EmulatedBoard, strict_board: Board, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ten times the silence: a standing motor is no danger, and a computer may be held up for a moment."""
+    """The limit is ten times that during motion: a motor at rest is no danger, and a computer may be delayed for a
+    moment.
+    """
     emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 1)
     since, before_s = len(emulated.edges), emulated.clock.now_s()
     monkeypatch.setattr(strict_board._link, "_send", lambda line: None)
     after_s = emulated.clock.now_s()
     down = emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 0, since=since)
-    # The last word was said up to a period of asking before, or while the computer's mouth was shut.
+    # The last message was sent up to one polling period before sending was blocked, or during the blocking.
     assert down.host_s - before_s >= 0.8 - 2 * ASK_EVERY_S
     assert down.host_s - after_s <= 0.8 + ASK_EVERY_S
     monkeypatch.undo()
@@ -156,7 +158,7 @@ def test_a_motion_that_takes_too_long_loses_the_drive_line(emulated: EmulatedBoa
 
 def test_a_slow_motion_may_take_minutes(emulated: EmulatedBoard, board: Board) -> None:
     since = len(emulated.edges)
-    board.run(3, 66.0)  # 66.000 s less the 65.536 s that 16 bits of milliseconds hold are 0.464 s
+    board.run(3, 66.0)  # with 16 bits of milliseconds (65.536 s), 66.000 s would be taken as 0.464 s
     up = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 1, since=since)
     emulated.clock.wait_until(up.host_s + 0.6)
     assert emulated.edges[-1].level(DRIVE_PIN) == 1
@@ -169,7 +171,7 @@ def test_force_is_sampled_at_its_rate_without_loss_and_converted_rightly(emulate
     emulated.clock.wait_until(emulated.clock.now_s() + 1.0)
     samples = board.samples()
     assert board.lost_samples == 0
-    # 1234 mV of 5000 mV on 1024 steps.
+    # 1234 mV of 5000 mV, in 1024 steps.
     assert {sample.level for sample in samples} == {252}
     steps_s = [b.board_s - a.board_s for a, b in pairwise(samples)]
     assert all(step_s == pytest.approx(5e-3, abs=INTERRUPT_S) for step_s in steps_s)
@@ -204,7 +206,7 @@ def test_corrupt_bytes_cost_single_samples_and_no_command(
     while board.lost_samples == 0 and emulated.clock.now_s() < until_s:
         board.wait(0.01)
     emulated.say("spoil 0 0")
-    assert controller.codes == codes  # none twice, though answers were lost
+    assert controller.codes == codes  # no code twice, although answers were lost
     assert board.damaged_lines > 0
     assert 0 < board.lost_samples <= board.damaged_lines
 
@@ -236,13 +238,13 @@ def test_a_pulled_cable_is_said_and_drops_the_drive_line(emulated: EmulatedBoard
 def test_two_programs_on_one_port(emulated: EmulatedBoard, board: Board) -> None:
     with pytest.raises(DeviceError) as raised:
         opened(emulated.settings(), emulated.clock)
-    # The emulator holds the other end open too; on a real port the process is that of the other program.
+    # The emulator also has the port open; for a real port, the process number is that of the other program.
     assert re.fullmatch(
         rf"The port {emulated.port} must be free, but another program \(process \d+\) has it open: "
         "close that program first.",
         str(raised.value),
     )
-    board.wait(0.05)  # the first is not disturbed
+    board.wait(0.05)  # the connection of the first program still works
 
 
 def test_another_firmware_is_refused(

@@ -1,4 +1,4 @@
-"""board.toml: the wiring that differs from laboratory to laboratory."""
+"""Reading of board.toml, the file with the wiring of the board."""
 
 from pathlib import Path
 

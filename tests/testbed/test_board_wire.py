@@ -1,4 +1,4 @@
-"""The wire: what is sent is read, and what was damaged is not."""
+"""The serial protocol of the board: intact messages are read, and damaged messages are rejected."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -29,7 +29,7 @@ messages = st.one_of(
 
 
 def words_of(message: Message) -> str:
-    """As the board's sketch writes it."""
+    """A message as the board's sketch writes it."""
     match message:
         case Identity(number, name, protocol, version):
             return f"I {number:02X} {name} {protocol:02X} {version}"
@@ -50,7 +50,7 @@ def test_what_is_written_is_read(message: Message) -> None:
 
 @given(messages, st.data())
 def test_no_message_with_up_to_three_wrong_bits_is_read(message: Message, data: st.DataObject) -> None:
-    """CRC-16/XMODEM finds all of them in lines as short as these: its Hamming distance is 4 up to 32751 bits."""
+    """CRC-16/XMODEM detects up to three wrong bits: its Hamming distance is 4 for messages of up to 32751 bits."""
     line = bytearray(encoded(words_of(message)).rstrip(b"\n"))
     text = line.rindex(b"*")
     for bit in data.draw(st.lists(st.integers(0, 8 * text - 1), min_size=1, max_size=3, unique=True)):

@@ -1,4 +1,4 @@
-"""A camera's clock beside the bed's, from arrivals alone."""
+"""Conversion of a camera's clock to the clock of the test bed, from the arrival times of frames alone."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from fingervision.testbed.camera import Latency
 from fingervision.testbed.clocks.camera_clock import ArrivalClock
 
 LEAST_S, U_LEAST_S, MEAN_MORE_S = 0.008, 0.0005, 0.002
-# What the bed is held to, the board's part included.
+# Required uncertainty of times on the test bed, including that of the board.
 JOINED_WITHIN_S = 0.002
 OFFSET_S, RATE = -812.3, 1.0 + 30e-6
 

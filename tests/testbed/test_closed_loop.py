@@ -1,4 +1,6 @@
-"""What is hidden in the simulated bed is found in its pictures; tests/benchmarks/closed_loop.py asks for more of it."""
+"""Effects added to the simulated test bed are identified from its frames; more cases are in
+tests/benchmarks/closed_loop.py.
+"""
 
 from pathlib import Path
 
@@ -14,13 +16,13 @@ from fingervision.storage.model_toml import read_model
 from fingervision.testbed.simulation.injected_effects import Hidden
 from tests.testbed.simulated_beds import run, steps
 
-# One run there and back, one of another speed after a new reference: 400 frames.
+# One run to the end of the range and back, and one at another speed after a new reference: 400 frames.
 RECIPE = steps(
     'kind = "triangle"\nfrom_mm = -0.3\nto_mm = 1.1\nspeed_mm_s = 0.5',
     'kind = "rezero"',
     'kind = "triangle"\nfrom_mm = -0.3\nto_mm = 1.1\nspeed_mm_s = 0.3',
 )
-# The stage's place and the gap are known within 1 um of gap each: a play of 0.1 mm to a part in a hundred at least.
+# The position of the stage and the gap are each known within 1 um of gap, and hence a play of 0.1 mm within 1 %.
 PART_OF_SIZE = 0.01
 
 

@@ -1,4 +1,4 @@
-"""Pause, go on and stop: by letters on a real terminal, and by whoever holds the controls."""
+"""Pause, continue and stop, by letters on a real terminal and by calls of the controls."""
 
 import os
 import pty
@@ -22,20 +22,20 @@ from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.safety_monitor import StoppedError
 from tests.testbed.simulated_beds import SHORT, recipe_at, run, steps
 
-# Starting Python with its libraries on a busy machine; nothing is measured by it.
+# Time limit for starting Python with its libraries on a loaded computer; no time is measured with it.
 PATIENCE_S = 120.0
-# Long enough that it never ends before somebody has typed.
+# This recipe is so long that it does not end before a letter is typed.
 LONG = steps('kind = "hold"\nat_mm = 0.2\nseconds = 60.0')
 SLOW = steps('kind = "move"\nto_mm = 0.8\nspeed_mm_s = 0.5')
 SINE = steps('kind = "sine"\nmean_mm = 0.3\namplitude_mm = 0.2\nfrequency_hz = 0.5\ncycles = 1')
-# The first frames join the clocks; with this one a slow move, or a sine, is well under way.
+# Frame during a slow move or a sine; the first frames are used to relate the clocks.
 UNDER_WAY = 100
 PAUSED_FRAMES = 20
 ENCODER_STEP_MM = 0.03
 
 
 class Pressing:
-    """A camera at some of whose frames somebody does something."""
+    """A camera that calls given functions before some of its frames."""
 
     def __init__(self, camera: BedCamera, at: dict[int, Callable[[], None]]) -> None:
         self.camera, self.at, self.count = camera, at, 0
@@ -52,7 +52,9 @@ class Pressing:
 def pressed(
     folder: Path, text: str, at: dict[int, str], *, replays: bool, on_say: Callable[[Controls], None] = lambda _: None
 ) -> list[SampleRow]:
-    """Run a recipe, with letters typed before some of its frames, on a bed that replays or one taken for real."""
+    """Run a recipe with letters typed before some of its frames, on a test bed that can replay or one treated as
+    hardware.
+    """
     bed, controls = open_bed("simulated"), Controls()
     assert bed.camera is not None
     camera = Pressing(bed.camera, {k: lambda keys=keys: list(map(controls._letter, keys)) for k, keys in at.items()})  # type: ignore[misc]
@@ -67,7 +69,7 @@ def test_a_pause_stops_the_motor_and_the_motion_goes_on_after_it(tmp_path: Path)
     encoder = np.array([row.encoder_mm for row in rows])
     inside = (encoder > 0.1) & (encoder < 0.7)
     stood_mm, frames = np.unique(encoder[inside], return_counts=True)
-    # It stood for the pause, and passes each step of its encoder in two frames otherwise.
+    # The stage rested during the pause; otherwise it passes each step of the encoder within two frames.
     assert frames.max() >= PAUSED_FRAMES
     assert np.sort(frames)[-2] <= 3
     assert encoder[-1] == pytest.approx(0.8, abs=0.09 + ENCODER_STEP_MM)
@@ -83,7 +85,7 @@ def test_a_pause_that_is_over_before_the_next_frame_breaks_no_motion_off(tmp_pat
 def test_a_sine_goes_on_where_it_was_paused(tmp_path: Path) -> None:
     rows = pressed(tmp_path, SINE, {UNDER_WAY: "p", UNDER_WAY + 3 * PAUSED_FRAMES: "p"}, replays=False)
     encoder = np.array([row.encoder_mm for row in rows])
-    # A frame of 40 ms at 0.63 mm/s, and a piece of three frames that is gone on with at the speed it was begun with.
+    # Frames are 40 ms apart, at 0.63 mm/s; a piece of the sine of three frames is continued at its initial speed.
     assert np.max(np.abs(np.diff(encoder))) <= 3 * 0.04 * 0.63 + 2 * ENCODER_STEP_MM
     assert encoder.max() == pytest.approx(0.5, abs=0.09 + ENCODER_STEP_MM)
     assert encoder.min() == pytest.approx(0.0, abs=0.09 + ENCODER_STEP_MM)
@@ -93,7 +95,7 @@ def test_a_sine_goes_on_where_it_was_paused(tmp_path: Path) -> None:
 def test_a_hold_lasts_its_time_beside_a_pause(tmp_path: Path) -> None:
     hold = steps('kind = "hold"\nat_mm = 0.0\nseconds = 1.0')
     rows = pressed(tmp_path, hold, {90: "p", 90 + 2 * PAUSED_FRAMES: "p"}, replays=False)
-    # The pause is recorded as well.
+    # Frames during the pause are recorded as well.
     assert rows[-1].time_s == pytest.approx(1.0 + 2 * PAUSED_FRAMES * 0.04, abs=0.3)
 
 
@@ -111,7 +113,7 @@ def test_the_time_of_a_simulation_stands_while_it_is_paused(tmp_path: Path, whol
     assert (tmp_path / "run" / "samples.csv").read_bytes() == whole
 
 
-# At these frames rows wait for the place of the stage, which later readings tell better.
+# At these frames, rows are held back, because later readings determine the position of the stage better.
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [81, 91])
 def test_a_stopped_simulation_goes_on_to_the_same_end(tmp_path: Path, whole: bytes, at: int) -> None:
@@ -150,7 +152,7 @@ def test_a_stop_before_a_motion_lets_nothing_move(tmp_path: Path, replays: bool)
 
 
 def stop_at(words: str, controls: Controls) -> None:
-    if words.startswith("Paused"):
+    if "paused" in words:
         controls.stop()
 
 

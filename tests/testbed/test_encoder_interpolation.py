@@ -1,4 +1,6 @@
-"""Between the steps of an encoder: a stage that moves evenly is found far inside a step."""
+"""Interpolation between encoder steps: the position of a stage at constant speed is found to a small fraction of a
+step.
+"""
 
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from fingervision.testbed.motion.encoder_interpolation import WAIT_FOR_BORDER_S,
 from fingervision.testbed.reading import Reading
 
 STEP_MM, RATE_HZ = 0.03, 200.0
-# A border is passed somewhere between two readings: half of one reading's way, at 0.5 mm/s.
+# A step boundary is passed between two readings: half of the distance between readings, at 0.5 mm/s.
 BETWEEN_READINGS_MM = 0.5 * 0.5 / RATE_HZ
 
 
@@ -16,7 +18,7 @@ def read(position_mm: float, device_s: float, moving: bool) -> Reading:
 
 
 def followed(speed_mm_s: float = 0.5) -> tuple[StageTrack, np.ndarray]:
-    """There for 2 s, a rest of 1 s, back for 2 s; times and true positions of the readings."""
+    """Track of a motion of 2 s, a rest of 1 s, and a return of 2 s, and the times and true positions of readings."""
     track = StageTrack(STEP_MM)
     time_s = np.arange(0.0, 6.0, 1.0 / RATE_HZ)
     true_mm = speed_mm_s * np.interp(time_s, [0.5, 2.5, 3.5, 5.5], [0.0, 2.0, 2.0, 0.0])
@@ -29,7 +31,7 @@ def test_a_moving_stage_is_found_between_the_borders() -> None:
     track, (time_s, true_mm) = followed()
     way = (time_s > 0.6) & (time_s < 5.4)
     found_mm = np.array([track.at_mm(at_s) for at_s in time_s[way].tolist()])
-    # Where it stood after the way there, the speed is known from the last borders alone.
+    # When the stage comes to rest after the first motion, its speed is known from the last step boundaries alone.
     assert np.max(np.abs(found_mm - true_mm[way])) < 3.0 * BETWEEN_READINGS_MM
     assert np.std(found_mm - true_mm[way]) < 0.15 * STEP_MM / np.sqrt(12.0)
 
@@ -56,13 +58,13 @@ def test_without_a_step_readings_are_taken_as_they_are() -> None:
 @pytest.mark.parametrize("every_s", [0.005, 0.02, 0.037])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_stage_that_slows_down_rests_where_its_encoder_says(every_s: float, sign: float) -> None:
-    """A fine encoder, several of whose steps lie between two readings: the last way is not left half done."""
+    """If several encoder steps lie between two readings, the interpolated position reaches the final position."""
     step_mm, speed_mm_s, slowing_s = 0.0005, 0.5, 0.1
     track = StageTrack(step_mm)
     time_s = np.arange(0.0, 3.0, every_s)
 
     def place_mm(at_s: float) -> float:
-        # Even motion from 0.5 s on, then an even deceleration that ends at 1.5 s.
+        # Constant speed from 0.5 s on, then constant deceleration that ends at 1.5 s.
         even_s, left_s = min(max(at_s - 0.5, 0.0), 0.9), min(max(at_s - 1.4, 0.0), slowing_s)
         return sign * speed_mm_s * (even_s + left_s - 0.5 * left_s**2 / slowing_s)
 
@@ -74,5 +76,5 @@ def test_a_stage_that_slows_down_rests_where_its_encoder_says(every_s: float, si
     way_s = np.arange(0.6, 1.5, 0.01)
     found = np.array([track.at_mm(at_s, at_once=True) for at_s in way_s.tolist()])
     true = np.array([place_mm(at_s) for at_s in way_s.tolist()])
-    # Between two readings the speed changes by at most deceleration times their distance.
+    # Between two readings, the speed changes by at most the deceleration times the interval of readings.
     assert np.max(np.abs(found - true)) < step_mm + 0.5 * speed_mm_s / slowing_s * every_s**2

@@ -1,4 +1,4 @@
-"""A hand screw: what is asked, what is typed, and what is then its position."""
+"""A hand screw: the questions, the typed answers, and the resulting position."""
 
 from io import StringIO
 
@@ -27,7 +27,7 @@ def test_the_reading_that_was_typed_is_the_position() -> None:
 
 
 def test_nothing_lies_between_two_readings() -> None:
-    """Who interpolates between them finds the old one until the new one was typed."""
+    """Interpolation between readings gives the old position until the new position was typed."""
     clock = VirtualClock()
     actuator = HandScrew(LIMITS, clock, Terminal(StringIO("\n"), StringIO()))
     before = actuator.readings()

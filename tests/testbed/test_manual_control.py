@@ -1,4 +1,4 @@
-"""Motions asked for one by one, on the simulated bed: limited, watched, stopped; and the commands that ask for them."""
+"""Single motions on the simulated test bed: limits, monitoring and stop, and the commands that request them."""
 
 from collections.abc import Iterator
 

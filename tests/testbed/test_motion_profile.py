@@ -1,4 +1,4 @@
-"""Profiles of motions: the way is gone, in the time asked for, within speed and acceleration."""
+"""Motion profiles cover the distance in the requested time, within the limits of speed and acceleration."""
 
 from math import sqrt
 
@@ -11,7 +11,7 @@ from fingervision.domain.step_data import CycleTime, SpeedEntry
 from fingervision.testbed.motion.motion_profile import MotionProfile, profile, shortest_s
 
 TOP_MM_S, STRONG_MM_S2 = 400.0, 27500.0  # 5.5 N on 0.2 kg
-# Sums and products of a dozen doubles.
+# Relative rounding error of sums and products of a dozen double-precision numbers.
 ROUNDING = 1e-9
 
 ways_mm = st.floats(0.001, 10.0)
@@ -71,17 +71,17 @@ def test_both_directions_mirror_each_other(way: float, slowness: float, entry: S
 
 @given(ways_mm, st.floats(0.5, 0.999))
 def test_no_motion_is_shorter_than_the_shortest(way: float, share: float) -> None:
-    """With the accelerations that a shorter time would need, the limits are broken."""
+    """The accelerations that a shorter time requires exceed the limit."""
     least_s = shortest_s(way, TOP_MM_S, STRONG_MM_S2)
     seconds = share * least_s
     if seconds <= way / TOP_MM_S:
-        return  # not even without any time for speeding up
+        return  # too short even at the largest speed throughout
     motion = profile(way, CycleTime(seconds), TOP_MM_S)
     assert motion.acceleration_mm_s2 > STRONG_MM_S2
 
 
 def test_the_trapezoid_agrees_with_its_textbook_formula() -> None:
-    """v = (a T - sqrt(a^2 T^2 - 4 a s)) / 2, which needs a T^2 >= 4 s."""
+    """v = (a T - sqrt(a^2 T^2 - 4 a s)) / 2 for distance s, time T and acceleration a, which requires a T^2 >= 4 s."""
     motion = profile(10.0, CycleTime(0.04), TOP_MM_S)
     a, seconds = motion.acceleration_mm_s2, 0.04
     assert motion.cruising_s > 0.0

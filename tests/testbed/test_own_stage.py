@@ -1,4 +1,6 @@
-"""A stage from a file: its contract is named where it is not tested, and a run tells of a stage without speed."""
+"""A stage from a file: a note names its contract test if it is missing, and a run reports a stage that ignores the
+requested speed.
+"""
 
 import re
 import shlex
@@ -24,7 +26,7 @@ def called(folder: Path, *words: str) -> Result:
 
 @pytest.fixture(params=["keeps its speed", "teleports"])
 def bench(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, bool]:
-    """The tutorial's stage and its bed; the other stage is at its target at once."""
+    """The stage of the tutorial with its test bed, and a stage that reaches its target at once."""
     stage, bed = (
         re.search(rf"```\w+\n(# {name}\n.*?)```", TUTORIAL, re.DOTALL)[1]  # type: ignore[index]
         for name in ("my_stage.py", "bench.toml")

@@ -1,4 +1,4 @@
-"""The paper's experiment as a recipe: the inputs of Table 1, and what the bed measures there."""
+"""The published experiment as a recipe: the inputs of Table 1, and the gaps that the test bed measures there."""
 
 import csv
 import subprocess
@@ -11,7 +11,7 @@ import pytest
 from fingervision.storage.recipe_toml import read_recipe
 
 SAMPLES = Path(__file__).parents[2] / "sample_frames"
-# Of the gap in pictures at 34 px/mm, five frames each, the stage's own place included: 0.1 px.
+# Tolerance of the gap measured in five frames at 34 px/mm, including the position of the stage: 0.1 px.
 MEASURED_MM = 0.003
 
 pytestmark = pytest.mark.skipif(not SAMPLES.is_dir(), reason="sample_frames is not part of this installation")
@@ -34,8 +34,8 @@ def test_the_bed_measures_what_the_table_says_at_the_place_where_the_stage_stood
     subprocess.run([sys.executable, str(SAMPLES / "make_paper_run.py"), str(tmp_path)], check=True)
     made = table(tmp_path / "measured.csv")
     assert np.max(np.abs(made["gap_mm"] - made["true_mm"])) < MEASURED_MM
-    # The paper's actuator: within 90 um of where it was sent, and nearly nowhere exactly there.
+    # The actuator of the publication stops within 90 um of its target, and hardly ever exactly at the target.
     assert np.max(np.abs(made["stage_mm"] - made["input_mm"])) < 0.09
     kept = table(SAMPLES / "paper_run" / "measured.csv")
-    # Another processor rounds otherwise.
+    # Rounding differs between processors.
     assert np.allclose(kept["gap_mm"], made["gap_mm"], atol=1e-4)

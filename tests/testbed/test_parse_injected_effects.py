@@ -1,4 +1,4 @@
-"""What is hidden, from words: every effect of the catalogue by its name alone, or with sizes, or sealed."""
+"""Effects to be added to the simulation, from text: by name alone, with parameter values, or from a sealed file."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ def test_every_effect_has_a_usual_size_inside_its_bounds_that_does_something(nam
     values = usual_values(effect)
     assert set(values) == {p.name for p in effect.parameters}
     assert all(p.lower <= values[p.name] <= p.upper for p in effect.parameters)
-    # One that has no neutral value (ringing) is there as soon as it is named.
+    # An effect without neutral values (ringing) acts as soon as it is named.
     assert all(p.neutral is None for p in effect.parameters) or any(
         p.neutral is not None and values[p.name] != p.neutral for p in effect.parameters
     )

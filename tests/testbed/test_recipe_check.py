@@ -1,4 +1,4 @@
-"""`bed check`: the plan is what a run does, every refusal is said, and no hardware is touched."""
+"""`bed check`: the plan agrees with the run, every refusal is reported, and no hardware is used."""
 
 import json
 from pathlib import Path
@@ -12,9 +12,10 @@ from fingervision.storage.samples_csv import read_samples
 from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
 
 HEAD = 'schema = 1\nname = "test"\nbelow_force_n = 2.9\n'
-# Over less than half of the stroke, so that the force stays below the recipe's.
+# The triangle covers less than half of the stroke, so that the force stays below the limit of the recipe.
 TRIANGLE = '[[step]]\nkind = "triangle"\nfrom_mm = -0.2\nto_mm = {to_mm}\nspeed_mm_s = {speed}\ncycles = 1\n'
-# What a run adds to a plan: settling of the picture, frames that wait for a corner, the encoder's last step.
+# Relative excess of a run over its plan: settling of the picture, frames before a reversal, the last step of the
+# encoder.
 BESIDE_THE_PLAN = 0.25
 
 
@@ -33,7 +34,7 @@ def test_a_run_takes_the_time_and_the_way_of_its_plan(tmp_path: Path) -> None:
     rows = read_samples(tmp_path / "run" / "samples.csv")
     assert rows[-1].time_s - rows[0].time_s == pytest.approx(planned["seconds"], rel=BESIDE_THE_PLAN)
     inputs = [row.input_mm for row in rows if row.input_mm is not None]
-    # The simulated stage comes to a stand within 90 um of where it is sent.
+    # The simulated stage stops within 90 um of its target.
     assert min(inputs) == pytest.approx(min(step["lower_mm"] for step in planned["steps"]), abs=0.1)
     assert max(inputs) == pytest.approx(max(step["upper_mm"] for step in planned["steps"]), abs=0.1)
     gaps = [row.gap_mm for row in rows if row.gap_mm is not None]
@@ -58,7 +59,7 @@ def test_every_step_that_does_not_fit_is_said_with_its_line(tmp_path: Path) -> N
     assert "line 13" in refused[2]
     assert "900" in refused[3]
     for step in planned["steps"]:
-        # What cannot be done has no gap.
+        # A step that is refused has no gap.
         assert (step["gap_mm"] is None) == (step["refusal"] is not None)
 
 

@@ -1,4 +1,4 @@
-"""A camera that goes on by itself: it may go stale, and a run with it goes on with the leg that broke off."""
+"""A camera that runs continuously: its frames may be outdated, and a run with it resumes with the interrupted leg."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ TWO_MOVES = steps(
 
 
 class BreaksOffError(Exception):
-    """What ends a run between two legs."""
+    """Exception that ends a run between two legs."""
 
 
 def break_off(done: float, total: float) -> None:
@@ -29,7 +29,7 @@ def break_off(done: float, total: float) -> None:
 def test_a_run_that_cannot_be_played_again_goes_on_with_its_leg_as_another_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # The live gripper is never still.
+    # The gripper of this camera moves all the time.
     monkeypatch.setattr("fingervision.testbed.run.step_executor.STILL_WITHIN_S", 0.5)
     config = live_camera_at(tmp_path)
     bed = open_bed(str(config))
@@ -41,7 +41,7 @@ def test_a_run_that_cannot_be_played_again_goes_on_with_its_leg_as_another_run(
     assert run(tmp_path, TWO_MOVES, bed_name=str(config)).resumed_after == 2
     rows = read_samples(tmp_path / "run" / "samples.csv")
     assert rows[:2] == before
-    # The first leg had ended, but nothing says so before the next begins: it is gone through once more.
+    # The first leg had ended, but its end is only recorded when the next leg begins: the first leg is repeated.
     assert [(row.run, row.step) for row in rows[2:]] == [("2", 1), ("2", 1), ("2", 2), ("2", 2)]
     times = [row.time_s for row in rows]
     assert times == sorted(times)

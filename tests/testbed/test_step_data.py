@@ -1,4 +1,4 @@
-"""Step data: what a file may hold, and what the stage can do of it; each refusal is a sentence."""
+"""Step data: the permitted contents of a file, and the limits of the stage; each refusal is one sentence."""
 
 from pathlib import Path
 
@@ -51,7 +51,7 @@ def test_steps_follow_each_other_from_where_the_last_one_ended(tmp_path: Path) -
     motions = planned_sequence(data, LIMITS)
     assert [(each.from_mm, each.to_mm) for each in motions] == [(0.0, 5.0), (5.0, 5.5), (5.5, 0.0)]
     assert motions[1].force_n == 3.0
-    # 4 s / T^2 with 5 mm in 0.2 s are 0.5 m/s2, on 0.2 kg.
+    # Acceleration 4 s / T^2 for s = 5 mm in T = 0.2 s: 0.5 m/s2, with a load of 0.2 kg.
     assert motions[0].force_n == pytest.approx(0.1)
     table = steps_table(motions).splitlines()
     assert len(table) == 4
@@ -102,7 +102,7 @@ def test_sixteen_steps_are_refused(tmp_path: Path) -> None:
 def test_a_time_too_short_is_answered_with_the_shortest_and_that_is_enough(tmp_path: Path) -> None:
     path = tmp_path / "steps.toml"
     said = sentence_of(path, GOOD.replace("= 0.2\n[[", "= 0.02\n[["))
-    # 5 mm with 5.5 N on 0.2 kg (27.5 m/s2): a triangle, 2 sqrt(s / a) = 26.97 ms.
+    # Distance s = 5 mm with 5.5 N on 0.2 kg (a = 27.5 m/s2): a triangular speed profile takes 2 sqrt(s / a) = 26.97 ms.
     assert said == (
         "positioning_time_s of step 1 must be at least 0.027 s for its 5 mm with 0.2 kg (at most 400 mm/s and 5.5 N), "
         "but is 0.02."

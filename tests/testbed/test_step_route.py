@@ -1,4 +1,4 @@
-"""Routes by step data blocks: they end where they shall, are never faster than asked, and take the direct way."""
+"""Routes by step data blocks end at their target, never exceed the requested speed, and are direct."""
 
 import pytest
 from hypothesis import given
@@ -33,7 +33,9 @@ def test_a_route_ends_at_its_target_and_keeps_the_speed(begin: int, end: int, sp
     try:
         numbers = route(STEPS, at_mm, to_mm, speed, TOP_MM_S)
     except FingervisionError:
-        assert speed < 10.0  # from anywhere at 10 mm/s: to 0 or 5 mm, and on by 0.1 mm
+        assert (
+            speed < 10.0
+        )  # at 10 mm/s, every position can be reached: by a step to 0 or 5 mm, then by steps of 0.1 mm
         return
     for number in numbers:
         assert nominal_speed_mm_s(STEPS[number], to_mm, TOP_MM_S) <= 1.01 * speed

@@ -1,4 +1,4 @@
-"""The terminal: answers and letters come by one keyboard, and none is lost or taken for the other."""
+"""The terminal: answers and command letters come from one keyboard; none is lost, and none is confused."""
 
 import os
 import pty
@@ -18,13 +18,13 @@ QUESTION = "How far? "
 
 @pytest.fixture
 def keyboard() -> Iterator[tuple[int, Terminal, StringIO]]:
-    """The typing end of a terminal, and what reads the other."""
+    """The end of a terminal to which a test types, the terminal that reads the other end, and the screen."""
     typing, reading = pty.openpty()
     screen = StringIO()
     with os.fdopen(reading, "r") as stream:
         terminal = Terminal(stream, screen)
         yield typing, terminal, screen
-        os.write(typing, b"\x04")  # the end of input, so that the reader ends
+        os.write(typing, b"\x04")  # end of input, so that the reading thread ends
         if terminal._reader is not None:
             terminal._reader.join()
     os.close(typing)
@@ -48,7 +48,7 @@ def test_a_line_is_an_answer_if_a_question_stands_and_a_letter_otherwise(
 
 
 def answer(typing: int, screen: StringIO, number: int) -> None:
-    """Type as soon as the question is seen."""
+    """Type an answer as soon as the question appears on the screen."""
     wait_until(lambda: screen.getvalue().count(QUESTION) > number)
     os.write(typing, f"{number}.5\n".encode())
 

@@ -46,7 +46,7 @@ class NextView:
 
 
 def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
-    """Choose the view that best separates the members of an ambiguity set; None if no view separates them.
+    """Choose the view that best separates the explanations of an ambiguity set; None if no view separates them.
 
     The criterion is the squared whitened distance that a view adds between the best explanation and every other one.
     The size of each other explanation is refitted to the view and the measured data together, with free constants

@@ -111,7 +111,7 @@ class AugmentedDataset:
         sigma_mm: tuple[float, ...] | None = None,
         iterations: int = REFITTED,
     ) -> float:
-        """Squared whitened distance, over data and proposed run, between a true prediction and the refitted rival."""
+        """Squared whitened distance, over data and proposed run, between the predictions of two explanations."""
         target = self.both.whitened(self.moved(tuple(truth), truth))
         start = self.moved(rival.names, rival.values)
         return fit(self.both, rival.names, start, target=target, sigma_mm=sigma_mm, iterations=iterations).score

@@ -116,7 +116,7 @@ def expected_gain(
 def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
     """The gain, below a limit, near which most posterior draws lie, and the share of draws near it.
 
-    If no draw is below the limit, the median of all draws is returned.
+    If no posterior draw is below the limit, the median of all draws is returned.
     """
     come = np.sort(come)
     named = come[(come > 0.0) & (come < below)]
@@ -130,9 +130,10 @@ def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
 def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:
     """Draw the standard deviation of the runs' offsets for each channel; from its prior if there is only one run.
 
-    In half of the draws the offset is zero, because the stage need not be re-zeroed before the run. In the other half,
-    the prior is the half-Cauchy prior of `RunOffsets.spread`, as in a diagnosis of both runs. With several runs, the
-    standard deviation of the offsets is drawn from its posterior.
+    For a single run, the standard deviation is zero in half of the draws, because the stage need not be re-zeroed
+    before the new run. In the other half of the draws, it is drawn from the half-Cauchy prior of `RunOffsets.spread`,
+    as in a diagnosis of both runs. With several runs, the standard deviation of the offsets is drawn from its
+    posterior.
     """
     if problem.offsets.runs > 1:
         return problem.offsets.drawn_spread(problem.measured - problem.whitened(explanation.values), rng)

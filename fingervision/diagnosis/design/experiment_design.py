@@ -75,7 +75,7 @@ class OpenSet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunPlan:
-    """A proposed run, with the chi-square distance that it adds between each assumed truth and each member."""
+    """A proposed run, with the chi-square distance that it adds between explanations of the ambiguity set."""
 
     name: str
     steps: list[Step]
@@ -141,7 +141,7 @@ class RunChoice:
         return RunPlan(name, steps, times, inputs, gains, minutes)
 
     def settled(self, gains: Array, needed: float = NEEDED) -> float:
-        """Fraction of the pairs of explanations that given gains separate, weighted by each truth's probability."""
+        """Fraction of pairs of explanations that given gains separate, weighted by the explanations' probabilities."""
         part = np.where(np.isfinite(gains), np.minimum(gains / needed, 1.0), 0.0)
         odds = self.open.odds[: self.open.truths]
         return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))

@@ -21,7 +21,7 @@ gauge block."""
 
 
 def static_check(data: Observations, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
-    """Propose a check without another motion, for the first rival that it separates from the best explanation.
+    """Propose a check without another motion that separates the best explanation from another explanation.
 
     For a table without times, no motion can be evaluated for effects with memory, and re-zeroing is proposed as a check
     of its own. For a table with times, re-zeroing is one of the protocols.

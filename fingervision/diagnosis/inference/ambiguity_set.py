@@ -126,8 +126,8 @@ def _least_refuted(distance: float) -> float:
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
     """Fit one explanation to another's prediction; the score is the squared whitened distance that remains.
 
-    In both directions the run offsets have the spread found for the best explanation, because a worse explanation would
-    hide its misfit in a larger spread.
+    Whichever of two explanations is assumed true, the run offsets have the spread found for the best explanation,
+    because a worse explanation would hide its misfit in a larger spread.
     """
     target = problem.whitened(truth.values)
     return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12)
@@ -136,8 +136,9 @@ def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_m
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
     """Drop explanations that only imitate an effect that the drawing predicts and that is found as predicted.
 
-    Otherwise, the agreement of the fitted effect with the drawing's prediction would be a coincidence. For example, an
-    apparent end stop at exactly the input at which the fingers meet in the drawing is the contact of the fingers.
+    If an imitation were the true explanation, the agreement of the fitted effect with the drawing's prediction would be
+    a coincidence. For example, an apparent end stop at exactly the input at which the fingers meet in the drawing is
+    the contact of the fingers.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:

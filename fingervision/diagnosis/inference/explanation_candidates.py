@@ -218,7 +218,7 @@ def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explan
 
 
 def without_roundings(problem: Problem, explanation: Explanation) -> Explanation:
-    """Drop effects without which the refitted other effects predict the same within the recorded input's error.
+    """Drop an effect if the other effects, refitted alone, predict the same within the recorded input's error.
 
     For example, in addition to a play and an offset, a delay by a small part of an encoder step only follows rounding
     errors, whichever of the three effects was found first.

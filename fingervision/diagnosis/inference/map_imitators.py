@@ -52,8 +52,8 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
 def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
     """Find effects of an explanation that act like a map at their fitted parameters.
 
-    An example of such an effect is a cyclic error with a period of half the range, because a map can follow a curve as
-    smooth as this one.
+    For example, a cyclic error with a period of half the range acts like a map, because a map can follow so smooth a
+    curve.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[
     offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
 
     def left(beside: Array) -> Array:
-        """Squared lengths of columns after projection off the run offsets and the columns `beside`; shape (k,)."""
+        """Squared lengths of the parts of columns orthogonal to run offsets and to the columns `beside`; shape (k,)."""
         moved = beside - offsets.design @ (metric @ (offsets.design.T @ beside))
         rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
         shared = offsets.design.T @ rest

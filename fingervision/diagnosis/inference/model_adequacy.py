@@ -48,7 +48,7 @@ class _Basis:
         return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
 
     def beside_offsets(self, metric: Array) -> Array:
-        """Squared lengths of columns after projection off the run offsets that a metric allows; shape (k,)."""
+        """Squared lengths of the parts of columns orthogonal to the run offsets, for given spreads; shape (k,)."""
         return np.asarray(self.squares - np.einsum("ij,ij->j", self.shared, metric @ self.shared))
 
 
@@ -179,7 +179,7 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
 
 
 def _beside(design: Array, metric: Array, columns: Array) -> Array:
-    """Whitened columns after projection off the runs' offsets and other random effects."""
+    """Parts of whitened columns that are orthogonal to the runs' offsets and to other random effects."""
     return np.asarray(columns - design @ (metric @ (design.T @ columns)), dtype=np.float64)
 
 

@@ -19,8 +19,8 @@ AS_MUCH = 2.0**0.5
 """Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
 power, because a richer formula also fits part of that structure."""
 BY_STRUCTURE = 1e-3
-"""Probability with which remaining structure may let one more effect fit as well, above which the effect is dropped:
-that of `verdict.LACK_OF_FIT`."""
+"""Probability (p-value) above which an effect is dropped: the probability that remaining structure alone reduces the
+residual as much as this effect does. It equals `verdict.LACK_OF_FIT`."""
 
 
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
@@ -41,11 +41,12 @@ def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
 
 
 def without_fits_to_structure(data: Observations, found: Findings) -> Findings:
-    """Drop effects beyond two that the remaining structure could imitate by chance; the verdict is then *unknown*.
+    """Drop effects, down to two, that the remaining structure could imitate by chance; the verdict is then *unknown*.
 
-    Beside structure, the noise is no measure of what an effect may gain. The residual without the effect is, and it
-    consists of a few bumps, each many rows long: an F test with as many degrees of freedom as these bumps decides.
-    On one turn of a rotary table, a warming within two seconds and an arc fitted such bumps beside the friction.
+    If structure remains, the gain of an effect cannot be compared with the noise. The gain is compared with the
+    residual without the effect, which consists of a few bumps of many rows each: an F test is used, whose degrees of
+    freedom are the number of independent values in this residual. For one turn of a rotary table, for example, a
+    warming within two seconds and an arc fitted such bumps in addition to the friction.
     """
     while len(found.best.names) > 2 and found.left_over is not None and found.unknown is None:
         fewer = [_without(found, name) for name in found.best.names]

@@ -87,7 +87,7 @@ class PositionMap:
         return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
-        """Estimate the map's curve for an explanation; in the problem, `behind` columns follow those of the map."""
+        """Estimate the map's curve for an explanation; `behind` is the number of columns after those of the map."""
         best, covariance_of_best = estimated_coefficients(problem, explanation, self.coefficients.size, behind)
         curve = self.root_mm @ best
         rms = float(np.sqrt(np.mean(curve**2)))

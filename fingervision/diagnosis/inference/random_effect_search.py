@@ -34,8 +34,9 @@ def beside_gains(state: Searched, look: Look) -> Searched:
     """Search with gains that differ between runs, and keep the result if it is much more probable.
 
     If a named effect changes the prediction more than the gains of the runs do, the gains are nuisance parameters. If
-    no named effect does, the gains are structure without a name. If further effects are not much more probable than
-    gains that differ between runs, the gains are kept, because naming an effect claims more than stating a scatter.
+    the gains of the runs change the prediction more than every named effect, the gains are reported as structure
+    without a name. If further effects are not much more probable than gains that differ between runs, the gains are
+    kept, because naming an effect claims more than stating a scatter.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
@@ -60,7 +61,8 @@ def beside_gains(state: Searched, look: Look) -> Searched:
         if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
             beside = apart
     left = standing_of(beside.data, beside.found)
-    # Gains of runs that stay at one place are no more than offsets, and may be anything: what they leave is looked at.
+    # If runs stay at one position, their gains are only offsets and can have any value. The remaining residuals are
+    # therefore compared as well.
     worse = not left.is_little and left.after_mm > standing_of(state.data, found).after_mm
     if worse or not _does_more(beside):
         return state

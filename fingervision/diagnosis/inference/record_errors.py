@@ -1,4 +1,4 @@
-"""Uncertainty of the estimates from the errors of the recorded input, by recording the stage's path again and again."""
+"""Uncertainty of estimates from errors of the recorded input, by simulated repetition of the recording."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,23 +15,25 @@ from fingervision.stage_record.window_blending import blended
 
 RECORDS = 30
 """Number of simulated records: a standard deviation is then known to an eighth."""
-MOST_ROWS = 60_000
-"""Largest number of rows in all simulated records (half a second), and `FEWEST_RECORDS` at least."""
+MOST_ROWS = 40_000
+"""Largest number of rows in all simulated records (a third of a second), and least number of records."""
 FEWEST_RECORDS = 8
 BARELY = 1e-3
-"""Share of the recorded input's standard uncertainty below which noise beside an encoder's rounding is none."""
+"""Share of the standard uncertainty of the recorded input below which noise in addition to the encoder's rounding is
+neglected."""
 
 
 def with_record_errors(
     data: Observations, problem: Problem, explanation: Explanation, rng: np.random.Generator
 ) -> Explanation:
-    """Add to an explanation's covariance what the errors of the recorded input contribute.
+    """Add the contribution of errors of the recorded input to the covariance of an explanation.
 
-    The covariance of the input's error in the likelihood is a rough one: the error of a smoothed record stays for a
-    whole stroke where the stage moves by nearly a fraction of the encoder's step from row to row, and differs at turns.
-    The stage's path is therefore recorded again with another zero of the encoder, and other noise, and smoothed again;
-    the estimates are linear in the difference. Of drawn plays behind an encoder of 30 um (seeds 811 and 501, 14 tables
-    each), 57 and 79 % lay within 1.96 standard uncertainties without it, 71 and 93 % with it.
+    The likelihood contains only a rough covariance of the errors of the input. If the stage moves by nearly a simple
+    fraction of the encoder step between rows, the error of the smoothed record is constant over a stroke and changes at
+    reversals. The recording is therefore simulated again with a random zero of the encoder and random noise, and
+    smoothed again; the estimates are taken as linear in the difference. Of simulated plays with an encoder of 30 um
+    (seeds 811 and 501, 14 tables each), 57 and 79 % lay within 1.96 standard uncertainties without this contribution,
+    71 and 93 % with it.
 
     Parameters
     ----------
@@ -40,10 +42,10 @@ def with_record_errors(
     problem : Problem
         Estimation problem of the explanation.
     explanation : Explanation
-        Explanation with its covariance; that of parameters that are held, or on which the prediction depends
-        discontinuously, is kept.
+        Explanation with its covariance. The covariance of a parameter is kept if the parameter is held constant, or if
+        the prediction depends on it discontinuously.
     rng : numpy Generator
-        Generator of the simulated records.
+        Generator of random numbers for the simulated records.
     """
     whitener = problem.whitener
     if not explanation.names or not (whitener.input_mm.any() or whitener.passing_mm.any()):
@@ -72,7 +74,7 @@ def with_record_errors(
 
 
 def _errors(data: Observations, rng: np.random.Generator) -> Iterator[Array]:
-    """Errors of the smoothed input if the stage's path were recorded again; each of shape (n,) (mm)."""
+    """Errors of the smoothed input in simulated repetitions of the recording; each of shape (n,) (mm)."""
     record, (_, time_s, runs) = data.recorded, recorded(data.table)
     if time_s is None:
         return

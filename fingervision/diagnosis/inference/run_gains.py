@@ -65,7 +65,7 @@ class RunGains:
         )
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
-        """Estimate the runs' gains for an explanation; in the problem, `behind` columns follow those of the gains."""
+        """Estimate the runs' gains for an explanation; `behind` is the number of columns after those of the gains."""
         return replace(
             self, coefficients=estimated_coefficients(problem, explanation, self.coefficients.size, behind)[0]
         )

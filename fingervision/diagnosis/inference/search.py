@@ -53,7 +53,7 @@ def search(
     progress: Progress,
     known: Explanation | None = None,
 ) -> Findings:
-    """Find the best explanation, the indistinguishable ones, and the remaining structure.
+    """Find the best explanation, the explanations indistinguishable from it, and the remaining structure.
 
     The search fits one, then two, then three effects, tests for the verdict *unknown*, and collects the ambiguity set;
     each step of the search returns a new state.
@@ -83,7 +83,7 @@ def search(
 
 
 def _one_effect(state: SearchState, rng: np.random.Generator, forced: frozenset[str]) -> SearchState:
-    """Fit every effect alone; keep the simplest that is as good as the best, if its gain is significant."""
+    """Fit every effect alone; keep the simplest effect that fits as well as the best, if its gain is significant."""
     problem = state.problem
     alone = state.with_known(single_effects(problem, state.atoms, 20), 1)
     singles = [e for e in alone if not within_a_step(problem, e)]
@@ -124,9 +124,9 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
 def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:
     """Keep pairs of effects that change the prediction by more than the recorded input's error.
 
-    If the best pair changes the prediction by less, its effects only follow the rounding errors of an encoder. Another
-    pair may follow the same rounding errors with a larger amplitude, and is kept only if its effects gain significantly
-    when they are added to the best pair.
+    If the best pair changes the prediction by less than the input's error, its effects only follow the rounding errors
+    of an encoder. Another pair may follow the same rounding errors with a larger amplitude, and is kept only if its
+    effects gain significantly when they are added to the best pair.
     """
     shown = beyond_the_input(state.problem, state.singles[0], pairs)
     if not shown or shown[0] is pairs[0]:
@@ -171,7 +171,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
 
 
 def _beyond_roundings(state: SearchState) -> SearchState:
-    """Drop effects that only follow the errors of the recorded input; the remaining explanations are then the peers."""
+    """Drop effects that only follow errors of the recorded input; compare the result with other explanations."""
     best = without_roundings(state.problem, state.best)
     if best is state.best:
         return state

@@ -52,9 +52,9 @@ def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -
 
     The residual of the smaller explanation must clearly exceed the noise and the inexactness of its formula. An effect
     that is added to the smaller explanation fits part of the inexactness of its formula, however large the residual is.
-    If the larger explanation has other effects instead, and leaves only noise, no more than the typical inexactness of
-    formulas is allowed for the smaller explanation. For example, a creep whose residual was 70 times the noise (3.6 %
-    of the explained change) imitated a ratio and an offset, which together leave only noise.
+    If the larger explanation does not contain the effects of the smaller one, and leaves only noise, no more than the
+    typical inexactness of formulas is allowed for the smaller explanation. For example, a creep whose residual was 70
+    times the noise (3.6 % of the explained change) imitated a ratio and an offset, which together leave only noise.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows

@@ -144,7 +144,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
 
 def isolated(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
-    """Mark the rows set aside that are isolated; all other rows set aside are part of the disagreement.
+    """Mark isolated rows among those set aside in the fit; all other rows set aside belong to the disagreement.
 
     Parameters
     ----------

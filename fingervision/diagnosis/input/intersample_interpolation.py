@@ -66,7 +66,7 @@ def _like_delays() -> frozenset[str]:
 
 
 def _delay_s(best: Explanation) -> float:
-    """Delay of an explanation, or the delay that corresponds to another of its effects (s)."""
+    """Delay (s) of the explanation, or the delay to which one of its other effects is equivalent; 0 without either."""
     effects = [effect for name, effect in catalogue().items() if name in best.names and effect.delay_s is not None]
     for effect in sorted(effects, key=lambda effect: not is_delay(effect)):
         assert effect.delay_s is not None  # noqa: S101 - chosen so above

@@ -1,4 +1,4 @@
-"""How many independent values a residual holds whose neighbouring rows are correlated."""
+"""Number of independent values in a residual whose neighbouring rows are correlated."""
 
 import numpy as np
 
@@ -6,15 +6,15 @@ from fingervision.domain.effect import Array
 
 
 def independent_values(residual_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Number of independent values with as much information on a mean as the correlated ones.
+    """Number of independent values whose mean is as certain as the mean of the correlated residual.
 
-    It is the number of rows over the integrated autocorrelation, which is summed up to its first zero (Sokal, in
-    Functional Integration, 1997, doi:10.1007/978-1-4899-0319-8_6).
+    The number of independent values is the number of rows divided by the integrated autocorrelation, which is summed up
+    to its first zero (Sokal, in Functional Integration, 1997, doi:10.1007/978-1-4899-0319-8_6).
 
     Parameters
     ----------
     residual_mm : ndarray of float, shape (n,)
-        Residual of one channel; each run's own offset is removed.
+        Residual of one channel. The mean of each run is removed.
     runs : tuple of slice
         Rows of each run.
     """

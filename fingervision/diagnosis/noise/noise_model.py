@@ -49,8 +49,8 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
     """Mark outliers against a running median; shape (n,), True where a value is to be excluded.
 
     Without times the rows have no order, and the median of all values replaces the running median. `sigmas` is the
-    limit of an outlier in standard deviations. None excludes no value, because in a short record an effect that acts on
-    a few samples looks like outliers until it is explained.
+    limit of an outlier in standard deviations. If `sigmas` is None, no value is excluded, because in a short record an
+    effect that acts on a few samples looks like outliers until it is explained.
     """
     out = np.zeros(residual.size, dtype=bool)
     if sigmas is None:

@@ -17,8 +17,8 @@ MIDLINE_FREE_MM = 1e3
 class RunOffsets:
     """Nuisance parameters of every explanation: re-zeroing between runs, constant of the midline, the drawing.
 
-    Re-zeroing is a zero-mean random effect per channel; the midline's constant is free; an uncertain dimension of the
-    drawing is a random effect with its stated uncertainty.
+    Offsets by re-zeroing are zero-mean random effects of each channel, and the constant of the midline is a free
+    parameter. The errors of uncertain dimensions in the drawing are random effects with their stated uncertainties.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ class RunOffsets:
     def __post_init__(self) -> None:
         """Tabulate, for each channel and each spread, the quantities that do not depend on the residual.
 
-        The tables contain the weights of the runs, the part of each run's squared mean that an offset absorbs, and the
-        penalty.
+        The precomputed tables contain the weights of the runs, the part of each run's squared mean that an offset
+        absorbs, and the penalty.
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
@@ -88,12 +88,14 @@ class RunOffsets:
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
         normal = self.gram + np.diag(1.0 / np.array(prior) ** 2)
-        # Columns of equal length: unscaled, a residual of a million noises came out with a negative square.
+        # The matrix is scaled to a unit diagonal before inversion. Without scaling, rounding made the square of a
+        # residual negative if it was a million times the noise.
         length = np.sqrt(np.diag(normal))
         found = np.asarray(
             np.linalg.inv(normal / np.outer(length, length)) / np.outer(length, length), dtype=np.float64
         )
-        # Spreads come from a grid, and with one run there is only one: the searches ask for the same again and again.
+        # Results are cached, because spreads come from a grid, with one run even a single spread, and searches request
+        # the same ones repeatedly.
         found.setflags(write=False)
         self._metrics[sigma_mm] = found
         return found

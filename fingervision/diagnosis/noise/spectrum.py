@@ -99,8 +99,8 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
     """Choose the most probable noise model: white noise, an autoregression, or the sum of both.
 
     A sum that is fitted to white noise can have a correlated part below the frequencies used, and then overstates the
-    slow noise by a factor of three. The three kinds of noise therefore have equal prior probabilities, and the
-    posterior mean of the most probable kind is returned.
+    slow noise by a factor of three. White noise, an autoregression and their sum therefore have equal prior
+    probabilities, and the posterior mean of the most probable model is returned.
 
     Returns
     -------

@@ -22,8 +22,9 @@ WAYS = {"input, opening": 1.0, "input, closing": -1.0}
 def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ...]:
     """Add a remark to regions whose difference between opening and closing a clock offset explains.
 
-    A clock that is late by t changes the gap by its speed times t, and so by opposite amounts in the two directions.
-    The changes in both directions must be found, and must require an offset within its expanded uncertainty.
+    A clock that is late by t changes the gap by the speed of the gap times t, and so by opposite amounts for opening
+    and closing. A difference is attributed to the clocks only if it is found in both directions, and if the clock
+    offset that it requires is within the expanded uncertainty of the clocks.
 
     Parameters
     ----------

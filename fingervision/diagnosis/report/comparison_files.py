@@ -66,7 +66,7 @@ def residuals_of(found: Mapping[str, Comparison]) -> Figure:
 
 
 def _left_out(found: Mapping[str, Comparison]) -> tuple[int, ...]:
-    """Rows that are left out for every model: a row left out for one only may be a disagreement of another."""
+    """Rows left out for every model, because a row left out for one model may be a disagreement with another model."""
     return tuple(sorted(set.intersection(*(set(one.left_out) for one in found.values()))))
 
 

@@ -47,7 +47,7 @@ def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> 
     """Describe where the stage rests after each step of a command; None if there is no dead band.
 
     A servo with a dead band stops short of its command, on the side from which it came, or does not answer small steps.
-    The mean over all holds is subtracted, because an offset is no band.
+    The mean over all holds is subtracted, because an offset is no dead band.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str, *
     title : str
         Title of the plots.
     prefix : str
-        Beginning of the names of the files, so that two commands may write into one folder.
+        Beginning of the file names, so that two commands can write to one folder.
     """
     over_time = gap_over_time(curves, title)
     if over_time is None:

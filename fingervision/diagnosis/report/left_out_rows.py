@@ -1,4 +1,4 @@
-"""Rows set aside in the fit: which they are, when they were measured, and whether the figures count them."""
+"""Rows set aside in the fit: which they are, when they were measured, and whether stated numbers include them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -51,7 +51,7 @@ def outlier_rows(
 
 
 def outside_words(residual: Array, low: float, high: float) -> str:
-    """Number of left-out rows that lie outside a picture from `low` to `high`, and how far; empty if none."""
+    """Number of left-out rows that lie outside a plot from `low` to `high`, and how far; empty if there are none."""
     outside = residual[(residual < low) | (residual > high)]
     if not outside.size:
         return ""

@@ -16,8 +16,8 @@ def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Para
     """Find time constants and widths for which the data give no upper limit within their search range.
 
     Beyond the upper end of the search range of a time constant, the effect does not change: an exponential at its
-    beginning is a straight line, of which only the slope is known. The posterior within the range would state time
-    constant and amplitude with too small an uncertainty.
+    beginning is a straight line, of which only the slope is known. If the posterior were limited to the search range,
+    the stated uncertainties of time constant and amplitude would be too small.
 
     Parameters
     ----------

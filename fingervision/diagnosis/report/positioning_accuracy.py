@@ -1,10 +1,10 @@
 """Positioning accuracy and repeatability of an axis from repeated visits of targets, as ISO 230-2:2014 defines them.
 
-Published reports deviate from the standard in three ways, which the tests check with readings of real stages. In a
-report, `forward` may mean the approach from above, so that the reversal has the opposite sign. The stated repeatability
-R may be max(R_up, R_down), whereas the R of the standard is bidirectional and includes the reversal. The stated
-accuracy E may be the accuracy in one direction only. The functions of this module compute all quantities of the
-standard: compare a published R with R_up and R_down, and a published E with E_up and E_down.
+Published reports deviate from ISO 230-2 in three ways, which the tests check with readings of real stages. In a report,
+`forward` may mean the approach from above, so that the reversal has the opposite sign. The stated repeatability R may
+be max(R_up, R_down), whereas the R of ISO 230-2 is bidirectional and includes the reversal. The stated accuracy E may
+be the accuracy in one direction only. The functions of this module compute all quantities of ISO 230-2: compare a
+published R with R_up and R_down, and a published E with E_up and E_down.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,6 @@
 """Quantities of positioning accuracy: symbols and definitions of ISO 230-2:2014, and their data classes.
 
-The arrows of the standard are written `up` (target approached from below, the input increasing) and `down` (from
-above).
+The arrows of ISO 230-2 are written `up` (target approached from below, the input increasing) and `down` (from above).
 
 References
 ----------

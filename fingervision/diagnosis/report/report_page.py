@@ -140,7 +140,7 @@ def _how_much(report: DiagnosisReport) -> str:
 
 
 def _counted(d: Disagreement) -> str:
-    """Rows and offsets that the verdict counts, in words."""
+    """Sentence with the rows and offsets that the verdict takes into account."""
     offsets = "" if d.unseen_before_rms_mm is None else ", without the runs' own offsets"
     return f"counted: {d.rows - d.rows_left_out} of {d.rows} rows{offsets}"
 

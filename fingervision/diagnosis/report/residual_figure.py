@@ -74,7 +74,7 @@ def residual_figure(
 
 
 def _left_out(axes: Axes, x: Array, residual: Array, *, note: bool) -> None:
-    """Mark rows left out, without a change of the scale; a note states how many lie outside the picture."""
+    """Mark rows left out, without a change of the scale; a note states how many rows lie outside the plot."""
     low, high = axes.get_ylim()
     axes.plot(x, residual, "o", color=LEFT_OUT, markerfacecolor="none", markersize=4, mew=0.8, label="left out")
     axes.set_ylim(low, high)

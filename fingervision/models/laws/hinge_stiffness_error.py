@@ -21,8 +21,8 @@ def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
     """Change the thickness of all hinges and the modulus so that the force changes by the given ratio.
 
     The thickness contributes the factor (1 + ratio)^p to the force, where p is `thickness_share`. The modulus, which
-    does not affect the gap, contributes the remaining factor (1 + ratio)^(1 - p). For the published gripper, hinges
-    thinner by 0.1 mm make the opening 0.17 % wider and the force 22 % smaller.
+    does not affect the gap, contributes the remaining factor (1 + ratio)^(1 - p) to the force. For the published
+    gripper, hinges thinner by 0.1 mm make the opening 0.17 % wider and the force 22 % smaller.
     """
     thickness_mm = drawn.gripper.hinge.thickness_mm
     curves = ratio_curves(

@@ -1,6 +1,6 @@
 """A Newport ESP300 (or ESP301) motion controller's axis as a stage, by pymeasure; needs the extra `pymeasure`.
 
-Commands as in Newport's "ESP300 User's Manual" (PA, VA, MV, ST, OR, MD, TP, TE), which pymeasure's `ESP300` speaks. The
+Commands as in Newport's "ESP300 User's Manual" (PA, VA, MV, ST, OR, MD, TP, TE), which pymeasure's `ESP300` uses. The
 adapter is tested against pymeasure's protocol emulator (`pymeasure.test.expected_protocol`, which compares each
 command) and against an emulated axis written from the manual (tests/adapters/esp300_axis.py), and not on hardware.
 """

@@ -4,7 +4,7 @@
 its data sheet. Positions are sent and read in microsteps, speeds in microsteps/s x 1.6384 (Zaber, "ASCII Protocol
 Manual", units), so that neither a device database nor a network is needed. The adapter is tested with zaber-motion
 against an emulated device in the network, written from the manual (tests/adapters/zaber_device.py), and not on
-hardware. The library's own mock connection cannot be used, because it responds to no commands.
+hardware. The library's own mock connection cannot be used, because it does not respond to commands.
 """
 
 from collections.abc import Callable

@@ -70,7 +70,7 @@ class Board:
 
     @property
     def dropped(self) -> str | None:
-        """Reason in words why the drive line was released; None if it was not."""
+        """Reason in words why the drive line was released; None if the drive line was not released."""
         words = DROPPED.get(self._cause)
         return None if words is None else words.format(silence_ms=self.settings.silence_ms)
 

@@ -37,7 +37,7 @@ NUMBERS = 128
 
 
 class BoardRefusalError(FingervisionError):
-    """The board did not execute a command; `reason` is its word for the cause."""
+    """The board did not execute a command; `reason` is the cause, as stated by the board."""
 
     def __init__(self, port: str | None, reason: str) -> None:
         super().__init__(f"The board on {port} refused a command ({reason}).")
@@ -119,7 +119,9 @@ class BoardLink:
                 self._news.wait(seconds)
 
     def command(self, words: str, within_s: float = ANSWER_WITHIN_S) -> wire.Answer | wire.Identity:
-        """Send a command, repeat it if the response is lost, and return the response. The board executes it only once.
+        """Send a command, repeat the command if the response is lost, and return the response.
+
+        The board executes a repeated command only once, because every command has a number.
 
         Raises
         ------

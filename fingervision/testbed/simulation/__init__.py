@@ -1,1 +1,4 @@
-"""Components of simulated parts: stage, gripper, clocks, optics. No hardware module imports these."""
+"""Components of simulated parts: stage, gripper, clocks, optics.
+
+Drivers of hardware do not import these modules directly.
+"""

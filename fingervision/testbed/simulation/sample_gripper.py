@@ -5,7 +5,7 @@ from fingervision.models.reference_mesh import REFERENCE_HINGE, REFERENCE_LEVER,
 
 
 def sample_gripper() -> Gripper:
-    """Return the sample's drawing; material and body are published; other values as in sample_frames/paper."""
+    """Return the drawing of the published gripper; only its material and body are published values."""
     return Gripper(
         material=Material("PA2200", 1650.0, 0.34, 930.0, 48.0),
         body=Body(80.0, 100.0, 3.0, 4.0, 0.3),
