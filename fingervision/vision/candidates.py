@@ -107,7 +107,7 @@ def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
     border = np.asarray(cv2.morphologyEx(split.dark, cv2.MORPH_GRADIENT, np.ones((3, 3), dtype=np.uint8))) > 0
     change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))
     least = EDGE_SHARE * contrast
-    # The median is above `least` where more than half of the pixels are: counting takes a third of the time.
+    # The median exceeds `least` if more than half of the pixels do; counting takes a third of the time of a median.
     steep, pixels = int(np.count_nonzero((change > int(least)) & border)), int(np.count_nonzero(border))
     if 2 * steep == pixels:
         return bool(pixels and np.median(change[border]) > least)

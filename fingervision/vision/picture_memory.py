@@ -1,4 +1,4 @@
-"""Memory of intermediate pictures, which is kept for the next frame."""
+"""Setting of the C library to keep the memory of intermediate pictures for the next frame."""
 
 from functools import cache
 
@@ -20,6 +20,6 @@ def keep_picture_memory() -> bool:
     Returns
     -------
     bool
-        Whether the C library does so; other C libraries are left as they are.
+        Whether the C library has this setting; other C libraries remain unchanged.
     """
     return bool(_keep(KEPT_BYTES))

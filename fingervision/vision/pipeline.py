@@ -207,7 +207,9 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
             if fingers.status is not Status.NO_FINGERS and split not in are_edges:
                 are_edges[split] = has_edges(denoised, split, binary.contrast)
             if fingers.status is not Status.NO_FINGERS and not are_edges[split]:
-                fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
+                fingers = NoGap(
+                    Status.NO_FINGERS, "The picture has only gradual transitions from light to dark, but no edge."
+                )
             attempt = _Attempt(fingers, split)
         else:
             attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)

@@ -44,10 +44,10 @@ Ints = NDArray[np.int_]
 
 # Ratio of a step's residuals to the noise of the picture's flat parts above which other models are tried.
 UNEXPLAINED = 1.2
-# Flanks that are broader than the tips and leave so many times the noise, without a common profile, are no steps: a pad
-# or a shadow is as broad as the window there. Motion leaves less than twice the noise.
+# Ratio of the residuals to the noise of the picture's flat parts above which wide flanks without a common profile are
+# not steps, but pads or shadows as wide as the window. Motion causes a ratio below 2.
 NO_STEP = 3.0
-# A wall improves what a step leaves by so much in chi-square.
+# Least reduction of chi-square by a wall, compared with a step.
 SIGNIFICANT = 30.0
 # Difference in chi-square above which one model is clearly better than another, in units of the residual per bin (odds
 # of e^8 to one).
@@ -71,8 +71,9 @@ CUT_OFF_SIGMAS = 2.0
 ONE_SIDED, ONE_SIDED_PX, STRIP = 0.5, 1.2, "strip"
 # Width of a wall or glare, as a multiple of the blur, below which it cannot be distinguished from blur.
 RESOLVED_BLURS = 1.6
-# A wall that a plain step fits as well is left alone, and stated, where it is narrower than this: chance makes such
-# walls of flanks in uneven light (1.1 blurs); walls of 2 px behind a blur of 1.2 px are found no narrower than 1.58.
+# Width of a wall, as a multiple of the blur, below which the wall only increases the uncertainty if a plain step fits
+# equally well. By chance, flanks in uneven light look like walls of 1.1 blurs; real walls of 2 px with a blur of 1.2 px
+# are found with at least 1.58 blurs.
 HIDDEN_BLURS = 1.4
 # Motion spreads a fillet of this radius like a box and not like a Gaussian: the half-level moves by up to half of the
 # variance that it adds over the radius.
@@ -203,7 +204,8 @@ def with_profile(
         remains = sum(fit.squares for fit in narrow)
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
             chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
-            if is_step and any(fit.breadth < HIDDEN_BLURS * fit.blur for fit in narrow):  # a wall, or chance
+            # Possibly a wall, possibly chance.
+            if is_step and any(fit.breadth < HIDDEN_BLURS * fit.blur for fit in narrow):
                 return _unsure(edges, [abs(fit.position) + 2.0 * fit.u_position for fit in chosen], "wall")
             return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
     flanks, tips = squared_blurs(edges)

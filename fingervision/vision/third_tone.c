@@ -1,4 +1,4 @@
-/* The lines of one side of a finger that are looked at, thinned out. */
+/* Lines of one side of a finger that are examined, evenly distributed along the side. */
 typedef struct {
     int64_t count, row[2 * MOST_ROWS + 2], edge[2 * MOST_ROWS + 2], outward;
 } Side;
@@ -17,7 +17,8 @@ static Side side_of(const int64_t *fixed, const double *position, const double *
     return side;
 }
 
-/* Upper median of a few levels by rank: without branches on the levels, twice as fast for noise as a selection. */
+/* Upper median of a few levels, found by rank: without branches that depend on the levels, it is computed twice as fast
+   for noise as by selection. */
 static int32_t middle_by_rank(const int32_t *levels, int32_t n) {
     for (int32_t i = 0; i < n; i++) {
         int32_t below = 0, alike = 0;
@@ -30,7 +31,7 @@ static int32_t middle_by_rank(const int32_t *levels, int32_t n) {
     return 0;
 }
 
-/* Median level at a distance outwards from the edge; 0 where too few rows are in the picture. */
+/* Compute the median level at a distance outwards from the edge; return 0 if too few rows are in the picture. */
 static int level_at(const Arg *upright, const Side *side, int64_t d, double *level) {
     int32_t levels[2 * MOST_ROWS + 2], n = 0;
     for (int64_t i = 0; i < side->count; i++) {
@@ -42,8 +43,8 @@ static int level_at(const Arg *upright, const Side *side, int64_t d, double *lev
     return 1;
 }
 
-/* Level half-way up the step in which a strip outside (sense 1) or inside (-1) of a side ends; 0 where there is none.
-   Only a step of the same sense as the edge itself ends a strip between finger and ground. */
+/* Mean level of the step at which a strip outside (sense 1) or inside (sense -1) a side ends; 0 if there is no strip. A
+   strip between finger and background ends with a step of the same sign as the edge. */
 static double strip_end(const Arg *upright, const Side *side, int64_t near, int64_t room_px, int64_t sense, double contrast) {
     double profile[REACH_PX + 1], most = (sense > 0 ? LEAST_STEP : LEAST_SHADE) * fabs(contrast), found = 0.0;
     double way = contrast > 0.0 ? 1.0 : contrast < 0.0 ? -1.0 : 0.0;

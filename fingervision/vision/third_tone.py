@@ -26,8 +26,9 @@ REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
 # Least step at the end of a strip, as a share of the edge's contrast, within this number of pixels; strips are only
 # searched outside the blur of the edge.
 LEAST_STEP, STEP_PX = 0.12, 6
-# A shadow that is darker than that is looked for inside the fingers' sides, down to this share; it has one tone: where
-# its two strips end, levels differ by less than this share of the contrast.
+# Least step at the end of a strip on the finger's side of an edge, as a share of the contrast. If only one finger has
+# such a strip, the strip beyond the other finger's outer edge, if in view, must have the same level within the second
+# share of the contrast, because a shadow has a uniform tone.
 LEAST_SHADE, ALIKE = 0.05, 0.04
 
 THIRD_TONE = NoGap(

@@ -21,7 +21,8 @@ CREEP_PRIOR = 0.02
 """Prior standard deviation of the creep's share of the motion at each time constant: metals creep by 0.1 % of a strain,
 printed polymers by one to five per cent per decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
 OTHER_CREEP = (1.0 / 3.0, 3.0)
-"""Factors on the creep's time constants by which its unknown course is varied: half a decade each way."""
+"""Factors on the time constants of creep, half a decade down and up, because the true course of the creep is unknown.
+"""
 STEPS = 12
 """Largest number of Gauss-Newton steps; three to five steps suffice from the peak of the correlation."""
 SETTLED = 1e-3
@@ -118,10 +119,10 @@ def squares_at(motion: Motion, at: Alignment) -> float:
 def allowance_for_creep(motion: Motion, found: Fit) -> tuple[Array, Array]:
     """Changes of offset, rate and play, and of their variances, if creep is added to the model; each of shape (3,).
 
-    If creep is already included, its time constants are varied, and the change is the largest. In slow motion, creep
-    too small to be detected acts as a delay equal to
-    (creep fraction x time constant), and can also be mistaken for play. The change is that of the most probable creep;
-    the growth covers the creep that remains possible within its prior.
+    If the model already includes creep, the time constants of creep are varied instead, and the largest changes are
+    returned. In slow motion, creep too small to be detected acts as a delay equal to (creep fraction x time constant),
+    and can also be mistaken for play. The changes of offset, rate and play are those caused by the most probable creep;
+    the changes of the variances cover the creep that remains possible within its prior.
     """
     free_play = found.at.play_mm > 0.0
     growth = np.zeros(3)

@@ -8,15 +8,19 @@ from numpy.typing import NDArray
 from fingervision.domain.effect import Array
 
 LINES = (48.0, 24.0, 12.0, 6.0, 3.0)
-"""Encoder lines through which a stroke is drawn: as many of these as are straight; through three, the stroke is known
-to a fifth of a step at the reversal. Where a row lies near every line, twelve leave a third of a step."""
+"""Numbers of encoder lines to which a stroke is fitted; the largest number for which the stroke is straight is used.
+With three lines, the stroke's position at the reversal has an uncertainty of a fifth of a step. If the log has only
+about one row per line, even twelve lines leave an uncertainty of a third of a step.
+"""
 LEAST_ROWS = 6
 """Least number of rows on each side of a reversal to which a line is fitted."""
 STRAIGHT = 1.3
-"""Scatter of the readings about a straight stroke, over that of rounding, above which the stroke is curved."""
+"""Ratio of the readings' scatter about a straight stroke to that of rounding, above which the stroke is curved."""
 ALLOWED, LINE_SIGMAS = 0.55, 1.0
-"""Distance of a reading from a path that it allows: 0.55 steps (half a step, and a tenth of it for curvature), and the
-standard uncertainty of the line there. Twice that lets curved turns pass that are drawn through a few lines."""
+"""Largest distance between a reading and a possible path: 0.55 steps (half a step, plus a tenth of half a step for
+curvature), plus one standard uncertainty of the fitted line. With two standard uncertainties, curved reversals would be
+accepted as sharp if few encoder lines are fitted.
+"""
 
 
 def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: float) -> Array:
@@ -83,7 +87,7 @@ class Stroke:
     height_mm : float
         Value at the time of the reversal.
     u_mm : float
-        Standard uncertainty of that value, by the rounding of each row.
+        Standard uncertainty of `height_mm`, due to the rounding of each row.
     """
 
     nearest: int
@@ -93,7 +97,7 @@ class Stroke:
 
 
 def allowed_mm(step_mm: float, *lines: Stroke) -> float:
-    """Largest distance (mm) of a reading from a path of strokes that it allows."""
+    """Largest distance (mm) between a reading and a path of strokes that agrees with the reading."""
     return ALLOWED * step_mm + LINE_SIGMAS * max((line.u_mm for line in lines), default=0.0)
 
 
