@@ -1,10 +1,10 @@
 """Select the model of the mean profile across a flank, from which the position of the finger's edge follows.
 
-A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these structures are
-indistinguishable on one flank alone: a wall half as light as the background looks like motion blur, and glare looks
-like a wall on the other side of the edge. Walls, motion, glare and shadows are distinguished by where they occur: a
-wall is visible on the inner flank only, because the camera looks into the gap from its middle; motion blurs both flanks
-but not the tip; glare and shadow surround the finger.
+A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. On one flank alone, some
+structures are indistinguishable: a wall half as light as the background looks like motion blur, and glare looks like a
+wall on the other side of the edge. Walls, motion, glare and shadows are distinguished by where they occur: a wall is
+visible on the inner flank only, because the camera looks into the gap from its middle; motion blurs both flanks but not
+the tip; glare and shadow surround the finger.
 """
 
 from dataclasses import replace
