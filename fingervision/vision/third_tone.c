@@ -60,8 +60,9 @@ static double strip_end(const Arg *upright, const Side *side, int64_t near, int6
     return found;
 }
 
-/* Both strips of a finger's side: picture, fixed, position, weight and outward sense (2, PLACES), which finger, first and
-   last place of the side, how near to the edge, how far out; levels of the inner and of the outer strip's end. */
+/* Inner and outer strip along a finger's side. Arguments: picture, fixed, position, weight and outward sign (2, PLACES),
+   which finger, first and last entry of the side, least and largest distance from the edge; results, levels at the ends of
+   the inner and of the outer strip. */
 LOOP(third_tone_strips, "pIFFIiiiii", "dd") {
     int64_t first = in[5].i * in[1].shape[1] + in[6].i, near = in[8].i;
     double inside, outside;
