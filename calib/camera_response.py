@@ -198,8 +198,8 @@ STUDIO = {"srgb": (8, 16, 235), "bt709": (8, 16, 235), "hlg": (10, 64, 940), "pq
 def _studio(name: str) -> Callable[[Floats], Floats]:
     """Transfer curve of a video with studio range, whose black and white lie within the range of stored levels.
 
-    Below black the curve continues antisymmetrically, above white by its own formula, because filters and noise cause
-    such levels.
+    Filters and noise cause levels below black and above white: below black the curve continues antisymmetrically, above
+    white by its own formula.
     """
     curve = CURVES[name]
     bits, black, white = STUDIO[name]

@@ -1,4 +1,4 @@
-"""Sources of a distance's uncertainty, one function each; only `calib.budget` combines them.
+"""Sources of a distance's uncertainty, one function for each source; only `calib.budget` combines the sources.
 
 Every function returns a standard uncertainty in millimetres, shape (n,), for n distances. The formula is
 gap_mm = (gap_px + p b) / s, where gap_px is the measured width, s the scale, b the edge bias, and p = +1 for a light
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def edge_noise_mm(u_random_px: Floats, px_per_mm: float) -> Floats:
-    """Contribution of the noise of the two edges in one frame, the only one that differs from frame to frame."""
+    """Contribution of the noise of the two edges, the only contribution that differs from frame to frame."""
     return np.asarray(u_random_px / px_per_mm)
 
 

@@ -10,8 +10,8 @@ LONGEST_PART = 0.25
 def rows_in_one(residual: NDArray[np.float64]) -> float:
     """Return the integrated correlation time of residuals in rows, at least 1.
 
-    The variance of a mean over n rows is the variance of one row times this number, divided by n. The sum over lags
-    stops where the sum of two neighbouring correlations becomes negative (Geyer's initial positive sequence,
+    The variance of a mean over n rows is the variance of one row times the correlation time, divided by n. The sum over
+    lags stops where the sum of two neighbouring correlations becomes negative (Geyer's initial positive sequence,
     Statistical Science 7(4), 1992, 473-483).
 
     Parameters

@@ -104,7 +104,7 @@ def find_widths(
 def _choices(
     picture: KnownSize, pairs: Sequence[ParallelEdges], region: tuple[int, int, int, int] | None
 ) -> list[ParallelEdges]:
-    """List the possible widths of the object: one, or two for a rectangle that is completely visible.
+    """List the possible widths of an object: one width, or two widths for a rectangle that is completely visible.
 
     If there are two possible widths, the pair with the longer edges comes first.
     """

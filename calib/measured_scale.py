@@ -151,7 +151,8 @@ class Calibration:
     def u_px_per_mm(self) -> float:
         """Standard uncertainty of the scale.
 
-        The contributions of plane, tilt and lens are part of a distance's budget and are not included here.
+        The standard uncertainty of the scale does not include plane, tilt and lens, which are part of a distance's
+        budget.
         """
         return sqrt(float(self.covariance[0, 0]))
 
@@ -186,7 +187,7 @@ class Calibration:
     def unflatten(self, points_px: Floats) -> Floats:
         """Apply lens distortion and perspective to points of the undistorted plane, shape (..., 2).
 
-        This is the inverse of `flatten`.
+        The function `unflatten` is the inverse of `flatten`.
         """
         seen = np.asarray(points_px, dtype=np.float64)
         if self.plane is not None:

@@ -17,7 +17,7 @@ def centre_px(frame_size_px: tuple[int, int]) -> Floats:
 def lens_shift_px(points_px: Floats, frame_size_px: tuple[int, int]) -> Floats:
     """Displacement by third-order radial distortion of 1 (100 %) of the radius at the picture's corner.
 
-    This is the first term of Brown's series; `points_px` and the result have shape (..., 2).
+    Third-order distortion is the first term of Brown's series; `points_px` and the result have shape (..., 2).
     """
     middle = centre_px(frame_size_px)
     radius = points_px - middle

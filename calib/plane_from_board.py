@@ -92,7 +92,7 @@ def _homography(board_mm: Floats, points_px: Floats) -> Floats:
 
 
 def _squared(to_picture: Floats, middle: Floats) -> tuple[Plane, float, float]:
-    """Plane that keeps the picture's centre and directions there, its scale, and the ratio of extreme stretches."""
+    """Plane that keeps the centre and directions of the picture, its scale, and the ratio of extreme stretches."""
     to_board = np.asarray(np.linalg.inv(to_picture), dtype=np.float64)
     at = apply_homography(to_board, middle)
     steps = MIDDLE_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])

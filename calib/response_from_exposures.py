@@ -1,7 +1,8 @@
 """Camera response from pictures of one static scene at several known exposures.
 
-The light at a pixel is the radiance of the scene there times the exposure: ln f(level) = ln radiance + ln exposure. The
-radiances and f are estimated together by least squares (Debevec & Malik, SIGGRAPH 1997, doi:10.1145/258734.258884).
+The light at a pixel is the scene's radiance times the exposure, so that the response curve f satisfies ln f(level) = ln
+radiance + ln exposure. The radiances and the response curve f are estimated together by least squares (Debevec & Malik,
+SIGGRAPH 1997, doi:10.1145/258734.258884).
 """
 
 from collections.abc import Sequence

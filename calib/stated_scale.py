@@ -48,8 +48,8 @@ class StatedScale(BareScale):
     def for_frames(self, frame_size_px: tuple[int, int]) -> Calibration:
         """Return the calibration that corresponds to the stated values.
 
-        The stated uncertainty is one contribution to its budget. As with a single reference object, the edge bias is
-        unknown, and the set-up's imperfections have their default limits (`calib.limits.Limits`).
+        The stated uncertainty is one contribution to the calibration's budget. As with a single reference object, the
+        edge bias is unknown, and the set-up's imperfections have their default limits (`calib.limits.Limits`).
 
         Parameters
         ----------

@@ -41,6 +41,14 @@ typedef union {
 #define FLAGS(k) ((uint8_t *)in[k].data)
 #define POINTS(k) ((const int32_t *)in[k].data)
 
+/* A function in a version for every width of vector registers, of which the widest that the processor has is chosen when the
+   library is loaded. Numbers side by side are worked out as one by one: the same digits. */
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define SIDE_BY_SIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define WIDE
+#endif
+
 static const double PI = 3.14159265358979323846;
 
 /* Python's max and min. */

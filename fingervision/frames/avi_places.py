@@ -1,11 +1,11 @@
 """Frame number of an AVI packet from its position in the file, because AVI stores no times, only an order.
 
 If a reader loses a frame at a damaged place and continues to count, every later frame gets too low a number. The file's
-own index (idx1) states the position of each frame, so that a packet at a stated position is identified, whatever was
-lost before it. If bytes are missing, the following packets lie nearer to the start of the file than the index states.
-Such packets are identified by a sequence of packet lengths that occurs only once in the rest of the index. If no byte
-is missing, a packet at a position that is not in the index was never written: its header is damaged. Without a valid
-index, frames are counted as long as the chunks follow each other without a gap.
+own index (idx1) states the position of each frame, so that a packet at a stated position is identified even if other
+packets were lost before. If bytes are missing, the following packets lie nearer to the start of the file than the index
+states. Packets at shifted positions are identified by a sequence of packet lengths that occurs only once in the rest of
+the index. If no byte is missing, a packet at a position that is not in the index was never written: its header is
+damaged. Without a valid index, frames are counted as long as the chunks follow each other without a gap.
 
 Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
 """
@@ -88,7 +88,7 @@ class AviPlaces:
         return found
 
     def _by_length(self, begin: int, size: int) -> int | None:
-        """Frame number from the lengths of this packet and the unidentified ones before it, if only one number fits."""
+        """Frame number from the lengths of a packet and of the unidentified packets before, if only one number fits."""
         if self.is_lost:
             possible = self._possible + 1
             possible = possible[possible < len(self._sizes)]
@@ -106,7 +106,7 @@ class AviPlaces:
         return number
 
     def _counted(self, begin: int) -> int | None:
-        """Number of pictures up to a chunk; those that are skipped were dropped by the camera or the reader."""
+        """Number of pictures up to a chunk, including pictures that the camera or the reader dropped."""
         if self._end is None:
             return None
         at, number = self._end, self._number + 1

@@ -1,4 +1,4 @@
-"""Settings of this machine's cameras that may be changed while they run, in the user's units and in OpenCV's."""
+"""Settings of this computer's cameras that can be changed while a camera runs, in the user's units and in OpenCV's."""
 
 from collections.abc import Iterator, Mapping
 

@@ -8,8 +8,9 @@ cap_avfoundation_mac.mm of OpenCV 4 and 5):
   If the environment asks for normalised values, the V4L2 menu returns 0.25 and 0.75 and every other property a fraction
   of an unknown range; mode 0 switches that off.
 * Media Foundation's exposure is the logarithm to base 2 of seconds. In Media Foundation, setting an automatic mode also
-  sets its value (the focus would run to 0), and reading the mode back gives no information. Setting a value there makes
-  the property manual, so that writing back the value just read holds it.
+changes the value of the property (the focus would run to 0), and reading the mode back gives no information. In Media
+Foundation,
+  setting a value makes the property manual, so that writing back the value just read keeps the value constant.
 * AVFoundation supports size and frame rate only.
 """
 

@@ -44,7 +44,7 @@ class CodedTime:
 
 
 def is_shown(packet: "av.Packet[Any]", codec: str) -> bool:
-    """Whether a packet presents a picture; in VP8 this is a bit of the first byte (RFC 6386, 9.1)."""
+    """Whether a packet presents a picture, which VP8 states in a bit of the first byte (RFC 6386, 9.1)."""
     return codec != "vp8" or bool(bytes(packet)[0] & 0x10)
 
 

@@ -1,8 +1,8 @@
 """Settings of a camera that can be changed while it runs, with their limits and the values that the camera accepted.
 
-A live source with such settings has `controls()` and `set_control(name, value)`; both are called between two frames by
-the thread that reads the frames, so that a driver needs no lock. A source without these two methods has no such
-settings.
+A live source whose settings can be changed has the methods `controls()` and `set_control(name, value)`. Both methods
+are called between two frames by the thread that reads the frames, so that a driver needs no lock. A source without
+`controls` and `set_control` has no settings that can be changed.
 """
 
 from dataclasses import dataclass

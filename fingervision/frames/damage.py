@@ -53,7 +53,7 @@ class DamageTrail:
         self._broken.setdefault(self._last, why)
 
     def recovers(self, over: int) -> None:
-        """Record that the last picture depends on no packet before the one that entered `over` positions earlier.
+        """Record that the last picture does not depend on packets more than `over` positions earlier.
 
         Streams without key frames are refreshed part by part: once every part has been refreshed, pictures no longer
         depend on those before the refresh.
@@ -62,7 +62,7 @@ class DamageTrail:
             self._recoveries[self._last] = self._last - over
 
     def fails(self, why: str) -> Iterator[Picture]:
-        """Record that the last packet, which depends on no other, gives no picture; a lost frame is yielded instead."""
+        """Record that the last packet, which depends on no other packet, gives no picture, and yield a lost frame."""
         self.breaks(why)
         own = [entry for entry in self._entered if entry[1] == self._last]
         for entry in own:

@@ -55,7 +55,7 @@ def child(content: mmap.mmap, parent: Element, name: bytes) -> Element | None:
 
 
 def number(content: mmap.mmap, at: int, *, keep_marker: bool) -> tuple[int, int]:
-    """Read a number of 1 to 8 bytes, and return it with the position of its end (the start if there is no number)."""
+    """Read a number of 1 to 8 bytes, and return the number and its end position (if no number: start position)."""
     if at >= len(content) or content[at] == 0:
         return 0, at
     length = 9 - content[at].bit_length()

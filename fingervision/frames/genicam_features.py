@@ -1,4 +1,4 @@
-"""Features of a GenICam camera: those requested at the start, those stated, and those that may change later.
+"""Features of a GenICam camera: requested at the start, stated by the camera, or changeable while the camera runs.
 
 The names of the features are those of the Standard Features Naming Convention (EMVA). Each GenTL producer has exception
 classes of its own, so that every exception is caught.
@@ -60,7 +60,7 @@ def _limit(nodes: Any, node: str, end: str) -> float | None:
 
 
 def request_settings(nodes: Any, wish: Wish) -> tuple[str, ...]:
-    """Request settings and a grey format; return a sentence for each one that the camera refuses."""
+    """Request settings and a grey format from a camera; return a sentence for each refused setting."""
     asked: dict[str, Any] = {}
     if feature_value(nodes, "PixelFormat") not in MONO:
         asked["PixelFormat"] = next((each for each in MONO if each in _choices(nodes, "PixelFormat")), None)

@@ -104,11 +104,11 @@ def _check_png(name: str, content: bytes) -> None:
     place = len(PNG_SIGNATURE)
     while True:
         if place + 12 > len(content):
-            raise UnreadableImageError(f"{name} is cut off: the file ends before its picture is complete.")
+            raise UnreadableImageError(f"{name} is truncated: the file ends before its picture is complete.")
         (length,) = struct.unpack_from(">I", content, place)
         end = place + 8 + length
         if end + 4 > len(content):
-            raise UnreadableImageError(f"{name} is cut off: the file ends before its picture is complete.")
+            raise UnreadableImageError(f"{name} is truncated: the file ends before its picture is complete.")
         kind = content[place + 4 : place + 8]
         (stated,) = struct.unpack_from(">I", content, end)
         if zlib.crc32(memoryview(content)[place + 4 : end]) != stated:

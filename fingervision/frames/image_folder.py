@@ -1,4 +1,4 @@
-"""Folders and glob patterns of images, in natural order, with times if a table states these."""
+"""Folders and glob patterns of images, in natural order, with times if a table states the times."""
 
 import glob
 import re
@@ -142,7 +142,7 @@ def _files(name: str) -> tuple[Path, ...]:
     images = [file for file in found if file.suffix.lower() in IMAGE_SUFFIXES and not file.name.startswith(".")]
     files = tuple(sorted((file for file in images if file.is_file()), key=_natural))
     if not files:
-        raise InputFileError(f"{what} ({', '.join(sorted(IMAGE_SUFFIXES))}), but there is none.")
+        raise InputFileError(f"{what} ({', '.join(sorted(IMAGE_SUFFIXES))}), but no such image was found.")
     return files
 
 

@@ -3,9 +3,9 @@
 The arithmetic decoders of VP8 and VP9 give a picture for any bytes: after a flipped bit there is no error message, and
 a finger may be shown at its position in an earlier frame. The container may help: a cluster whose first element is a
 CRC-32 states the checksum of all following bytes (FFmpeg writes it into `.mkv`, not into `.webm`). If the checksum is
-wrong, every picture of the cluster counts as damaged, and every later picture that depends on one of them. Codecs that
-detect damage themselves are not checked in this way, because they lose a single picture where this check loses a
-cluster.
+wrong, every picture of the cluster counts as damaged, and so does every later picture that depends on a damaged
+picture. Codecs that detect damage themselves are not checked by checksums, because a codec rejects a single picture
+whereas a wrong checksum rejects a whole cluster.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 11.3.1 (CRC-32: of ISO 3309, little-endian).
 """

@@ -2,8 +2,9 @@
 
 A cluster states one time, relative to which the times of its blocks are given, so that one flipped bit shifts seconds
 of frames forward or back. The file's index (cues) repeats the times of the key frames: a cluster that contains none of
-the times stated by its cues has a wrong time. Without cues, clusters must follow one another in time: if two overlap,
-neither is trusted unless a cue confirms it, and the last cluster must lie within the stated duration.
+the times stated by its cues has a wrong time. Without cues, clusters must follow one another in time. If two clusters
+overlap, neither cluster is trusted unless a cue confirms its time; the last cluster must lie within the stated
+duration.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters), 5.1.5 (cues).
 """

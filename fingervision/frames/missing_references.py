@@ -2,22 +2,22 @@
 
 H.264 numbers its pictures (see `reference_chain`), HEVC names the reference pictures, MPEG-2 has a constant rate
 (`transport_stream`). With other codecs, a missing packet causes no decoding error: the differences of the next picture
-are added to an older one, and a moving finger is shown in an old position. Four criteria are used, all from data that
-are read before decoding:
+are added to an older picture, and a moving finger is shown in an old position. Four criteria are used, all from data
+that are read before decoding:
 
 * AV1 numbers the pictures in the order in which they are shown. If a number is omitted, a picture is missing;
   consecutive numbers prove that none is missing, whatever the times are.
-* MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing picture is visible in this
-  bit; if the bit fits although a time is missing, an odd number of pictures was never coded.
-* In MPEG-4 part 2 a B picture lies between two others in time. A B picture that is presented after all pictures
+* MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing P picture is visible in
+the toggling bit. If the bit is correct although a time is missing, an odd number of pictures was never coded. * In
+MPEG-4 part 2 a B picture lies between two other pictures in time. A B picture that is presented after all pictures
   received so far depends on a missing picture.
 * Times. In a file with equidistant times (coded at a constant rate), a gap in the times of a whole number of steps
-  means that pictures are missing. If times are irregular, or such gaps are frequent, the camera or the encoder skipped
+  means that pictures are missing. If times are irregular, or gaps are frequent, the camera or the encoder skipped
   pictures, and a gap proves nothing: a missing VP8 or VP9 picture, or two missing pictures of MPEG-4, are then not
   detected. If every n-th picture is a key frame and n packets lie between two key frames, no picture is missing: the
   camera paused.
 
-AVI is not judged by times, because it counts frames and marks omitted ones by an empty chunk.
+AVI is not judged by times, because AVI counts frames and marks an omitted frame by an empty chunk.
 """
 
 from bisect import bisect_right
@@ -133,7 +133,7 @@ def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
     """Find packets after a missing picture by MPEG-4's rounding bit.
 
     The bit is used only if the P pictures of this stream toggle it. The first P picture after an I picture is checked
-    only if the bit has the same value in nearly all such pictures.
+    only if the bit has the same value in nearly all first P pictures.
     """
     needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
     pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]
@@ -193,8 +193,8 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
 def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
     """Whether as many packets as usual lie between the key frames around a hole, which means that the camera paused.
 
-    A coder that makes every n-th picture a key frame counts the pictures that it coded. If pictures had been lost,
-    there would be fewer packets between the key frames, unless a multiple of n was lost.
+    A coder that makes every n-th picture a key frame counts the pictures that it coded. Lost pictures would reduce the
+    number of packets between two key frames, unless a multiple of n was lost.
     """
     lengths = [after - before for before, after in pairwise(key_numbers)]
     behind = bisect_right(key_numbers, number)

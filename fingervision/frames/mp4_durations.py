@@ -1,12 +1,12 @@
 """Check the times in an MP4 file's table of contents, because one damaged number in it shifts all frames.
 
 The file states the duration of its pictures three times: as the sum of the pictures' durations (`stts`), in the head of
-the track (`mdhd`), and in the edit list (`elst`), which also states the first picture to be shown. The first two are in
-the track's own ticks, the third in those of the whole film. If FFmpeg cannot read a table to its end, it leaves the
+the track (`mdhd`), and in the edit list (`elst`), which also states the first picture to be shown. `stts` and `mdhd`
+are in the track's own ticks, `elst` in ticks of the whole film. If FFmpeg cannot read a table to its end, it leaves the
 rest unread, and the times are too late by the reordering delay of the encoder. The times are accepted if
 
 * all tables of a track that FFmpeg needs can be read to their ends, and state the same number of pictures;
-* the shown duration is not longer than that of all pictures;
+* the shown duration is not longer than the duration of all pictures;
 * a shorter shown duration is not explained by a single damaged byte, so that somebody cut the film.
 
 Files in fragments state their times with each fragment, and are not checked.
@@ -104,7 +104,7 @@ def states_another_duration(path: Path) -> bool:
 
 
 def _is_unread(path: Path) -> bool:
-    """Whether FFmpeg stops reading within the table of contents, and continues with an incomplete one."""
+    """Whether FFmpeg stops reading within the table of contents, and continues with an incomplete table."""
     with listening("") as heard, suppress(av.FFmpegError, IndexError), open_container(path):
         return any(GIVES_UP in words for _, _, words in heard.log)
     return False
@@ -159,7 +159,7 @@ def _is_explained(track: _Track) -> bool:
 
 
 def _is_another(ticks: int, total: int) -> bool:
-    """Whether one of two numbers is more than twice the other."""
+    """Whether the larger of two numbers is more than twice the smaller number."""
     return ticks > 2 * total or total > 2 * ticks
 
 

@@ -1,8 +1,8 @@
 """Data that MPEG-4 part 2 stores in front of every picture: its type, and a bit that encoders toggle.
 
 Half-pixel values are rounded up in one P picture and down in the next, so that rounding errors do not accumulate
-(`vop_rounding_type`). Encoders toggle this bit with every P picture and reset it at each I picture, so that it counts
-modulo two and reveals one missing picture.
+(`vop_rounding_type`). Encoders toggle the bit `vop_rounding_type` with every P picture and reset it at each I picture,
+so that the bit counts modulo two and reveals one missing picture.
 
 Source: ISO/IEC 14496-2, 6.2.3 (video object layer), 6.2.5 (video object plane), 6.3.5.
 """

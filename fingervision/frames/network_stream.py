@@ -240,7 +240,7 @@ class NetworkStream:
 
 
 def _until_shown(waiting: list[OwnPacket], tick: int | None) -> int:
-    """Number of waiting packets up to the one whose picture is shown at a tick; all packets if none has this tick."""
+    """Number of waiting packets up to the packet that is shown at a tick; all packets if no packet has this tick."""
     shown = [place for place, own in enumerate(waiting, 1) if tick is not None and own.packet.pts == tick]
     return shown[-1] if shown else len(waiting)
 

@@ -26,9 +26,9 @@ class ReferenceChain:
     """Checks the frame numbers of H.264 pictures in decoding order (ITU-T H.264, 7.4.3, `frame_num`).
 
     A decoder that misses a picture reports nothing: it adds the differences of the next picture to whichever picture
-    came before. Pictures on which no other picture depends (mostly B pictures) may be missing without damage to others;
-    such pictures are recognised. HEVC needs no such check: its pictures name their references, and FFmpeg reports which
-    of them are missing. Other codecs write no frame numbers, so that nothing can be checked.
+    came before. Pictures on which no other picture depends (mostly B pictures) are recognised, because they may be
+    missing without damage to other pictures. HEVC needs no check of frame numbers: its pictures name their reference
+    pictures, and FFmpeg reports missing ones. Other codecs write no frame numbers, so that nothing can be checked.
 
     Resets of the numbers in mid-stream (memory management operation 5) are not detected, since no camera is known to
     use them; pictures after such a reset would be reported as damaged until the next key frame.
@@ -97,7 +97,7 @@ class ReferenceChain:
         return missing > before.number and is_due
 
     def _missing(self, tick: int | None) -> int:
-        """Number of pictures that are missing before this one, as far as the times show it."""
+        """Number of pictures that are missing before a picture, as far as the times show."""
         step = None if self._tick is None or tick is None else tick - self._tick
         self._tick = tick
         if step is None or step <= 0:

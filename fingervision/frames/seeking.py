@@ -1,4 +1,4 @@
-"""Random access to a frame by its time: for display only, never for measuring a series."""
+"""Random access to a frame by its time, for display only; a series is never measured by random access."""
 
 from pathlib import Path
 from typing import Protocol

@@ -145,7 +145,7 @@ class SourceKind(Protocol):
     def accepts(self, name: str) -> bool:
         """Whether a name belongs to this kind of source.
 
-        This function is called for every recording, so that it must be fast and must not open anything.
+        The function `accepts` is called for every recording, so that it must be fast and must not open anything.
         """
         ...
 
@@ -158,7 +158,7 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
     """Open a recording or camera by its name.
 
     Every module of this package that has `accepts(name) -> bool` and `open_frames(name, wish) -> FrameSource` is a kind
-    of source, as is every such module or object of another distribution (entry points of the group
+    of source, as is every module or object with these two functions in another distribution (entry points of the group
     `fingervision.frame_sources`). A kind with `TAKES_THE_REST = True` is tried only if no other kind accepts the name.
 
     Raises

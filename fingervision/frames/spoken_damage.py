@@ -21,7 +21,7 @@ class Heard:
     """Errors that FFmpeg has logged since they were last requested.
 
     Decoders replace a damaged part by the previous picture, and container readers skip to the next place that looks
-    undamaged. Such damage is only logged; most of it is never returned to the caller as an error.
+    undamaged. Most damage that FFmpeg conceals is only logged, and never returned to the caller as an error.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Heard:
     log: list[tuple[int, str, str]] = field(default_factory=list)
 
     def of_picture(self) -> str:
-        """Return the first message of the decoder and delete all of its messages; empty if there is none."""
+        """Return the first message of the decoder, and delete all of its messages; empty if there is no message."""
         said = [
             words.strip() for level, speaker, words in self.log if speaker == self.decoder and level <= av.logging.ERROR
         ]
@@ -45,7 +45,7 @@ class Heard:
         return said[0].rstrip(".") if said else ""
 
     def of_file(self) -> str:
-        """Return the container reader's messages and delete them, keeping those of the decoder."""
+        """Return and delete the container reader's messages; the decoder's messages are kept."""
         said = [
             words.strip()
             for level, speaker, words in self.log

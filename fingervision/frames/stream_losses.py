@@ -1,4 +1,4 @@
-"""Detect lost packets of a stream from those that arrived, in addition to reports of the container reader."""
+"""Detect lost packets of a stream from the received packets, in addition to reports of the container reader."""
 
 import av
 
@@ -10,7 +10,7 @@ LOST_REFERENCE = "A picture on which the frame depends is missing: the numbers o
 
 
 class StreamLosses:
-    """Checks the packets of a stream in order, and reports missing ones to the object that marks damaged pictures.
+    """Checks the packets of a stream in order, and reports missing packets to the object that marks damaged pictures.
 
     Parameters
     ----------

@@ -20,12 +20,12 @@ OUT_OF_ROW = "The frame's time does not fit between those of its neighbours, whi
 
 
 def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
-    """Yield pictures in order of presentation, with lost frames in place of those whose time is impossible.
+    """Yield pictures in order of presentation, with lost frames in place of pictures whose time is impossible.
 
-    Pictures leave a decoder in the order of presentation. If a time is earlier than the time before it, one of the two
-    is wrong, but it is not known which. Both pictures count as lost, and so do all following pictures until times are
-    later than both. A single time that deviates from an otherwise regular series is itself wrong. A repeated time is
-    left unchanged, because it means a duplicate frame.
+    Pictures leave a decoder in the order of presentation. If a time is earlier than the previous time, one of the two
+    times is wrong, but it is not known which one. Two pictures with contradicting times count as lost, and so do all
+    following pictures until times are later than both times. A single time that deviates from an otherwise regular
+    series is wrong. A repeated time is left unchanged, because it means a duplicate frame.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class EvenRow:
         self._last: int | None = None
 
     def leaps(self, tick: int) -> bool:
-        """Whether frames are missing between the previous tick and this one."""
+        """Whether frames are missing between the previous tick and `tick`."""
         step = None if self._last is None else tick - self._last
         self._last = tick
         if step is None:

@@ -54,7 +54,7 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
 def _of_video(codec: av.VideoCodecContext) -> str | None:
     """Transfer curve that a video states, with `_studio` appended if black and white lie within the stored levels.
 
-    Only luma is stored with such a range; a video that states no range is assumed to use the full range.
+    Only luma has a limited (studio) range; a video that states no range is assumed to use the full range.
     """
     name = VIDEO_TAGS.get(int(codec.color_trc))
     is_luma = (codec.pix_fmt or "").startswith(LUMA_FORMATS)

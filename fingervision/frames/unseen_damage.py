@@ -1,10 +1,10 @@
 """Look for damage in a whole file before its first frame is returned, for codecs that notice only some damage.
 
 The arithmetic decoders of VP8 and VP9 give a picture for any bytes, and notice damage only if it makes them read past
-the end of a packet. Damage that they notice in one packet is therefore evidence of unnoticed damage in other packets:
-of simulated files with 1 to 20 faults, those in which any fault was noticed contained two thirds of the wrong pictures
-that looked undamaged (`tests/benchmarks/damaged_files.py`). If such a file has no checksum, none of its frames can be
-trusted. Files with checksums are not judged in this way, but cluster by cluster (`matroska_checksums`).
+the end of a packet. Damage that a decoder notices in one packet is therefore evidence of unnoticed damage in other
+packets. In simulated files with 1 to 20 faults, two thirds of the wrong pictures that looked undamaged were in files
+with a noticed fault (`tests/benchmarks/damaged_files.py`). If a file with noticed damage has no checksums, none of its
+frames can be trusted. Files with checksums are judged cluster by cluster instead (`matroska_checksums`).
 
 Missing whole pictures, a missing end, and packets before the first key frame are not evidence of damaged bytes.
 """

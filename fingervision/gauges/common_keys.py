@@ -1,4 +1,4 @@
-"""Settings (TOML keys) that are the same in several kinds of gauges, with their limits and the reasons for these."""
+"""Settings (TOML keys) that several kinds of gauges share, with their limits and the reasons for the limits."""
 
 from dataclasses import dataclass
 from math import radians

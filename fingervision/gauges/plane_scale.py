@@ -56,7 +56,8 @@ class PlaneScale:
     def relative_u(self, point_px: tuple[float, float], direction_rad: float) -> float:
         """Relative standard uncertainty of a length at a point, shared by all frames; 0 if it is unknown.
 
-        This uncertainty includes scale, plane, tilt, lens and temperature, but not the bias and phase error of edges.
+        The relative uncertainty of a length includes scale, plane, tilt, lens and temperature, but not the bias and
+        phase error of edges.
         """
         if not isinstance(self.scale, Calibration):
             return 0.0

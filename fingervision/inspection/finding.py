@@ -70,7 +70,7 @@ class Finding:
 
     @property
     def rank(self) -> tuple[float, bool, float]:
-        """Sort key, larger is worse: unmeasured frames, then certain findings, then uncertain ones, each by cost."""
+        """Sort key, larger is worse: unmeasured frames, then certain findings, then uncertain findings, all by cost."""
         sure = self.severity is not Severity.GOOD and not self.is_doubt
         first = self.share_refused if self.share_refused > MOSTLY_REFUSED else 0.0
         return first, sure, self.cost_px or 0.0
@@ -101,7 +101,7 @@ def weighed(
 
 
 def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy: str) -> Finding | None:
-    """Finding for frames that were not measured for one of the given reasons; None if such frames are too few."""
+    """Finding for frames without a gap that have one of the given statuses; None if there are too few such frames."""
     count = sum(sample.counts[status] for status in statuses)
     if not count or count < FEW_REFUSED * sample.frames:
         return None

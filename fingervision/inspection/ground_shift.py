@@ -1,7 +1,7 @@
 """Vibration of the camera, from registration of the background beyond the fingers' tips against the first frame.
 
 The background is divided into two halves, which are registered separately. A motion of the camera shifts both halves
-equally. If the two shifts differ, the background has too little texture; the difference gives the uncertainty of the
+equally. A difference between the shifts of the two halves, caused by too little texture, gives the uncertainty of the
 mean shift.
 """
 

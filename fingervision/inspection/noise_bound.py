@@ -1,6 +1,6 @@
 """Random uncertainty of an edge as a function of noise, blur and number of rows: the Cramer-Rao bound.
 
-Only ratios of these uncertainties are used.
+The package `inspection` only uses ratios of such uncertainties.
 """
 
 from math import pi, sqrt

@@ -1,9 +1,9 @@
 """Evidence for the camera response from the shape of edges: optics blur an edge symmetrically in light, not in levels.
 
 Each inner flank is fitted by a symmetrically blurred step, once in the light of the assumed response and once in that
-of the alternative response. The likelihood ratio of the two fits gives the probability of the alternative. An optical
-aberration (coma) skews the edges of both fingers to the same side of the picture, whereas a wrong response skews each
-edge towards its dark side, so that the two flanks together distinguish these causes.
+of the alternative response. The likelihood ratio of the two fits gives the probability of the alternative response. An
+optical aberration (coma) skews the edges of both fingers to the same side of the picture, whereas a wrong response
+skews each edge towards its dark side, so that the two flanks together distinguish the aberration from a wrong response.
 """
 
 from collections.abc import Sequence
@@ -88,7 +88,7 @@ def response_evidence(
 
 
 def _agreed(odds: list[float]) -> float:
-    """Sum of the two flanks' values (`_odds`); 0 if one value is missing or the two contradict each other."""
+    """Sum of the log likelihood ratios of the two flanks; 0 if one ratio is missing or the ratios contradict."""
     if len(odds) < 2 or (odds[0] * odds[1] < 0.0 and min(map(abs, odds)) > CONTRADICTING):
         return 0.0
     return sum(odds)

@@ -118,8 +118,8 @@ class Sample:
     def good_px(self) -> float:
         """Cost (in pixels of this picture) below which a correction is not worth while.
 
-        If the fingers do not fill the picture, a pixel covers more of the object than necessary, and this limit is
-        proportionally lower.
+        If the fingers do not fill the picture, a pixel covers more of the object than necessary, and the limit of the
+        cost is proportionally lower.
         """
         return GOOD_PX * min(1.0, self.fill / FILLED) if self.looks else GOOD_PX
 
@@ -142,7 +142,7 @@ class Sample:
     def refused_blur_px(self) -> float:
         """Approximate blur of the steepest edges in the first unmeasured picture (pixels).
 
-        It is derived from the contrast divided by the steepest slope.
+        The blur is the contrast divided by the steepest slope and by sqrt(2 pi), minus the blur of the smoothing.
         """
         if self.refused_frame is None:
             return 0.0

@@ -53,8 +53,8 @@ class Choices:
     def changed(self, **changes: Any) -> tuple["Choices", bool]:
         """Return changed settings, and whether the change removed the zero.
 
-        The zero is a gap measured with a certain scale, height, direction and region; a change of one of these makes
-        the zero invalid, so that it is removed.
+        The zero is a gap measured with a certain scale, height, direction and region. A change of scale, height,
+        direction or region invalidates and removes the zero.
         """
         moves_zero = bool(MOVES_ZERO & set(changes))
         if self.zero_mm and moves_zero:

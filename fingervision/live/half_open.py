@@ -1,4 +1,4 @@
-"""Limits for idle network connections: few at a time from one address, each for a short time only."""
+"""Limits for idle network connections: their number from one address, and their duration."""
 
 import asyncio
 from collections import defaultdict
@@ -39,7 +39,7 @@ class PatientProtocol(H11Protocol):
             self.heard()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        """Pass the connection to the WebSocket protocol, which has a time limit of its own."""
+        """Pass the connection to the WebSocket protocol, which has its own time limit."""
         self.heard()
         super().handle_websocket_upgrade(event)
 

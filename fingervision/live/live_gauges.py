@@ -71,7 +71,7 @@ class LiveGauges:
         return ""
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Readings in one frame for a given version of the gauges; None if there are none."""
+        """Readings in one frame for a given version of the gauges; None if there are no readings."""
         found = self._read.get(frame)
         return found[1] if found is not None and found[0] == version else None
 

@@ -1,4 +1,4 @@
-"""Write access to the live view: one browser page at a time has it; other pages watch until one takes it over."""
+"""Write access to the live view: one browser page at a time may change settings, the others watch and may take over."""
 
 from fingervision.domain.errors import StateError
 

@@ -1,4 +1,4 @@
-"""One message to the browser page: all news since the last message, and the newest picture with measured edges."""
+"""Compose a message to the browser page: changes since the last message, and the newest picture with measured edges."""
 
 import json
 import struct
@@ -47,7 +47,7 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """A message to a browser page, and what the page has received after this message."""
+    """A message to a browser page, and a record of the data that the page has after receiving the message."""
 
     content: bytes
     known: Known

@@ -16,8 +16,8 @@ def be_prompt() -> None:
     """Raise the priority of the calling thread, and of threads that it starts, so that frames are measured on time.
 
     All threads that run Python code should call this function, because a thread that waits for Python's global
-    interpreter lock depends on the thread that holds it. The priority is raised only for users with permission (root,
-    or a limit set with ulimit -e).
+    interpreter lock is delayed by the thread that has the lock. The priority is raised only for users with permission
+    (root, or a limit set with ulimit -e).
     """
     sys.setswitchinterval(SWITCH_S)
     with suppress(AttributeError, OSError):

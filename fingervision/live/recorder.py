@@ -77,7 +77,7 @@ class Recorder:
         )
 
     def _look_at_the_disk(self) -> None:
-        """Check whether the folder was deleted (writing does not report this), and how long the disk space suffices."""
+        """Check whether the folder was deleted, which writing does not report, and how long the disk space suffices."""
         if monotonic() - self._looked_s < DISK_EVERY_S:
             return
         self._looked_s = monotonic()

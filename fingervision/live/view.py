@@ -56,7 +56,7 @@ class View(Protocol):
 
     @property
     def table(self) -> Path | None:
-        """File of the complete table; None if there is none."""
+        """File of the complete table; None if the table is incomplete."""
         ...
 
     @property

@@ -2,12 +2,13 @@
 
 JPEG and H.264 code the picture in squares of 8 or 16 pixels. Damage puts wrong content into whole squares. The picture
 then has steps of the grey level along the borders of squares, ending at their corners, where the previous picture has
-none. Motion of objects does not follow this grid, and optics never change an edge within a single pixel.
+none. Motion of objects does not follow the grid of the codec's squares, and optics never change an edge within a single
+pixel.
 
 Method: steps across the borders of blocks are compared with steps inside them, as in measures of blocking artefacts (Z.
 Wang, H. R. Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP
-2002, doi:10.1109/ICIP.2002.1038064). Here the comparison is made for the difference between two pictures, and for each
-border segment separately.
+2002, doi:10.1109/ICIP.2002.1038064). This module makes the comparison for the difference between two pictures, and for
+each border segment separately.
 """
 
 import cv2

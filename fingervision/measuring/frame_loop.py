@@ -36,7 +36,7 @@ SeeItem = Callable[[Frame | LostFrame, Result], None]
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A recording and the settings of its measurement, where each is completed by information from the other.
+    """Description of a recording and settings of its measurement, each completed with values from the other.
 
     Parameters
     ----------

@@ -64,10 +64,10 @@ class Joint:
 def torn_off(joints: Sequence[Joint], poses: Mapping[str, SeenPose]) -> set[str]:
     """Names of the bodies whose measured poses do not fit the flexures that join them to the others.
 
-    Fixed bodies are taken to be at their drawn positions. Of the moving bodies, the one with the largest fraction of
-    flexures that do not fit (at equal fractions, the one with the largest number of them) is left out; this is repeated
-    until all flexures of the remaining bodies fit. If two bodies are equal in both respects, it is not known which of
-    them was mistaken, and both are left out.
+    Fixed bodies are assumed to be at their drawn positions. The moving body with the largest fraction of flexures that
+    do not fit (at equal fractions, with the largest number of these flexures) is left out, repeatedly until all
+    flexures of the remaining bodies fit. If two bodies are equal in both respects, it is not known which of them was
+    mistaken, and both are left out.
     """
     found: set[str] = set()
     while True:

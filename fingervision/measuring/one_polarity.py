@@ -1,8 +1,8 @@
 """Determine once per recording whether the fingers are darker or lighter than the background.
 
 If the user has not stated the polarity, the first frames decide by majority, because fingers do not change from dark to
-light within a recording. This excludes frames in which the bright regions on either side of a dark object look like two
-light fingers.
+light within a recording. The majority excludes frames in which the bright regions on either side of a dark object look
+like two light fingers.
 """
 
 from collections import Counter

@@ -26,8 +26,8 @@ OPTIONS = {"crf": "20", "preset": "veryfast"}
 class OverlayVideo:
     """Writes the overlay video frame by frame.
 
-    Frames that could not be decoded are left out, and so are frames whose time is not later than that of the frame
-    before.
+    Frames that could not be decoded are left out, and so are frames whose time is not later than the previous frame's
+    time.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Uncertainty of a body's pose: from its own edges in each frame, and from errors that all frames share.
 
-Shared errors are those of the drawing's placement in the picture (itself a fit), the scale, the edge bias, lens and
+Errors that all frames share are those of the drawing's placement in the picture, the scale, the edge bias, lens and
 plane. A pose is measured relative to the drawing, so that the effect of a scale error grows with the distance from the
 edges by which the drawing was placed.
 """
@@ -118,7 +118,7 @@ class SharedPose:
     def u_turn_against(self, other: "SharedPose") -> float:
         """Standard uncertainty (rad) that all frames share, of the angle between two bodies.
 
-        The error of the drawing's placement cancels in this angle.
+        The error of the drawing's placement cancels in an angle between two bodies.
         """
         bias = float(self.by_bias[2] - other.by_bias[2])
         scale = float(self.by_scale[2] - other.by_scale[2])

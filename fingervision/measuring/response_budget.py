@@ -16,9 +16,9 @@ from fingervision.measuring.scale import Scale
 def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDArray[np.float64]:
     """Standard uncertainty of each gap due to an assumed camera response, shape (n,) (mm).
 
-    An error of the response also displaced the edges in the calibration's pictures. That displacement is contained in
-    the calibration's edge bias, or in its budget; only its difference from that of this recording's edges remains. If a
-    calibration does not state its response, it is taken to be that of the recording.
+    An error of the response also displaced the edges in the calibration's pictures. The calibration's edge bias, or its
+    budget, contains the displacement in the calibration's pictures; only the difference from the displacement in the
+    recording remains. If a calibration does not state its response, the response of the recording is assumed.
     """
     if not isinstance(scale, Calibration) or scale.response_shift_px is None:
         return np.zeros(len(measured))
@@ -33,8 +33,8 @@ def choose_response(
 ) -> tuple[CameraResponse, CameraResponse | None, str]:
     """Choose the response of a recording, another response that is also possible, and a warning if needed.
 
-    The response stated by the user has priority, then that stated by the calibration, then the recording's own tag;
-    without any of these the response is taken as linear.
+    The response stated by the user has priority, then the response stated by the calibration, then the recording's own
+    tag; otherwise the response is assumed to be linear.
 
     Returns
     -------

@@ -33,7 +33,7 @@ def check_px_per_mm(px_per_mm: float) -> None:
 
 
 def stated_scale(px_per_mm: float, u_px_per_mm: float | None = None) -> BareScale:
-    """Return a scale that the user states, with its standard uncertainty if this is stated too.
+    """Return a scale that the user states, with its standard uncertainty if the user states one.
 
     Raises
     ------

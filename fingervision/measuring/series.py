@@ -156,7 +156,7 @@ class GapSeries:
     def response_px(self) -> NDArray[np.float64]:
         """Change of each gap (px) under the alternative camera response.
 
-        It is 0 if the response is known.
+        The change is 0 if the response is known.
         """
         return np.array(self._response_px)
 

@@ -3,7 +3,7 @@
 A jump alone does not prove damage, because stages make steps. Visible blocks alone do not prove damage either, because
 coarse coding makes them visible. A picture counts as damaged if the measured position jumps and squares of the codec's
 grid appear that are neither in the previous picture nor in that picture shifted with the fingers. All later pictures
-that are coded as differences from a damaged picture are damaged as well.
+that are coded as differences from a damaged picture are also damaged.
 """
 
 from dataclasses import dataclass

@@ -148,7 +148,7 @@ def _tick(frame: Frame, last_tick: int) -> int:
 
 
 def _pixel_format(pixels: Pixels, codec: Codec) -> str:
-    """FFmpeg's name of the pixel format in which a codec stores such frames."""
+    """FFmpeg's name of the pixel format in which a codec stores frames of this bit depth and number of channels."""
     wide, colour = pixels.dtype == np.uint16, pixels.ndim == 3
     if isinstance(codec, Ffv1):
         if colour:

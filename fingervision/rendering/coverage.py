@@ -1,8 +1,8 @@
 """Fraction of each pixel that a shape covers, after Gaussian blur: computed exactly, as an integral along the outline.
 
 Blur and integration over the square pixel act together as the kernel K(x, y) = k(x) k(y), where k is the Gaussian
-averaged over one pixel. The covered fraction of the pixel at p is the integral of K(p - q) over the shape; by Green's
-theorem this is
+averaged over one pixel. The covered fraction V of the pixel at p is the integral of K(p - q) over the shape; by Green's
+theorem it is
 
     V(p) = integral round the outline of  k(p_x - q_x) c(p_y - q_y) dq_x,      c' = k,
 

@@ -1,9 +1,9 @@
 """Fit the edges again after the shadow or glare beside them has been subtracted from each line of pixels.
 
-The mean profile across the flanks gives the breadth, strength and blur of the shadow or glare; these are assumed to be
-the same all around a finger. Along a slanted line of pixels, shadow or glare is stretched by the same factor as the
-edge. After the subtraction and a new fit of the step, no line's edge is displaced by the shadow or glare, however much
-of it was in the line's window.
+The mean profile across the flanks gives the breadth, strength and blur of the shadow or glare; breadth, strength and
+blur are assumed to be the same all around a finger. Along a slanted line of pixels, shadow or glare is stretched by the
+same factor as the edge. After the subtraction and a new fit of the step, no line's edge is displaced by the shadow or
+glare, however much of it was in the line's window.
 """
 
 from dataclasses import replace

@@ -85,7 +85,7 @@ def found(
 ) -> CoarseFingers | NoGap:
     """Fingers found in one class (dark or light) of a binary picture, also with a part held between them.
 
-    In a picture split by its local mean, objects appear hollow; such hollows are not gaps between fingers.
+    In a picture split by its local mean, objects appear hollow; the hollow parts are not gaps between fingers.
     """
     below = settings.below_tip_px
     reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
@@ -105,8 +105,13 @@ def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
     """Whether the grey level changes steeply at the border of light and dark, as even the most blurred edge does."""
     square = np.ones((2 * EDGE_REACH_PX + 1, 2 * EDGE_REACH_PX + 1), dtype=np.uint8)
     border = np.asarray(cv2.morphologyEx(split.dark, cv2.MORPH_GRADIENT, np.ones((3, 3), dtype=np.uint8))) > 0
-    change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))[border]
-    return bool(change.size and np.median(change) > EDGE_SHARE * contrast)
+    change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))
+    least = EDGE_SHARE * contrast
+    # The median is above `least` where more than half of the pixels are: counting takes a third of the time.
+    steep, pixels = int(np.count_nonzero((change > int(least)) & border)), int(np.count_nonzero(border))
+    if 2 * steep == pixels:
+        return bool(pixels and np.median(change[border]) > least)
+    return 2 * steep > pixels
 
 
 def _border_is_light(binary: Binary) -> bool:

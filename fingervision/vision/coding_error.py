@@ -2,13 +2,13 @@
 
 If an edge is parallel to the codec's blocks, all its rows share an error, which the scatter of the rows about a line
 does not show. A block copied from an earlier picture is displaced as a whole, which is not visible in the picture
-either. The quantiser step bounds this error: a coder corrects every difference larger than a fraction of the step. For
-an edge of contrast A the codec's transform coefficients change by about A per pixel of displacement, so that the
-displacement is a fixed fraction of `step / A`.
+either. The quantiser step limits the error of a codec, which corrects every difference larger than a fraction of the
+step. For an edge of contrast A the codec's transform coefficients change by about A per pixel of displacement, so that
+the displacement is a fixed fraction of the ratio of step to contrast.
 
-A block that the coder does not code again states no step of its own but that of the block before it (H.264's QP_Y,PRED,
-ITU-T H.264 (2021), 7.4.5), which may be flat ground with a step four times finer than the coder allows an edge. The
-step that counts is therefore the largest along the outlines of both fingers.
+A block that the codec skips has no quantiser step of its own, but inherits the step of the preceding block (QP_Y,PRED
+in ITU-T H.264 (2021), 7.4.5). The preceding block may be flat background with a step four times finer than the codec
+allows an edge. The largest step along the outlines of both fingers is therefore used.
 """
 
 from dataclasses import replace

@@ -49,7 +49,7 @@ def corner_retreat(turn: float) -> float:
 
     At a depth a (in sigma) inside both sides of a wedge whose sides turn by theta, the blurred coverage is Phi(a) - 2
     T(a, tan(theta / 2)), with T Owen's function (Ann. Math. Stat. 27, 1956, doi:10.1214/aoms/1177728074); the
-    half-level is where it equals one half.
+    half-level is where the coverage equals one half.
 
     Parameters
     ----------

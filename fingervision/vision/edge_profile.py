@@ -1,9 +1,9 @@
 """Deviations of a finger's flank from a blurred step: a bright rim, or clipped levels.
 
 A rim or clipping moves the fitted edge by the same amount in every row, and leaves a pattern in the residuals of the
-fit. The possible displacement of the edge is estimated from this pattern and added to the uncertainty. The edge
-itself is not corrected, because real optics cause similar patterns, and a correction derived from them would vary from
-frame to frame.
+fit. The possible displacement of the edge is estimated from the pattern in the residuals and added to the uncertainty.
+The edge itself is not corrected, because real optics cause similar patterns, and a correction derived from them would
+vary from frame to frame.
 """
 
 from typing import NamedTuple

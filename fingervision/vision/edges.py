@@ -200,8 +200,8 @@ def _along_axes(blur: Floats, lines: ProfileLines) -> Floats:
     """Blur across the fingers and along them, from the fitted blurs of the flanks' rows and the tips' columns.
 
     The squared blur on a line that crosses an edge of slope m contains a share m^2 / (1 + m^2) of the other axis'
-    squared blur. Without this correction, sideways motion during the exposure would make a round tip appear blurred
-    along the fingers.
+    squared blur. Without a correction for this share, sideways motion during the exposure would make a round tip appear
+    blurred along the fingers.
     """
     out = blur.copy()
     squared = blur**2

@@ -29,7 +29,7 @@ def without_the_other(
 ) -> Floats:
     """Subtract the other finger's edge from lines whose window contains the edges of both fingers.
 
-    In such a window the background between the fingers appears as a narrow stripe.
+    In a window that contains both edges, the background between the fingers appears as a narrow stripe.
     """
     levels, reach = values.copy(), values.shape[-1] // 2
     edge = lines.coarse + lines.outward * position

@@ -1,11 +1,11 @@
 """Step 6, the finger's end: fit of three straight sides and two round corners to its outline.
 
 A printed or cut finger ends in an inner flank, a top and an outer flank, each straight, with a fillet of any radius
-(from sharp to fully round) between them. This shape is fitted to all edge points of a finger, not only to those in a
-window, and gives the tip and the inner edge with their joint covariance.
+(from sharp to fully round) between them. The shape of three sides and two fillets is fitted to all edge points of a
+finger, and gives the tip and the inner edge with their joint covariance.
 
 Blur moves the half-level of a curved edge towards the centre of curvature by sigma^2 kappa / 2 (kappa the curvature),
-and by less near the end of a fillet. The points are compared with the model's outline displaced in this way, so that
+and by less near the end of a fillet. The points are compared with the model's outline displaced by the blur, so that
 the fitted outline is that before blurring.
 """
 
@@ -117,6 +117,7 @@ def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_
 def _has_settled(end: FingerEnd) -> bool:
     """Whether the points that counted in the last step still lie where they count after it.
 
-    The weights are those from before the last step. A step that leads to another shape leaves these points far off it.
+    The fit's last weights are those computed before the last step. After a step to another shape, the points that
+    counted before are far from the new shape.
     """
     return float(end.robust @ end.residual**2) < (BIWEIGHT_REACH * end.misfit) ** 2 * float(end.robust.sum())

@@ -280,8 +280,8 @@ def _is_open(
 ) -> bool:
     """Whether the straight path between the two measuring points is almost free of other objects.
 
-    If the camera is turned, a corner of one finger may lie on that path; then a horizontal path at the lower of the two
-    measuring heights is tested.
+    If the camera is turned, a corner of one finger may lie on the straight path; then a horizontal path at the lower of
+    the two measuring heights is tested.
     """
     heights = [finger.top_along_px + below_tip_px for finger in (left, right)]
     if is_free(mask, *_inner_places(left, right, orientation, heights)):

@@ -207,8 +207,9 @@ def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float,
 
     Both fingers are measured by the same method, so that their systematic errors are equal.
     """
-    found = [polygonal_measuring_point(p, below_tip_px, shared) for p in points]
-    return [own for own in found if own is not None] if None not in found else []
+    left = polygonal_measuring_point(points[0], below_tip_px, shared)
+    right = None if left is None else polygonal_measuring_point(points[1], below_tip_px, shared)
+    return [] if left is None or right is None else [left, right]
 
 
 def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
@@ -294,7 +295,7 @@ def _assemble(
     roughness_px: float,
     held: HeldPart | None,
 ) -> GapMeasurement | NoGap:
-    """Transform the result from the fingers' axes to the picture; refuse one with a larger variance than allowed."""
+    """Transform the result from the fingers' axes to the picture; refuse a result with too large a variance."""
     orientation = fingers.orientation
     across, along, found = [], [], []
     for k, (finger, m) in enumerate(zip((fingers.left, fingers.right), measured, strict=True)):

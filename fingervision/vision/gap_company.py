@@ -1,8 +1,9 @@
 """Recognise a space between two strokes of a letter, which looks like the gap between two fingers.
 
 If the paper of a printed text is taken for the objects, and the letters for the background, the spaces inside and
-between letters look like bars that extend from the picture's border. Between two such bars lies a part of a letter, and
-the picture contains other parts of the same size. Between two fingers lies the background, which is a single region.
+between letters look like bars that extend from the picture's border. Between two apparent bars in a text lies a part of
+a letter, and the picture contains other parts of the same size. Between two fingers lies the background, which is a
+single region.
 """
 
 import cv2
@@ -42,7 +43,7 @@ def has_company(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: f
     x, y = (round(place) for place in fingers.orientation.to_pixels(0.5 * sum(across), height))
     if not (0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]):
         return False
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(np.where(mask == 0, 1, 0).astype(np.uint8), connectivity=4)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats((mask == 0).view(np.uint8), connectivity=4)
     own = int(labels[y, x])
     if own == 0:
         return False

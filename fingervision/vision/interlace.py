@@ -2,7 +2,7 @@
 
 The displacement between the two fields (even and odd rows) is measured on the flanks: the edge in each row is compared
 with the line through its neighbours in the other field, over all rows. The edges in every row are then moved half-way
-towards those of the other field, so that both fields represent the mean time. Colour sensors cause similar, smaller
+towards the edges of the other field, so that both fields represent the mean time. Colour sensors cause similar, smaller
 combs, which are not due to motion and are removed in the same way.
 """
 

@@ -108,8 +108,8 @@ def lie_level(step_px: float, apart_px: float, below_tip_px: float, builds: tupl
     """Whether two objects that lie wholly in view end at the same height, if the camera is turned by their mean tilt.
 
     Two objects that extend from the picture's border are likely to be fingers of one gripper, however the camera is
-    turned. For two bars that lie wholly in view there is no such evidence; therefore the difference in height between
-    their ends must agree with a camera that is turned by the mean tilt of both.
+    turned. Two bars that lie wholly in view are less likely to be fingers; the difference in height between their ends
+    must therefore agree with a camera that is turned by the mean tilt of both bars.
 
     Parameters
     ----------

@@ -107,9 +107,9 @@ def mean_profile(
 
 
 def _rows_between(looked_at: Ints) -> Ints:
-    """Every row between the first and the last fitted one, including rows left out to save time.
+    """Every row between the first and the last fitted row, including rows that were left out to save time.
 
-    Long gaps between fitted rows are not filled, because a part hides the edge there.
+    Long gaps between fitted rows are not filled, because a part hides the edge in these rows.
     """
     looked_at = np.sort(looked_at)
     rows, steps = np.arange(looked_at[0], looked_at[-1] + 1), np.diff(looked_at).astype(np.float64)

@@ -9,13 +9,13 @@ _middle, _median = loop("median_middle"), loop("median_median")
 
 
 def middle(values: NDArray[np.float64]) -> float:
-    """The upper median: for an even number of values the upper of the two central ones; 0 for no values."""
+    """The upper median: for an even number of values the upper of the two central values; 0 for no values."""
     return float(_middle(np.ascontiguousarray(values)))
 
 
 def median(values: NDArray[np.float64]) -> float:
-    """The median: for an even number of values the mean of the two central ones; 0 for no values.
+    """The median: for an even number of values the mean of the two central values; 0 for no values.
 
-    This function is twenty times as fast as `numpy.median`.
+    The function `median` is twenty times as fast as `numpy.median`.
     """
     return float(_median(np.ascontiguousarray(values)))

@@ -2,8 +2,9 @@
 
 Digital zoom, demosaicing of a colour sensor, denoising and compression spread noise over neighbouring pixels.
 Neighbouring points of an outline then have correlated errors, so that the variance of their mean is larger than for
-independent points. The factor of this increase follows from the autocovariance of the noise: the variance of the mean
-edge position over many lines, each weighted by the edge's filter, divided by its value for independent lines.
+independent points. The factor by which the variance increases follows from the autocovariance of the noise: the
+variance of the mean edge position over many lines, each weighted by the edge's filter, divided by its value for
+independent lines.
 """
 
 import numpy as np

@@ -37,7 +37,7 @@ static inline double normal(double z, double *density) {
 
 /* The same at many places at once, which may be those where the results go: the same digits, but the series of several
    places are summed side by side. */
-static void normal_at_all(const double *z, int64_t n, double *integral, double *density) {
+SIDE_BY_SIDE static void normal_at_all(const double *z, int64_t n, double *integral, double *density) {
     enum { AT_ONCE = 64 };
     double a[AT_ONCE], h[AT_ONCE], own[AT_ONCE], whole[AT_ONCE], sum[AT_ONCE], slope[AT_ONCE];
     for (int64_t first = 0; first < n; first += AT_ONCE) {

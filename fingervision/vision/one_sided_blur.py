@@ -3,13 +3,14 @@
 A narrow shadow along an edge is a second step in the same profile. A shadow with a fraction q of the contrast and a
 width w beyond the edge displaces the single fitted step by q w, and adds q (1 - q) w^2 to the squared blur of the step
 (mean and variance of a mixture of two steps). Optics and defocus blur all sides equally; motion blurs opposite sides
-equally, and displaces neither of them. If one side's squared blur still differs by D, its edges may be displaced by
-sqrt(|D| q / (1 - q)): by sqrt(|D|) if the shadow is half as dark as the body (q = 1/2), by twice that for q = 4/5. The
-offset of this side therefore has the standard uncertainty sqrt(|D|).
+equally, and displaces neither of them. If one side's squared blur differs by D from the blur that optics and motion
+explain, its edges may be displaced by sqrt(|D| q / (1 - q)): by sqrt(|D|) if the shadow is half as dark as the body (q
+= 1/2), by twice that for q = 4/5. The offset of a side with the excess D therefore has the standard uncertainty
+sqrt(|D|).
 
 A lens with distortion, or a camera that looks at the plane at an angle, magnifies the sides differently. The blur of
-optics is then the same in the picture, that of an object out of focus rather the same in the plane; both, and what lies
-between them, count as equal.
+the optics is equal on all sides in the picture, the blur of an object out of focus rather in the plane. Blurs equal in
+the picture, equal in the plane, or in between are therefore accepted as equal.
 """
 
 import numpy as np
@@ -94,7 +95,7 @@ def doubtful_offsets(
 
 
 def _excess(mean: Array, variance: Array, normal: Array, magnified: Array) -> Array:
-    """Part of each side's squared blur that a shadow would explain, shape (k,); 0 for a side without such a part.
+    """Part of each side's squared blur that only a shadow explains, shape (k,); 0 for a side without shadow.
 
     Parameters
     ----------

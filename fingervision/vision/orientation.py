@@ -54,7 +54,7 @@ class Orientation:
     def upright(self, mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a mask as if the tips pointed up, contiguous in memory.
 
-        This function is faster than NumPy's copy of a transposed view.
+        The function `upright` is faster than NumPy's copy of a transposed view.
         """
         turned = mask if self.direction.is_vertical else cv2.transpose(mask)
         return np.ascontiguousarray(cv2.flip(turned, 0) if self.is_flipped else turned, dtype=np.uint8)

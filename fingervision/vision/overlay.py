@@ -34,7 +34,7 @@ Canvas = NDArray[np.uint8]
 
 
 def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> Canvas:
-    """Draw edges, tips, measuring points, the distance between these, the width of a held part, and a line of text.
+    """Draw edges, tips, measuring points and their distance, the width of a held part, and a line of text.
 
     Parameters
     ----------

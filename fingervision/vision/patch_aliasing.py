@@ -2,16 +2,19 @@
 
 Texture of a frequency f above the Nyquist frequency (half a cycle per pixel) appears at the frequency `1 - f` and seems
 to move in the opposite direction: relative to the rest of the patch its phase changes by 2 pi for every pixel of
-displacement. After a displacement d its residual is `2 sin(pi d)` times as large as the aliased texture itself. What of
-this residual looks like a displacement is a bias, which depends on the sub-pixel phase. It has two parts:
+displacement. After a displacement d its residual is `2 sin(pi d)` times as large as the aliased texture itself. The
+part of the aliased residual that looks like a displacement is a bias, which depends on the sub-pixel phase. The bias
+has two parts:
 
-* The product of the residual with the aliased texture's own gradient is the same for every texture of that power: it
-  pulls the patch towards whole pixels by `pull sin(2 pi d)`. It is computed and corrected (`aliasing_pull`).
-* The product with the gradient of the rest has either sign. Its variance is computed (`aliasing_covariance`).
+* The product of the residual with the aliased texture's own gradient is the same for every texture of equal power: the
+  product pulls the patch towards whole pixels by `pull sin(2 pi d)`. The pull is computed and corrected
+  (`aliasing_pull`).
+* The product of the residual with the gradient of the remaining texture has either sign. The variance of the product is
+  computed (`aliasing_covariance`).
 
-The power above the Nyquist frequency is extrapolated from the power of the patch below it. The aliased power is assumed
-to be the same for every frequency along the other axis, so that an edge parallel to the pixels, whose phase is the same
-along its whole length, counts as a single edge.
+The power above the Nyquist frequency is extrapolated from the power of the patch below the Nyquist frequency. The
+aliased power is assumed to be equal for all frequencies along the other axis, so that an edge parallel to the pixels,
+whose phase is constant along its length, counts as a single edge.
 """
 
 from collections.abc import Sequence

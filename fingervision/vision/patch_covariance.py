@@ -66,12 +66,12 @@ def noise_covariance(
 
 
 def widened(covariance: Doubles, inverse: Doubles, scores: Doubles, aliasing: Doubles) -> Doubles:
-    """Increase covariances to the scatter of the patch's blocks, and to aliasing, if these are larger than the noise's.
+    """Increase covariances to the scatter of the patch's blocks and to aliasing, where these exceed the noise.
 
     If the residuals are not noise but texture that moves differently from the rest (because of aliasing, or on a
     surface that deforms), the covariance is estimated from the scatter of the blocks (White, Econometrica 48, 1980,
-    doi:10.2307/1912934). An error that is common to a whole edge along the patch does not appear in this scatter, but
-    in the prediction from the patch's spectrum (`aliasing`).
+    doi:10.2307/1912934). An error that is common to a whole edge along the patch does not appear in the scatter of the
+    blocks, but in the prediction from the patch's spectrum (`aliasing`).
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Double
 
 
 def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
-    """Predicted covariance of x, y and rotation for a registration of this patch, shape (3, 3).
+    """Predicted covariance of x, y and rotation for a registration of a patch, shape (3, 3).
 
     The covariance is infinite if the gradients do not exceed those of noise, or if all of them have the same direction.
 

@@ -1,6 +1,6 @@
 """Run the image processing steps on one video frame: grey, denoise, binarise, fingers, edges, tip, gap.
 
-Only this module knows the order of the steps.
+Only the module `pipeline` determines the order of the steps.
 """
 
 from contextlib import suppress
@@ -38,6 +38,7 @@ from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
+from fingervision.vision.picture_memory import keep_picture_memory
 from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.residuals import SHARED_POINTS
@@ -66,7 +67,8 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     """Measure one video frame, without any memory of earlier frames.
 
     The first call limits OpenCV to one thread in this process: its other threads would wait busily between frames,
-    which takes two thirds of a processor core that the decoder needs.
+    which takes two thirds of a processor core that the decoder needs. It also lets the process keep the memory of
+    intermediate pictures (`keep_picture_memory`).
 
     Parameters
     ----------
@@ -82,6 +84,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     """
     if cv2.getNumThreads() != 1:
         cv2.setNumThreads(1)
+    keep_picture_memory()
     grey = _part(to_grey(frame.pixels), settings.region)
     return _shifted(_attempt(grey, settings, _coded(frame, settings)).outcome, settings.region)
 
@@ -198,12 +201,13 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     if binary.contrast < CONTRAST_FLOOR * top:
         return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
+    are_edges: dict[Binary, bool] = {}
     for split, fingers, light_gap in candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
-            if fingers.status is not Status.NO_FINGERS and not has_edges(denoised, split, binary.contrast):
-                fingers = NoGap(
-                    Status.NO_FINGERS, "The picture shows only a gradual change of brightness without edges."
-                )
+            if fingers.status is not Status.NO_FINGERS and split not in are_edges:
+                are_edges[split] = has_edges(denoised, split, binary.contrast)
+            if fingers.status is not Status.NO_FINGERS and not are_edges[split]:
+                fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
             attempt = _Attempt(fingers, split)
         else:
             attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)

@@ -2,7 +2,7 @@
 
 The outline's points are divided into straight runs. Blur rounds the half-level contour at a corner: points near a
 corner determine only its radius, and sides are fitted to points farther away. Tip and inner edge are those of the
-polygon of these sides, with its corners rounded by the fitted radii.
+polygon of the fitted sides, with its corners rounded by the fitted radii.
 """
 
 from math import atan2, cos, hypot, pi, sin, sqrt, tan
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fingervision.vision.corner_blur import corner_half_level
 from fingervision.vision.measuring_point import MeasuringPoint
+from fingervision.vision.median import median
 from fingervision.vision.outline_points import OutlinePoints
 from fingervision.vision.polygon import Corner, Polygon, Side
 from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE, TIP_SIDE
@@ -85,7 +86,7 @@ def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared
         return None
     chain = _chain(points, float(points.y.min()) + below_tip_px + BELOW_PX)
     x, y, u = points.x[chain], points.y[chain], points.u[chain]
-    is_row, blur = points.is_row[chain], float(np.median(points.blur))
+    is_row, blur = points.is_row[chain], median(points.blur)
     runs = straight_runs(x, y, u)
     if not FEWEST_SIDES <= len(runs) <= MOST_SIDES:
         return None
@@ -123,7 +124,7 @@ def _has_straight_top(points: OutlinePoints) -> bool:
     x, y, u = points.x[is_top], points.y[is_top], points.u[is_top]
     if x.size < 2 * FEWEST_POINTS:
         return True
-    near = np.abs(x - np.median(x)) <= 0.5 * MIDDLE_SHARE * np.ptp(x)
+    near = np.abs(x - median(x)) <= 0.5 * MIDDLE_SHARE * np.ptp(x)
     x, y, u = x[near], y[near], u[near]
     x = x - x.mean()
     away = y - y.mean() - x * (x @ y) / max(float(x @ x), 1e-12)
@@ -169,10 +170,13 @@ def _fitted(
         corners = Polygon([fit.side for fit in fits], radii, None).corners()
         if corners is None:
             return None
-        known = [_radius(x, y, u, corner, blur) for corner in corners]
-        radii, u_radii = [r for r, _ in known], [ur for _, ur in known]
-        if max(radii) > ROUNDEST_PX:
-            return None
+        radii, u_radii = [], []
+        for corner in corners:
+            radius, u_radius = _radius(x, y, u, corner, blur)
+            if radius > ROUNDEST_PX:
+                return None
+            radii.append(radius)
+            u_radii.append(u_radius)
         fits = []
         for k, run in enumerate(runs):
             keep = np.ones(run.size, dtype=bool)

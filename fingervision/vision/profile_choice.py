@@ -1,10 +1,10 @@
 """Select the model of the mean profile across a flank, from which the position of the finger's edge follows.
 
-A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these are
+A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these structures are
 indistinguishable on one flank alone: a wall half as light as the background looks like motion blur, and glare looks
-like a wall on the other side of the edge. They are distinguished by where they occur: a wall is visible on the inner
-flank only, because the camera looks into the gap from its middle; motion blurs both flanks but not the tip; glare and
-shadow surround the finger.
+like a wall on the other side of the edge. Walls, motion, glare and shadows are distinguished by where they occur: a
+wall is visible on the inner flank only, because the camera looks into the gap from its middle; motion blurs both flanks
+but not the tip; glare and shadow surround the finger.
 """
 
 from dataclasses import replace
@@ -44,7 +44,10 @@ Ints = NDArray[np.int_]
 
 # Ratio of a step's residuals to the noise of the picture's flat parts above which other models are tried.
 UNEXPLAINED = 1.2
-# Least reduction of chi-square by a wall, compared with a step.
+# Flanks that are broader than the tips and leave so many times the noise, without a common profile, are no steps: a pad
+# or a shadow is as broad as the window there. Motion leaves less than twice the noise.
+NO_STEP = 3.0
+# A wall improves what a step leaves by so much in chi-square.
 SIGNIFICANT = 30.0
 # Difference in chi-square above which one model is clearly better than another, in units of the residual per bin (odds
 # of e^8 to one).
@@ -68,8 +71,11 @@ CUT_OFF_SIGMAS = 2.0
 ONE_SIDED, ONE_SIDED_PX, STRIP = 0.5, 1.2, "strip"
 # Width of a wall or glare, as a multiple of the blur, below which it cannot be distinguished from blur.
 RESOLVED_BLURS = 1.6
-# Radius of a fillet (pixels) for the effect of motion: a uniform motion displaces the half-level by up to half of the
-# added squared blur divided by the radius.
+# A wall that a plain step fits as well is left alone, and stated, where it is narrower than this: chance makes such
+# walls of flanks in uneven light (1.1 blurs); walls of 2 px behind a blur of 1.2 px are found no narrower than 1.58.
+HIDDEN_BLURS = 1.4
+# Motion spreads a fillet of this radius like a box and not like a Gaussian: the half-level moves by up to half of the
+# variance that it adds over the radius.
 MOTION_RADIUS_PX = 15.0
 # Standard uncertainty of a correction, as a share of it, for shadow, wall and glare: real shadows are not exactly
 # ramps, real walls not exactly uniform, and glare on a fillet has another position than on the flank.
@@ -113,7 +119,8 @@ def with_profile(
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        return _unsure_of_width(edges, displaced_px)
+        is_strip = edges.noise > NO_STEP * edges.noise_flat and np.any(is_surely_broader(edges, displaced_px))
+        return replace(edges, beside=STRIP) if is_strip else _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # the models do not describe a flank that is clipped at the end of the scale
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
@@ -145,11 +152,11 @@ def with_profile(
     if outer[0] is None or outer[1] is None:
         wall = fits.of(WALL)
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
-        is_strip = [
+        has_strip = [
             step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
             for step, fit, (profile, _, _) in zip(steps, wall, profiles, strict=True)
         ]
-        if is_strip[0] != is_strip[1]:
+        if has_strip[0] != has_strip[1]:
             return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
             # The flanks are more blurred than the tips, because of a wall or of motion, which cannot be distinguished
@@ -196,6 +203,8 @@ def with_profile(
         remains = sum(fit.squares for fit in narrow)
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
             chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
+            if is_step and any(fit.breadth < HIDDEN_BLURS * fit.blur for fit in narrow):  # a wall, or chance
+                return _unsure(edges, [abs(fit.position) + 2.0 * fit.u_position for fit in chosen], "wall")
             return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
     flanks, tips = squared_blurs(edges)
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
@@ -226,9 +235,9 @@ def _without_shadow(
 ) -> EdgePoints:
     """Edges corrected for a soft shadow, whose light recovers with distance linearly or exponentially.
 
-    The edge is placed between the positions of the linear and the exponential model, the nearer to the one with the
-    smaller sum of squared residuals beyond noise. The distance between this position and that of the better model is
-    taken as a standard uncertainty.
+    The edge is placed between the positions of the linear and the exponential model, nearer to the model with the
+    smaller sum of squared residuals beyond noise. The distance between the chosen position and the position of the
+    better model is a standard uncertainty.
     """
     squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
     if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
@@ -293,7 +302,7 @@ def _room(edges: EdgePoints) -> int:
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement of the inner edge across the picture, due to a side wall."""
+    """Displacement along every line of pixels if a side wall displaces the inner edge horizontally by one pixel."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
@@ -312,7 +321,7 @@ def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixe
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Set the blur of the inner flanks to the given one, because a wall beside an edge is not blur."""
+    """Set the blur of the inner flanks to a given value, because a wall beside an edge is not blur."""
     blur_px = edges.blur_px.copy()
     blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
     blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])

@@ -100,7 +100,7 @@ def shape_holds(
 def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, height: float) -> float:
     """Variance of the edge due to points near the measuring point that the fit rejected as dust (pixels squared).
 
-    The edge may lie anywhere between the fitted shape and the farthest of these points (a rectangular distribution).
+    The edge may lie anywhere between the fitted shape and the farthest rejected point (a rectangular distribution).
     The errors of the two fingers may be equal, so that each finger's variance is doubled to cover the variance of the
     sum (JCGM 100:2008, 4.3.7 and 5.2.2).
     """

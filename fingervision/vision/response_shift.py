@@ -45,7 +45,7 @@ def edge_shift_px(
 def gap_shift_px(
     measured: GapMeasurement, edges: EdgePoints, assumed: CameraResponse, other: CameraResponse, top_level: int
 ) -> float:
-    """Measured gap minus the gap under another camera response, if that is the true one (pixels).
+    """Measured gap minus the gap under another camera response, if the other response is the true one (pixels).
 
     A finger's whole outline shifts, including the tip, and the measuring height shifts with the tip, which matters if
     the edge is slanted.

@@ -1,9 +1,9 @@
 """Rigid motion of one body in a picture, from all visible stretches of its outline.
 
 The motion is fitted by weighted least squares to the offsets of all chunks of the outline (`outline_chunks`); Tukey's
-weights suppress chunks whose edge is covered. Scatter of the chunks beyond their own noise widens the covariance. Edge
-bias, size error, and the offset of every side that may have a shadow (`one_sided_blur`) are fitted together with the
-motion, each with its standard uncertainty as prior.
+weights suppress chunks whose edge is covered. Scatter of the chunks beyond their own noise increases the covariance.
+Edge bias, size error, and the offset of every side that may have a shadow (`one_sided_blur`) are fitted together with
+the motion, each with its standard uncertainty as prior.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """Corner of a rough finger: a fillet or a chamfer (a straight cut), which roughness may make indistinguishable.
 
 A fillet of radius R and a straight cut whose legs are 0.655 R remove the same area from a corner, and nowhere differ by
-more than 0.06 R. If roughness hides this difference, the measuring point is the mean over both shapes, each weighted by
-its likelihood (Bayesian model averaging: Hoeting et al., Statistical Science 14, 1999, 382, doi:10.1214/ss/1009212519);
-the variance between the two shapes is part of its uncertainty.
+more than 0.06 R. If roughness hides the difference between the two shapes, the measuring point is the mean over both
+shapes, each weighted by its likelihood (Bayesian model averaging: Hoeting et al., Statistical Science 14, 1999, 382,
+doi:10.1214/ss/1009212519); the variance between the two shapes is part of its uncertainty.
 """
 
 from collections.abc import Sequence

@@ -4,10 +4,10 @@ Neighbouring points of a rough edge have correlated errors, so that the variance
 independent points. Deviation and correlation length are estimated from the flanks. Each flank is modelled as a
 parabola, plus white noise of the points, plus a stationary process with a Matern covariance of smoothness 5/2 (whose
 tails are a little longer than a Gaussian's, so that the uncertainty is rather too large than too small). The standard
-deviation and the correlation length of this process have the restricted likelihood of Patterson and Thompson
+deviation and the correlation length of the process are estimated by the restricted likelihood of Patterson and Thompson
 (Biometrika 58, 1971, 545), which accounts for the part of a long wave that the parabola absorbs. The covariance is
-averaged over that likelihood, not taken at its maximum, because a few waves do not determine the correlation length
-well.
+averaged over the likelihood instead of taken at its maximum, because a few waves do not determine the correlation
+length well.
 """
 
 from collections.abc import Callable

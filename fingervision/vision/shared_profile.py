@@ -1,10 +1,9 @@
 """Mean residual over all rows of a flank: possible displacement of the flank as a whole.
 
 If a codec, an interpolation or a filter affects all rows in the same way, the residuals do not average out over the
-rows. One component of this mean profile is absorbed by the fit as a displacement and cannot be seen; it is assumed to
-be about as large as the other components, which are visible. A displacement adds a profile that is symmetric (even)
-about the edge. Optics that spread light equally to both sides, whatever the shape of the blur, add an antisymmetric
-(odd) profile only.
+rows. The fit absorbs one component of the mean profile as a displacement; this invisible component is assumed to be
+about as large as the visible components. A displacement adds a profile that is symmetric (even) about the edge. Optics
+that spread light equally to both sides, whatever the shape of the blur, add an antisymmetric (odd) profile only.
 """
 
 from typing import NamedTuple

@@ -2,8 +2,8 @@
 
 In stored levels, an unsharp mask adds as much to the light side of an edge as it takes from the dark side. After
 conversion to light the two amounts differ, so that a step fitted in light is displaced from the edge. The effect of the
-mask is visible in the mean profile of a flank in stored levels. This profile is fitted by a blurred step of light,
-encoded by the response, plus a fraction of the difference between this encoded step and a blurred copy of it. A step is
+mask is visible in the mean profile of a flank in stored levels. The mean profile is fitted by a blurred step of light,
+encoded by the response, plus a fraction of the difference between the encoded step and a blurred copy of it. A step is
 then fitted to the fitted profile after conversion to light; its distance from the true edge is the correction of the
 whole outline.
 """

@@ -4,12 +4,12 @@ Source: Unser, IEEE Signal Processing Magazine 16(6), 1999, doi:10.1109/79.79993
 interpolation costs no extra time, because it is part of the spline's prefilter.
 
 The spectrum of the interpolated picture contains copies of the picture's spectrum, centred on every multiple of the
-sampling frequency. These copies seem to move differently from the picture, which causes a bias of a registration that
-depends on the sub-pixel phase (Schreier, Braasch & Sutton, Optical Engineering 39(11), 2000, doi:10.1117/1.1314593). A
-kernel `b + c b''`, where b is the B-spline, uses the same four pixels and also has approximation order 4 (Blu, Thevenaz
-& Unser, IEEE Trans. Image Processing 10(7), 2001, doi:10.1109/83.931101); its spectrum `sinc(f)^4 (1 - c (2 pi f)^2)`
-has an additional zero, at a frequency that can be chosen. With the coefficients of the plain B-spline, this kernel
-smooths slightly more.
+sampling frequency. The copies of the spectrum seem to move differently from the picture, which causes a bias of a
+registration that depends on the sub-pixel phase (Schreier, Braasch & Sutton, Optical Engineering 39(11), 2000,
+doi:10.1117/1.1314593). A kernel `b + c b''`, where b is the B-spline, uses the same four pixels and also has
+approximation order 4 (Blu, Thevenaz & Unser, IEEE Trans. Image Processing 10(7), 2001, doi:10.1109/83.931101); its
+spectrum `sinc(f)^4 (1 - c (2 pi f)^2)` has an additional zero, at a frequency that can be chosen. With the coefficients
+of the plain B-spline, the kernel `b + c b''` smooths slightly more.
 """
 
 from functools import cache
@@ -51,7 +51,7 @@ def _symbol(curvature: float) -> Doubles:
 
 
 def _slope(curvature: float) -> Doubles:
-    """Derivatives of that kernel at the pixels -2 to 2; at a kink, the mean of the derivatives on both sides."""
+    """Derivatives of `b + curvature b''` at the pixels -2 to 2; at a kink, the mean of the derivatives on its sides."""
     return np.array([0.5 * curvature, 0.5 - curvature, 0.0, curvature - 0.5, -0.5 * curvature])
 
 

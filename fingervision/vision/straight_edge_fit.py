@@ -2,8 +2,8 @@
 
 The light of one or more nearly parallel straight edges is `c + d s + sum_k A_k S((t - p_k - m_k s) cos_k)`, with `t`
 across the edges, `s` along them and `S` the integral over the pixel of a Gaussian-blurred step. Under white noise the
-least-squares fit reaches the Cramer-Rao bound of this model (Kay, Estimation Theory, 1993, chapter 8; O'Gorman, IEEE
-PAMI 18(7), 1996, doi:10.1109/34.506799 for lines). The picture is not resampled.
+least-squares fit reaches the Cramer-Rao bound (Kay, Estimation Theory, 1993, chapter 8; O'Gorman, IEEE PAMI 18(7),
+1996, doi:10.1109/34.506799 for lines). The picture is not resampled.
 """
 
 from dataclasses import dataclass

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
+from fingervision.vision.median import median
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -52,7 +53,7 @@ def straight_runs(x: Floats, y: Floats, u: Floats) -> list[Ints]:
     squares = np.empty(n - FEWEST_POINTS + 1)
     _windows(sums, squares)
     chi_square = squares / (FEWEST_POINTS - 2)
-    noise = max(float(np.median(chi_square)) / MEDIAN_OF_CHI_SQUARE, 1e-12)
+    noise = max(median(chi_square) / MEDIAN_OF_CHI_SQUARE, 1e-12)
     starts = np.empty(n + 1, dtype=np.int64)
     _cheapest(sums, noise, starts)
     last_run = starts.tolist()

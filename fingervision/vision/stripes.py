@@ -1,7 +1,7 @@
 """Fit a gap narrower than the blur, in which the light does not reach the level of the background.
 
-Within a row, the contrast of such a gap cannot be separated from its width. The contrast is therefore taken from the
-tips, where the same background is in full view, and both edges of a row are fitted together.
+Within a row, the contrast of a gap narrower than the blur cannot be separated from its width. The contrast is therefore
+taken from the tips, where the same background is in full view, and both edges of a row are fitted together.
 """
 
 from dataclasses import dataclass, replace

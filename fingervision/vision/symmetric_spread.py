@@ -1,4 +1,4 @@
-"""Fit of an edge with any symmetric blur: the part of a mean profile that no such blur explains.
+"""Fit of an edge with any symmetric blur, to find the part of a mean profile that no symmetric blur explains.
 
 Defocus, motion or a halo blurs a step of light into a profile that is antisymmetric (odd) about the edge, whatever the
 shape of the blur. Glare and shadow have profiles with a symmetric (even) part.

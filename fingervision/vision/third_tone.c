@@ -45,7 +45,7 @@ static int level_at(const Arg *upright, const Side *side, int64_t d, double *lev
 /* Level half-way up the step in which a strip outside (sense 1) or inside (-1) of a side ends; 0 where there is none.
    Only a step of the same sense as the edge itself ends a strip between finger and ground. */
 static double strip_end(const Arg *upright, const Side *side, int64_t near, int64_t room_px, int64_t sense, double contrast) {
-    double profile[REACH_PX + 1], most = LEAST_STEP * fabs(contrast), found = 0.0;
+    double profile[REACH_PX + 1], most = (sense > 0 ? LEAST_STEP : LEAST_SHADE) * fabs(contrast), found = 0.0;
     double way = contrast > 0.0 ? 1.0 : contrast < 0.0 ? -1.0 : 0.0;
     int64_t last = near - 1, end = sense > 0 ? smaller_int(REACH_PX, room_px) : REACH_PX;
     while (last < end && level_at(upright, side, sense * (last + 1), &profile[last + 1])) last++;

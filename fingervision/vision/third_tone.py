@@ -1,9 +1,10 @@
 """A strip of a third tone along the fingers' sides: a drop shadow with a hard edge, or a pad.
 
-A threshold assigns such a strip either to the fingers or to the background, so that the measured outline may be that of
-the shadow, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face each other.
-If a strip is assigned to the fingers on one inner side only, it is therefore a shadow. If strips are assigned to the
-background on both inner sides and on no outer side, they are a pair of pads. In both cases the threshold was wrong.
+A threshold assigns a strip of a third tone either to the fingers or to the background, so that the measured outline may
+be that of the shadow, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face
+each other. A strip that is assigned to the fingers on one inner side only is therefore a shadow. If strips are
+assigned to the background on both inner sides and on no outer side, they are a pair of pads. In both cases the
+threshold was wrong.
 """
 
 import numpy as np
@@ -25,6 +26,9 @@ REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
 # Least step at the end of a strip, as a share of the edge's contrast, within this number of pixels; strips are only
 # searched outside the blur of the edge.
 LEAST_STEP, STEP_PX = 0.12, 6
+# A shadow that is darker than that is looked for inside the fingers' sides, down to this share; it has one tone: where
+# its two strips end, levels differ by less than this share of the contrast.
+LEAST_SHADE, ALIKE = 0.05, 0.04
 
 THIRD_TONE = NoGap(
     Status.NO_FINGERS,
@@ -55,8 +59,10 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX) for k in range(2)]
     if is_in[0] != is_in[1]:
         k = 0 if is_in[0] else 1
-        # The same shadow must lie outside the other finger, if this side is in view.
-        if outer[1 - k][0] > 0 or not (lines.weight[1 - k, INNER:ROWS] > 0).any():
+        # The same shadow falls outside the other finger, if that side is in view.
+        is_in_view = (lines.weight[1 - k, INNER:ROWS] > 0).any()
+        alike = ALIKE * median(np.abs(edges.contrast[k, :INNER][lines.weight[k, :INNER] > 0]))
+        if not is_in_view or (outer[1 - k][0] > 0 and abs(outer[1 - k][0] - inner[k][0]) < alike):
             return float(inner[k][0])
     if all(is_out) and not any(strip[1] > 0 for strip in outer):
         return 0.5 * float(inner[0][1] + inner[1][1])

@@ -2,8 +2,8 @@
 
 A wall of breadth w whose light is a share s of the step's adds s (1 - s) w^2 to the variance of the flank's spread, and
 puts a single fitted step (1 - s) w beyond the finger's own edge. If the wall is narrower than the blur, or the flank
-too curved for a mean profile, only this added variance indicates the wall. The outer flanks would distinguish a wall
-from motion; if they are out of view, the flanks can be compared only with the tips.
+too curved for a mean profile, only the variance that the wall adds indicates the wall. The outer flanks would
+distinguish a wall from motion; if they are out of view, the flanks can be compared only with the tips.
 """
 
 import numpy as np

@@ -10,12 +10,20 @@ from time import monotonic, process_time
 
 import numpy as np
 
+from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
+from fingervision.domain.frame import Frame
+from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.clock.alignment import find_clock_offset
 from fingervision.measuring.clock.clock_offset import NoClockOffset
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks import drawn_recordings
 
 FINE_HZ = 2000.0
+WIDEST_PX, FRAME_PX, BELOW_PX = 230.0, (360, 120), 10.2
+"""Largest gap of a rendered recording, its frame, and where it is measured: small frames are measured fast,
+and the noise of the gap depends on neither."""
 KINDS = ("triangles", "staircase", "strokes", "sine", "wander")
 
 
@@ -132,11 +140,32 @@ def of_laboratory(seed):
     return Drawn(one.time_s, one.gap_mm, drive, kind.offset_s, kind.rate, 1.0 / kind.frame_hz, words)
 
 
+def of_pictures(seed):
+    """Draw a short recording as `of_laboratory`, render its frames, and measure the gap in them."""
+    one = drawn_recordings.draw(seed, noise_mm=0.0, duration_s=12.0 + seed % 9)
+    rng = np.random.default_rng(seed)
+    px_per_mm = WIDEST_PX / one.gap_mm.max()
+    camera = Camera(blur_px=rng.uniform(0.7, 1.5), noise_grey=rng.uniform(1.0, 4.0))
+    radius_px = rng.uniform(0.0, 12.0)
+    times, gaps = [], []
+    for number, (time_s, gap_mm) in enumerate(zip(one.time_s, one.gap_mm, strict=True)):
+        scene = two_fingers(gap_mm * px_per_mm, radius_px=radius_px, width_px=40.0, frame=FRAME_PX)
+        found = measure_frame(Frame(render(scene, camera, rng), number), Settings(BELOW_PX, Direction.UP))
+        if isinstance(found, GapMeasurement):
+            times.append(time_s)
+            gaps.append(found.gap_px / px_per_mm)
+    kind = one.kind
+    words = ", ".join(f"{name} {value}" for name, value in asdict(kind).items())
+    drive = DriveHistory(one.log_s, one.input_mm)
+    return Drawn(np.array(times), np.array(gaps), drive, kind.offset_s, kind.rate, 1.0 / kind.frame_hz, words)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--series", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--laboratory", action="store_true", help="draw the recordings of drawn_recordings.py")
+    parser.add_argument("--rendered", action="store_true", help="render their frames, and measure the gap in these")
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--verbose", action="store_true")
     asked = parser.parse_args()
@@ -147,7 +176,8 @@ def main():
     for number in range(asked.series):
         if monotonic() - begun > 60.0 * asked.minutes:
             break
-        case = of_laboratory(1000 * asked.seed + number) if asked.laboratory else draw(rng)
+        of_seed = of_pictures if asked.rendered else of_laboratory
+        case = of_seed(1000 * asked.seed + number) if asked.laboratory or asked.rendered else draw(rng)
         begin = process_time()
         found = find_clock_offset(case.time_s, case.gap_mm, case.drive)
         seconds.append(process_time() - begin)

@@ -105,7 +105,10 @@ def _shifted(words: str, wholes: Iterator[np.ndarray], each: int, noise: float, 
                 value, stated = _numbers(reading)[:2].T
                 errors[place, shift - 1], u[place, shift - 1] = value - (shift / 10, down / 10), stated
     there = np.isfinite(errors)
-    biases = " ".join(f"{np.nanmean(own):+.4f}" for own in errors[:, :, 0].T) if there.any() else ""
+    if not there.any():
+        print(f"{words}: n 0 of {9 * each}", flush=True)
+        return
+    biases = " ".join(f"{own[np.isfinite(own)].mean():+.4f}" for own in errors[:, :, 0].T if np.isfinite(own).any())
     print(
         f"{words}: n {there.sum() // 2} of {9 * each}  bias {biases} px, RMS {np.sqrt(np.nanmean(errors**2)):.4f}, u "
         f"{np.nanmedian(u):.4f}, within {share_within(errors[there], u[there]):.3f}",

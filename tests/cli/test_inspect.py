@@ -58,7 +58,7 @@ def test_no_fingers_is_exit_1_with_the_remedy(tmp_path: Path) -> None:
         (("--seconds", "0"), "--seconds"),
         (("--seconds", "nan"), "--seconds"),
         (("--px-per-mm", "-3"), "positive"),
-        (("--px-per-mm", "34", "--calibration", "c.json"), "leave one out"),
+        (("--px-per-mm", "34", "--calibration", "c.json"), "leave out one of them"),
         (("--px-per-mm", "34", "--roi", "0,0,9999,10"), "inside the frame"),
         (("--px-per-mm", "34", "--below-tip-mm", "0"), "below-tip"),
         (("--px-per-mm", "34", "--response", "nothing.csv"), "response"),

@@ -174,7 +174,7 @@ def test_a_calibration_for_other_frames_is_refused(run: Run, clip: Path) -> None
     ("arguments", "code", "sentence"),
     [
         (("CLIP",), 2, "The scale must be given, but is not: add --calibration FILE"),
-        (("CLIP", *SCALE, "--calibration", "c.json"), 2, "but both are given: leave one out"),
+        (("CLIP", *SCALE, "--calibration", "c.json"), 2, "but both are given: leave out one of them"),
         (("CLIP", "--px-per-mm", "0"), 2, "--px-per-mm must be positive, but is 0."),
         (("CLIP", "--px-per-mm", "-3"), 2, "--px-per-mm must be positive, but is -3."),
         (("CLIP", "--px-per-mm", "nan"), 2, "--px-per-mm must be positive, but is nan."),

@@ -164,9 +164,9 @@ def test_jpeg_is_lossy_and_png_is_not(tmp_path: Path) -> None:
 
 
 def test_where_there_are_no_images_the_sentence_says_so(tmp_path: Path) -> None:
-    with pytest.raises(InputFileError, match=r"The folder .* must contain images .* but there is none"):
+    with pytest.raises(InputFileError, match=r"The folder .* must contain images .* but no such image was found"):
         open_source(str(tmp_path))
-    with pytest.raises(InputFileError, match=r"The pattern .* must match images .* but there is none"):
+    with pytest.raises(InputFileError, match=r"The pattern .* must match images .* but no such image was found"):
         open_source(str(tmp_path / "*.png"))
     (tmp_path / "0.png").write_text("no image")
     with pytest.raises(

@@ -136,7 +136,7 @@ def test_refuses_what_holds_no_levels(source: object, facts: str) -> None:
         (np.zeros((0, 640), np.uint8), "(0, 640)"),
         (np.zeros(640, np.uint8), "(640,)"),
         (np.zeros((4, 5, 6, 7), np.uint8), "(4, 5, 6, 7)"),
-        (picture().astype(float), "0 to 1"),
+        (picture().astype(float), "0 (black) to 1 (full scale)"),
         (-(picture() / 255.0), "-"),
         (np.where(picture() > 150, np.nan, 0.5), "NaN"),
         (np.dstack([picture()] * 4), "alpha"),

@@ -34,13 +34,13 @@ def test_set_points_in_equal_steps_with_a_repeated_row_are_no_encoder():
     assert input_sigma(read, (slice(0, read.size),), 0.1 * np.arange(read.size))[1] == 0.0
 
 
-def test_reversals_between_two_lines_are_not_cut():
+@pytest.mark.parametrize(("row_s", "step"), [(0.008, 0.007), (0.0257, 0.0062)], ids=["many rows", "a row each line"])
+def test_reversals_between_two_lines_are_not_cut(row_s, step):
     rng = np.random.default_rng(12)
-    time_s = np.arange(0.0, 40.0, 0.008)
+    time_s = np.arange(0.0, 40.0, row_s)
     corners = np.arange(0.0, 42.0, 2.0)
     tops = np.where(np.arange(corners.size) % 2, 0.5 + 0.2 * rng.random(corners.size), 0.1 * rng.random(corners.size))
     place = np.interp(time_s, corners, tops)
-    step = 0.007
     path = LogPath.of(DriveHistory(time_s, np.round(place / step) * step))
     assert path.step_mm == pytest.approx(step)
     drawn = np.interp(corners[1:-1], path.drive.time_s, path.drive.input_mm)

@@ -23,10 +23,6 @@ SETTINGS = Settings(BELOW_PX)
 SIGMAS, HARMLESS_PX = 3.0, 0.1
 
 
-# Kinds of which a few in a hundred are still wrong; `python -m tests.benchmarks.scenes clutter` says how many.
-NOT_YET = {"shadow-dark"}
-
-
 def is_wrong(shot: Shot, found: GapMeasurement) -> bool:
     assert shot.gap_px is not None
     return abs(found.gap_px - shot.gap_px) > max(SIGMAS * np.hypot(found.u_gap_px, found.u_picture_px), HARMLESS_PX)
@@ -83,7 +79,7 @@ def test_a_whole_gripper_on_its_base_is_found_without_help() -> None:
         assert not is_wrong(shot, found)
 
 
-@pytest.mark.parametrize("name", sorted(CLUTTER.keys() - NOT_YET))
+@pytest.mark.parametrize("name", sorted(CLUTTER))
 def test_clutter_is_right_or_refused(name: str) -> None:
     for rng in drawn(name):
         shot = CLUTTER[name](rng)

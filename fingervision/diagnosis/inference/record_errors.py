@@ -14,10 +14,9 @@ from fingervision.stage_record.local_polynomial_smoothing import smoothed
 from fingervision.stage_record.window_blending import blended
 
 RECORDS = 30
-"""Largest number of simulated records, which determine a standard deviation to an eighth."""
-MOST_ROWS = 60_000
-"""Largest number of rows in all simulated records (half a second of computation); at least `FEWEST_RECORDS` are
-simulated."""
+"""Number of simulated records: a standard deviation is then known to an eighth."""
+MOST_ROWS = 40_000
+"""Largest number of rows in all simulated records (a third of a second), and least number of records."""
 FEWEST_RECORDS = 8
 BARELY = 1e-3
 """Share of the standard uncertainty of the recorded input below which noise in addition to the encoder's rounding is

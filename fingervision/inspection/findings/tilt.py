@@ -85,10 +85,10 @@ def corner_px(look: Look, below_px: float) -> float:
     """Displacement of one measuring point along a round corner because the camera is rotated (pixels).
 
     In a rotated picture, the highest point of one finger is its outer corner, so that its inner edge is measured higher
-    up on the fillet than that of the other finger, whose highest point is the inner corner. On a fillet of radius R,
-    the point with slope m lies R (1 - m / sqrt(1 + m^2)) below the top and R (1 - 1 / sqrt(1 + m^2)) inside the flank.
-    The first formula and the measuring height of the finger with the inner corner on top give R; the second gives the
-    displacement.
+    up on the fillet. The highest point of the other finger is its inner corner. On a fillet of radius R, the point with
+    slope m is at the depth R (1 - m / sqrt(1 + m^2)) below the top and at the distance R (1 - 1 / sqrt(1 + m^2)) inside
+    the flank. The depth below the top equals the measuring height for the finger with the inner corner on top, which
+    gives R; the distance inside the flank gives the displacement.
     """
     slopes = sorted(abs(m) for m in (look.outcome.left.slope, look.outcome.right.slope))
     radius_px = below_px / (1.0 - slopes[0] / hypot(1.0, slopes[0]))

@@ -1,4 +1,4 @@
-"""Requests from the browser page, one module per topic; each is checked, executed, and answered with a sentence."""
+"""Requests from the browser page: each request is checked, executed, and answered with a sentence."""
 
 import importlib
 import pkgutil

@@ -108,7 +108,7 @@ class VerdictSeeker:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the running diagnosis and start no further one."""
+        """Stop the running diagnosis, and start no further diagnosis."""
         self._ending.set()
         if self._thread is not None:
             self._thread.join()

@@ -1,4 +1,4 @@
-"""Gauges in the browser page: the list that the user edits, and the measurement of these gauges."""
+"""Gauges in the browser page: the list that the user edits, and the measurement of the listed gauges."""
 
 from pathlib import Path
 from typing import Any, Protocol

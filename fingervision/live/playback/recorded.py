@@ -95,7 +95,7 @@ def _about(folder: Path) -> dict[str, Any]:
 
 
 def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices:
-    """Take scale and settings from a run; the user must choose those that cannot be read."""
+    """Take scale and settings from a run; the user must state a scale or setting that cannot be read."""
     try:
         scale, settings = about["scale"], about["settings"]
         file = scale.get("calibration")

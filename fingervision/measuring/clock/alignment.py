@@ -143,7 +143,7 @@ def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
 def _information(motion: Motion, found: Fit) -> float:
     """Logarithm of the likelihood ratio between the fitted motion and a constant gap.
 
-    For the same quality of fit, this number increases with the number of frames.
+    For the same quality of fit, the logarithm increases with the number of frames.
     """
     around = motion.gap_mm - motion.gap_mm.mean()
     return float(motion.time_s.size * np.log(max(float(around @ around), 1e-30) / max(found.squares, 1e-30)))

@@ -68,10 +68,10 @@ def rounded(path: LogPath, corner_s: float) -> LogPath:
 def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Spread]:
     """Choose the duration of all corners that explains the frames best, and the spread of the fit over other durations.
 
-    The rows before and after a corner lie on two lines, whether the stage turned at once where these lines meet or over
-    the time between the rows. All reversals of a stage are alike: if each is rounded by some distance, the fitted play
-    is wrong by twice this distance and the offset accordingly, however many reversals there are. If frames follow
-    faster than the log's rows, they show the difference.
+    The rows before and after a corner lie on two lines, whether the stage reversed at the point where the two lines
+    meet or gradually between the rows. All reversals of a stage are rounded alike. If a rounding by some distance is
+    ignored, the fitted play is wrong by twice the distance, and the offset accordingly, for any number of reversals. If
+    frames follow faster than the log's rows, the frames show whether reversals are rounded.
     """
     path = motion.path
     row_s = float(np.median(np.diff(path.rows.time_s)))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fingervision.domain.effect import Array
-from fingervision.measuring.clock.sharp_reversals import ALLOWED, Stroke, stroke
+from fingervision.measuring.clock.sharp_reversals import Stroke, allowed_mm, stroke
 
 MORE_ROWS = 2
 """Rows by which a halt is longer than the longest time that moving strokes may spend on one reading: the rows at which
@@ -47,19 +47,22 @@ def level_halts(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: flo
             continue
         level_mm = float(reading_mm[begin])
         rows, path = slice(begin, end + 1), np.full(end + 1 - begin, level_mm)
+        lines = []
         if k:
             line = stroke(time_s, reading_mm, begin, np.arange(begin, -1, -1), step_mm)
             if line is None:
                 line = _entering(begin, level_mm - float(reading_mm[begin - 1]), step_mm / before_s, level_mm, step_mm)
             rows, path = slice(line.nearest, rows.stop), np.append(np.full(begin - line.nearest, level_mm), path)
             path = _joined(path, line, time_s[rows] - time_s[begin], level_mm, is_leaving=False)
+            lines.append(line)
         if k + 1 < first.size:
             line = stroke(time_s, reading_mm, end, np.arange(end, reading_mm.size), step_mm)
             if line is None:
                 line = _entering(end, level_mm - float(reading_mm[end + 1]), -step_mm / after_s, level_mm, step_mm)
             rows, path = slice(rows.start, line.nearest + 1), np.append(path, np.full(line.nearest - end, level_mm))
             path = _joined(path, line, time_s[rows] - time_s[end], level_mm, is_leaving=True)
-        if np.max(np.abs(path - reading_mm[rows])) <= ALLOWED * step_mm:
+            lines.append(line)
+        if np.max(np.abs(path - reading_mm[rows])) <= allowed_mm(step_mm, *lines):
             out[rows] = path
     return out
 

@@ -20,6 +20,8 @@ in time. Strong evidence, such as the kink where the fingers meet, outweighs the
 CREEP_PRIOR = 0.02
 """Prior standard deviation of the creep's share of the motion at each time constant: metals creep by 0.1 % of a strain,
 printed polymers by one to five per cent per decade of time (Findley, Lai & Onaran 1976, ISBN 978-0-7204-2369-6)."""
+OTHER_CREEP = (1.0 / 3.0, 3.0)
+"""Factors on the creep's time constants by which its unknown course is varied: half a decade each way."""
 STEPS = 12
 """Largest number of Gauss-Newton steps; three to five steps suffice from the peak of the correlation."""
 SETTLED = 1e-3
@@ -116,21 +118,29 @@ def squares_at(motion: Motion, at: Alignment) -> float:
 def allowance_for_creep(motion: Motion, found: Fit) -> tuple[Array, Array]:
     """Changes of offset, rate and play, and of their variances, if creep is added to the model; each of shape (3,).
 
-    Both are zero if creep is already included. In slow motion, creep too small to be detected acts as a delay equal to
+    If creep is already included, its time constants are varied, and the change is the largest. In slow motion, creep
+    too small to be detected acts as a delay equal to
     (creep fraction x time constant), and can also be mistaken for play. The change is that of the most probable creep;
     the growth covers the creep that remains possible within its prior.
     """
-    if motion.creeps:
-        return np.zeros(3), np.zeros(3)
     free_play = found.at.play_mm > 0.0
-    slow = fit(replace(motion, creeps=True), found.at, free_play=free_play)
-    at, was = slow.at, found.at
-    change = np.array([at.offset_s - was.offset_s, at.rate - was.rate, at.play_mm - was.play_mm])
     growth = np.zeros(3)
+    if motion.creeps:
+        others = (
+            fit(replace(motion, creep_s=tuple(factor * one for one in CREEP_S)), found.at, free_play=free_play)
+            for factor in OTHER_CREEP
+        )
+        return np.max([np.abs(_change(other.at, found.at)) for other in others], axis=0), growth
+    slow = fit(replace(motion, creeps=True), found.at, free_play=free_play)
+    change = _change(slow.at, found.at)
     if slow.normal.shape == found.normal.shape:
         more = np.diag(np.linalg.pinv(slow.normal)) - np.diag(np.linalg.pinv(found.normal))
         growth[: more.size - 1] = np.maximum(np.delete(more, 2), 0.0)
     return change, growth
+
+
+def _change(to: Alignment, since: Alignment) -> Array:
+    return np.array([to.offset_s - since.offset_s, to.rate - since.rate, to.play_mm - since.play_mm])
 
 
 def prior_of(size: int) -> Array:
@@ -184,7 +194,7 @@ def solve(motion: Motion, at: Alignment) -> Solved:
     bends = design.shape[1] - 2
     priors = np.full(bends, BEND_PRIOR)
     if motion.creeps:
-        priors[-2 * len(CREEP_S) :] = CREEP_PRIOR
+        priors[-2 * len(motion.creep_s) :] = CREEP_PRIOR
     hold = spread / (priors * max(abs(float(straight[1])), 1e-12))
     rows = np.hstack([np.zeros((bends, 2)), np.diag(hold)])
     whole, aim = np.vstack([white_design, rows]), np.concatenate([white_gap, np.zeros(bends)])

@@ -29,11 +29,11 @@ far, which is 1.7 times the rounding's standard uncertainty.
 def drawn_paths(path: LogPath) -> Iterator[LogPath]:
     """Draw paths of the stage that are compatible with the log's rows.
 
-    Three kinds of error are drawn. First, smoothing averages the noise over several rows, so that the errors of these
-    rows are correlated. Second, the rounding error of an encoder is common to all rows of a halt, a reversal, or a
-    stretch of a stroke. Third, a corner may lie anywhere between two rows, and a smooth curve cuts all corners on the
-    same side. Reversals between two lines of an encoder are cut on the same side as well, by the rounding and by the
-    smoothing.
+    Three kinds of error are drawn. First, smoothing averages the noise over several rows, so that the errors of
+    neighbouring rows are correlated. Second, the rounding error of an encoder is common to all rows of a halt, a
+    reversal, or a stretch of a stroke. Third, a corner may lie anywhere between two rows, and a smooth curve cuts all
+    corners on the same side. Reversals between two lines of an encoder are cut on the same side as well, by the
+    rounding and by the smoothing.
 
     Parameters
     ----------

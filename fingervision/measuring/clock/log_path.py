@@ -154,9 +154,9 @@ def _shared_errors(
 
     Rounding errors do not average out like noise. A stage at rest may be anywhere within one step of the encoder. If a
     stage moves by whole steps from row to row, the rounding error is the same in each row. For a slower stage, only the
-    crossings of the encoder's lines are informative. The path may be shifted as long as every row stays within half a
-    step of it; if the rounding errors cover the whole step, no such shift is possible. At the beginning and the end of
-    a stroke, motion within one encoder step is invisible.
+    crossings of the encoder's lines are informative. A shift of the path is possible as long as every row stays within
+    half a step of the path; if the rounding errors cover the whole step, no shift is possible. At the beginning and the
+    end of a stroke, motion within one encoder step is invisible.
 
     Returns
     -------
@@ -230,7 +230,7 @@ def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
 
 
 def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
-    """Replace positions at rest by one position, and keep the path next to a rest from overshooting it.
+    """Replace the positions during a rest by one position that the neighbouring path does not overshoot.
 
     Smoothing makes corners overshoot by some standard deviations of a row, and the modelled play is changed by each
     overshoot.

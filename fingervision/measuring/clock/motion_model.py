@@ -92,6 +92,8 @@ class Motion:
         Noise from frame to frame.
     creeps : bool
         Whether the model includes creep of the gap.
+    creep_s : tuple of float
+        Time constants of the creep.
     """
 
     time_s: Array
@@ -100,6 +102,7 @@ class Motion:
     middle_s: float
     noise: Noise
     creeps: bool = False
+    creep_s: tuple[float, ...] = CREEP_S
 
     @property
     def drive(self) -> DriveHistory:
@@ -113,7 +116,7 @@ class Motion:
     def _behind_play(self, at: Alignment) -> tuple[Array, Array]:
         """Output of the play operator at the frames, and at the log's points.
 
-        This output is exact for a log that is linear between its points.
+        The output is exact for a log that is linear between its points.
 
         Between two samples the input is monotonic, so that the play operator clips the state at the earlier sample
         once.
@@ -144,14 +147,14 @@ class Motion:
         lags = []
         if self.creeps:
             since_s = np.maximum(self.log_time_s(at) - float(self.drive.time_s[0]), 0.0)
-            lags = [(self._lagging(at, states, tau_s) - inputs) / half for tau_s in CREEP_S]
-            lags += [np.exp(-since_s / tau_s) for tau_s in CREEP_S]
+            lags = [(self._lagging(at, states, tau_s) - inputs) / half for tau_s in self.creep_s]
+            lags += [np.exp(-since_s / tau_s) for tau_s in self.creep_s]
         return np.column_stack([np.ones_like(z), z, np.maximum(z[:, None] - knots, 0.0), *lags])
 
     def _lagging(self, at: Alignment, states: Array, tau_s: float) -> Array:
         """Exponentially weighted mean of past `states` with a given time constant, at the frames; shape (n,)."""
         times_s = self.drive.time_s
-        step_s = CREEP_STEP * min(CREEP_S)
+        step_s = CREEP_STEP * min(self.creep_s)
         grid_s = times_s[0] + step_s * np.arange(int((times_s[-1] - times_s[0]) / step_s) + 2)
         past = np.interp(grid_s, times_s, states)
         share = 1.0 - float(np.exp(-step_s / tau_s))
@@ -189,7 +192,7 @@ class Motion:
     def weighed(self, pulls: Array) -> Array:
         """Weights of the frames' own noise (white after the autoregression) in sums over whitened frames; shape (m, k).
 
-        This is the transpose of the weights in `whitened`, which is symmetric in the shared errors.
+        The weights are the transpose of those in `whitened`; the part for shared errors is symmetric.
         """
         table = self._without_shared(pulls)
         return table * self.noise.weights[:, None] if self.noise.weights.size else table

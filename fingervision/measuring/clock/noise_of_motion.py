@@ -167,10 +167,10 @@ def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Ar
 def _even_variance(squares: Array, input_mm2: Array) -> float:
     """Maximum-likelihood variance that must be added to `input_mm2`, if a share of the frames may be outliers.
 
-    Frames with a well-known input determine this variance; a median over all frames would fail if they are a minority.
-    The residuals are assumed to have a contaminated normal distribution (Tukey 1960). If large squares were only
-    clipped, there would be no probability density: the smallest variance, at which every frame is clipped, would then
-    be the most likely one.
+    Frames with a well-known input determine the variance; a median over all frames would fail if these frames are a
+    minority. The residuals are assumed to have a contaminated normal distribution (Tukey 1960). If large squares were
+    only clipped, there would be no probability density: the smallest variance, at which every frame is clipped, would
+    then be the most likely variance.
     """
     high = max(float(np.median(squares)) / MEDIAN_CHI_SQUARE, 1e-18)
     tried = high * np.geomspace(1e-4, 4.0, TRIED)

@@ -18,11 +18,11 @@ scatter is then a fifth, and a stretch of an ordinary recording contains one or 
 def inflation(motion: Motion, at: Alignment) -> Array:
     """Ratio of the variance of offset, rate and play to the variance from the fit's own weights; shape (3,).
 
-    The fit's weights treat the log's errors as independent from frame to frame. Their true effect on the fit is
-    computed here: another path that the log allows (`log_errors`) changes the prediction, and the fit passes a share of
-    this change on to its parameters (sandwich estimator: White 1980, doi:10.2307/1912934). If the contributions of
-    stretches of the recording to the parameters scatter by more than this, their scatter is used, because the gap then
-    has causes of motion that the model lacks.
+    The fit's weights treat the log's errors as independent from frame to frame. The true effect of the log's errors is
+    computed by means of other paths that the log permits (`log_errors`): another path changes the prediction, and the
+    fit passes a share of the change on to its parameters (sandwich estimator: White 1980, doi:10.2307/1912934). If the
+    contributions of stretches of the recording to the parameters scatter by more than the log's errors explain, the
+    scatter is used, because the gap then has causes of motion that the model lacks.
     """
     solved = solve(motion, at)
     free_play = at.play_mm > 10.0 * PLAY_STEP

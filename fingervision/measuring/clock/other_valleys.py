@@ -29,8 +29,9 @@ def other_valleys(motion: Motion, found: Fit, plays: tuple[float, ...], frame_s:
     """Find the far offsets that remain possible, and the spread of the fit over the minima nearby.
 
     The errors of a log's path between its rows are common to the frames of a move. A likelihood with one datum per
-    frame could therefore reject the true minimum; instead, a stretch of the recording counts as one datum. If the
-    frames' own noise determines the minimum, the minima differ so much that this choice has no effect.
+    frame could reject the true minimum because of errors common to many frames; instead, a stretch of the recording
+    counts as one datum. If the frames' own noise determines the minimum, the minima differ so much that counting
+    stretches instead of frames has no effect.
 
     Returns
     -------

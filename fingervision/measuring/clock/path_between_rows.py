@@ -38,7 +38,7 @@ STANDS = 0.1
 def piece(
     time_s: Array, input_mm: Array, u_mm: Array
 ) -> tuple[Array, Array, Array, Array, NDArray[np.intp], Array, Array]:
-    """Points of one run (times, inputs, uncertainties, their part due to the curve, intervals), and its corners."""
+    """Path of one run: points (times, inputs, uncertainties, their part due to the curve, intervals), and corners."""
     if time_s.size < FEWEST:
         none = np.zeros(0)
         return time_s, input_mm, u_mm, np.zeros(time_s.size), np.arange(time_s.size), none, none

@@ -1,4 +1,4 @@
-"""Find other clock offsets that fit as well as the best one, judged by the frames that both offsets cover."""
+"""Find other clock offsets that fit as well as the best offset, judged by the frames that both offsets cover."""
 
 from dataclasses import dataclass, replace
 

@@ -7,18 +7,16 @@ from numpy.typing import NDArray
 
 from fingervision.domain.effect import Array
 
-LINES = (12.0, 6.0, 3.0)
-"""Numbers of encoder lines to which a stroke is fitted; the largest number for which the stroke is straight is used.
-With three lines, the stroke's position at the reversal has an uncertainty of a fifth of a step.
-"""
+LINES = (48.0, 24.0, 12.0, 6.0, 3.0)
+"""Encoder lines through which a stroke is drawn: as many of these as are straight; through three, the stroke is known
+to a fifth of a step at the reversal. Where a row lies near every line, twelve leave a third of a step."""
 LEAST_ROWS = 6
 """Least number of rows on each side of a reversal to which a line is fitted."""
 STRAIGHT = 1.3
-"""Ratio of the readings' scatter about a straight stroke to that of rounding, above which the stroke is curved."""
-ALLOWED = 0.55
-"""Largest distance between a reading and a possible path, in steps: half a step, plus a tenth of this for the line's
-error.
-"""
+"""Scatter of the readings about a straight stroke, over that of rounding, above which the stroke is curved."""
+ALLOWED, LINE_SIGMAS = 0.55, 1.0
+"""Distance of a reading from a path that it allows: 0.55 steps (half a step, and a tenth of it for curvature), and the
+standard uncertainty of the line there. Twice that lets curved turns pass that are drawn through a few lines."""
 
 
 def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: float) -> Array:
@@ -27,7 +25,7 @@ def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm:
     Smoothing cuts the corner of a reversal, and no line of the encoder is crossed near it. All reversals are cut
     towards the inside, so that the fitted play is too small by twice the cut, and the offset is wrong by the time that
     a stroke takes for the cut. If a stage slows down before it reverses, two straight strokes do not pass through its
-    readings: such a reversal stays as smoothed.
+    readings, and the smoothed reversal is kept.
 
     Parameters
     ----------
@@ -50,7 +48,7 @@ def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm:
         rows = slice(left.nearest, right.nearest + 1)
         both = np.stack([one.height_mm + one.speed * (time_s[rows] - time_s[turn]) for one in (left, right)])
         path = both.min(axis=0) if left.speed > 0.0 else both.max(axis=0)
-        if np.max(np.abs(path - reading_mm[rows])) <= ALLOWED * step_mm:
+        if np.max(np.abs(path - reading_mm[rows])) <= allowed_mm(step_mm, left, right):
             out[rows] = path
     return out
 
@@ -84,11 +82,19 @@ class Stroke:
         Slope, in mm/s.
     height_mm : float
         Value at the time of the reversal.
+    u_mm : float
+        Standard uncertainty of that value, by the rounding of each row.
     """
 
     nearest: int
     speed: float
     height_mm: float
+    u_mm: float = 0.0
+
+
+def allowed_mm(step_mm: float, *lines: Stroke) -> float:
+    """Largest distance (mm) of a reading from a path of strokes that it allows."""
+    return ALLOWED * step_mm + LINE_SIGMAS * max((line.u_mm for line in lines), default=0.0)
 
 
 def stroke(time_s: Array, reading_mm: Array, turn: int, rows: NDArray[np.intp], step_mm: float) -> Stroke | None:
@@ -104,5 +110,8 @@ def stroke(time_s: Array, reading_mm: Array, turn: int, rows: NDArray[np.intp], 
         speed, height = np.polyfit(x, reading_mm[taken], 1)
         rest = reading_mm[taken] - height - speed * x
         if np.sqrt(np.sum(rest**2) / (taken.size - 2)) <= STRAIGHT * step_mm / np.sqrt(12.0):
-            return Stroke(int(taken[0]), float(speed), float(height))
+            away_s = x - x.mean()
+            leverage = 1.0 / x.size + float(x.mean()) ** 2 / float(away_s @ away_s)
+            u_mm = step_mm / np.sqrt(12.0) * np.sqrt(leverage)
+            return Stroke(int(taken[0]), float(speed), float(height), float(u_mm))
     return None
