@@ -25,9 +25,10 @@ REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
 # A strip ends in a step of at least this share of the edge's contrast within so many pixels; it is not looked for
 # nearer to the edge than the blur reaches.
 LEAST_STEP, STEP_PX = 0.12, 6
-# A shadow that is darker than that is looked for inside the fingers' sides, down to this share; it has one tone: where
-# its two strips end, levels differ by less than this share of the contrast.
-LEAST_SHADE, ALIKE = 0.05, 0.04
+# Fingers of one tone, whose lines leave less than so many times the noise of the flat parts, show a shadow that is
+# darker than that as well, down to this share: it has one tone, so that the levels at which its two strips end differ by
+# less than so much of the contrast.
+ONE_TONE, LEAST_SHADE, ALIKE = 1.3, 0.05, 0.04
 
 THIRD_TONE = NoGap(
     Status.NO_FINGERS,
@@ -51,16 +52,19 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     near, lines = edges.reach_px + 1, edges.lines
     seen = (upright, lines.fixed, edges.position, lines.weight, lines.outward)
     room = _room(edges)
-    inner = [_strips(*seen, k, 0, INNER, near, room) for k in range(2)]
+    is_plain = edges.noise < ONE_TONE * edges.noise_flat
+    least = LEAST_SHADE if is_plain else LEAST_STEP
+    inner = [_strips(*seen, k, 0, INNER, near, room, least) for k in range(2)]
     is_in, is_out = ([strip[way] > 0 for strip in inner] for way in range(2))
     if is_in[0] == is_in[1] and not all(is_out):
         return None
-    outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX) for k in range(2)]
+    outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX, least) for k in range(2)]
     if is_in[0] != is_in[1]:
         k = 0 if is_in[0] else 1
         # The same shadow falls outside the other finger, if that side is in view.
         is_in_view = (lines.weight[1 - k, INNER:ROWS] > 0).any()
-        alike = ALIKE * median(np.abs(edges.contrast[k, :INNER][lines.weight[k, :INNER] > 0]))
+        contrast = median(np.abs(edges.contrast[k, :INNER][lines.weight[k, :INNER] > 0]))
+        alike = ALIKE * contrast if is_plain else np.inf
         if not is_in_view or (outer[1 - k][0] > 0 and abs(outer[1 - k][0] - inner[k][0]) < alike):
             return float(inner[k][0])
     if all(is_out) and not any(strip[1] > 0 for strip in outer):
