@@ -26,8 +26,8 @@ REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
 # nearer to the edge than the blur reaches.
 LEAST_STEP, STEP_PX = 0.12, 6
 # Fingers of one tone, whose lines leave less than so many times the noise of the flat parts, show a shadow that is
-# darker than that as well, down to this share: it has one tone, so that the levels at which its two strips end differ by
-# less than so much of the contrast.
+# darker than that as well, down to this share: it has one tone, so that the levels at which its two strips end differ
+# by less than so much of the contrast.
 ONE_TONE, LEAST_SHADE, ALIKE = 1.3, 0.05, 0.04
 
 THIRD_TONE = NoGap(
