@@ -31,8 +31,9 @@ class Quantiser:
     def near(self, x_px: float, y_px: float, across_px: float, along_px: float) -> float:
         """Largest step in a rectangle centred at a point, with half sides `across_px` and `along_px`."""
         rows, columns = self.step.shape
-        left, right = (self._block(x_px + way - self.first_px[0], columns) for way in (-across_px, across_px))
-        top, bottom = (self._block(y_px + way - self.first_px[1], rows) for way in (-along_px, along_px))
+        x0_px, y0_px = self.first_px
+        left, right = self._block(x_px - across_px - x0_px, columns), self._block(x_px + across_px - x0_px, columns)
+        top, bottom = self._block(y_px - along_px - y0_px, rows), self._block(y_px + along_px - y0_px, rows)
         return float(self.step[top : bottom + 1, left : right + 1].max())
 
     def at(self, x_px: NDArray[np.float64], y_px: NDArray[np.float64]) -> float:

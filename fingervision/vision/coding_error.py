@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
+from fingervision.domain.loops import loop
 from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.median import middle
@@ -45,6 +46,8 @@ SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME
 EVEN_SHIFTS = 2.0
 # Full scale for which quantiser steps are stated: 8 bits.
 EIGHT_BITS = 255.0
+
+_stored_difference = loop("coding_error_stored_difference")
 
 
 def displaced_px(step: float, contrast: float, slope: float = 0.0) -> float:
@@ -137,8 +140,7 @@ def with_coding_error(
 
 def _stored_contrast(level: float, contrast: float, light: Floats, top_level: int) -> float:
     """Contrast of an edge in stored levels on an 8-bit scale, from the light inside and the change of light."""
-    stored = np.interp([level, level + contrast], light[: top_level + 1], np.arange(top_level + 1.0))
-    return float(np.ptp(stored)) * EIGHT_BITS / top_level
+    return float(_stored_difference(light, top_level, level, level + contrast)) * EIGHT_BITS / top_level
 
 
 def _by_slope(slope: float) -> float:

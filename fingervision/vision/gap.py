@@ -143,7 +143,7 @@ def measure_gap(
     if refusal is not None:
         return refusal
     held = None
-    if all(holds) or behind is not None:
+    if fingers.held_along_px is not None and (all(holds) or behind is not None):
         held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared), light_gap)
     if behind is not None:
         return replace(behind, held=held)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fingervision.vision.beside_edge import without_additions
 from fingervision.vision.blur_uncertainty import Displacement, not_displaced
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
-from fingervision.vision.edge_profile import EdgeMark
+from fingervision.vision.edge_moves import are_of_size, beyond_wall, moved_edges, stated_marks, unsure_edges
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.flank_fits import MODEL_LEAVES, MODEL_TIMES, Flank, FlankFits, best_fit
 from fingervision.vision.grey import GreyImage
@@ -27,12 +27,14 @@ from fingervision.vision.mean_profile import (
     MeanProfile,
     mean_profile,
 )
-from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
+from fingervision.vision.narrow_wall import SIGNIFICANT, with_narrow_wall
+from fingervision.vision.profile_lines import INNER, ROWS
 from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STEP, WALL, ProfileFit
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 from fingervision.vision.symmetric_spread import symmetric_squares
 from fingervision.vision.wall_width import (
     WIDER,
+    are_broader_together,
     are_outer_flanks_in_view,
     is_surely_broader,
     squared_blurs,
@@ -44,11 +46,10 @@ Ints = NDArray[np.int_]
 
 # Ratio of a step's residuals to the noise of the picture's flat parts above which other models are tried.
 UNEXPLAINED = 1.2
-# Ratio of the residuals to the noise of the picture's flat parts above which wide flanks without a common profile are
-# not steps, but pads or shadows as wide as the window. Motion causes a ratio below 2.
-NO_STEP = 3.0
-# Least reduction of chi-square by a wall, compared with a step.
-SIGNIFICANT = 30.0
+# Ratios above which flanks without a common profile are not steps, but pads or shadows as wide as the window: residuals
+# to the noise of the picture's flat parts, and squared blur of the flanks to that of the tips. Motion causes a ratio of
+# residuals below 2, and texture does not change the blur.
+NO_STEP, NO_EDGE = 3.0, 4.0
 # Difference in chi-square above which one model is clearly better than another, in units of the residual per bin (odds
 # of e^8 to one).
 CLEARLY = 16.0
@@ -59,9 +60,6 @@ DISC_LEAVES = 0.002
 # Ratio of the distance of a fitted glare to its blur below which defocus explains the glare; a disc of defocus of any
 # size gives 1.0 to 1.1.
 DISC_BREADTH = 1.12
-# Range of the strength of a structure beside an edge, as a share of the contrast; a weaker structure is texture, and
-# with a stronger one the edge is not that of a finger.
-SHARES = (0.05, 0.85)
 # Distance from the end of the scale, in standard deviations of the noise, within which levels are sometimes clipped.
 CUT_OFF_SIGMAS = 2.0
 # Motion and defocus widen both flanks of a finger, and a wall widens the inner flanks of both fingers. If only one
@@ -71,16 +69,12 @@ CUT_OFF_SIGMAS = 2.0
 ONE_SIDED, ONE_SIDED_PX, STRIP = 0.5, 1.2, "strip"
 # Width of a wall or glare, as a multiple of the blur, below which it cannot be distinguished from blur.
 RESOLVED_BLURS = 1.6
-# Width of a wall, as a multiple of the blur, below which the wall only increases the uncertainty if a plain step fits
-# equally well. By chance, flanks in uneven light look like walls of 1.1 blurs; real walls of 2 px with a blur of 1.2 px
-# are found with at least 1.58 blurs.
-HIDDEN_BLURS = 1.4
 # Motion spreads a fillet of this radius like a box and not like a Gaussian: the half-level moves by up to half of the
 # variance that it adds over the radius.
 MOTION_RADIUS_PX = 15.0
-# Standard uncertainty of a correction, as a share of it, for shadow, wall and glare: real shadows are not exactly
-# ramps, real walls not exactly uniform, and glare on a fillet has another position than on the flank.
-U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
+# Relative standard uncertainty of a correction for shadow and for glare: real shadows are not exactly ramps, and glare
+# has another position on a fillet than on the flank.
+U_SHADOW, U_GLARE = 0.1, 0.35
 
 
 def with_profile(
@@ -111,7 +105,7 @@ def with_profile(
         is in question.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
-    is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
+    is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE) or are_broader_together(edges, displaced_px)
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
         return _unsure_of_width(edges, displaced_px)
     room = _room(edges)
@@ -120,8 +114,9 @@ def with_profile(
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        is_strip = edges.noise > NO_STEP * edges.noise_flat and np.any(is_surely_broader(edges, displaced_px))
-        return replace(edges, beside=STRIP) if is_strip else _unsure_of_width(edges, displaced_px)
+        flanks, tips = squared_blurs(edges)
+        is_none = edges.noise > NO_STEP * edges.noise_flat and bool(np.any(flanks > NO_EDGE * tips))
+        return replace(edges, beside=STRIP) if is_none else _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # the models do not describe a flank that is clipped at the end of the scale
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
@@ -141,10 +136,10 @@ def with_profile(
     if is_lopsided:
         shadow, glare = fits.of(SHADOW), fits.of(GLARE)
         is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
-        if is_shadow and _are_of_size(shadow, -1.0):
+        if is_shadow and are_of_size(shadow, -1.0):
             return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
-        if left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
-            moved = _moved(edges, glare, U_GLARE, all_around, "glare")
+        if left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and are_of_size(glare, 1.0):
+            moved = moved_edges(edges, glare, U_GLARE, all_around, "glare")
             return without_additions(upright, moved, light, GLARE, glare)
     # Lines along the picture's border do not cross a flank.
     outer: list[MeanProfile | None] = [None, None]
@@ -152,12 +147,12 @@ def with_profile(
         outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         wall = fits.of(WALL)
-        is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
-        has_strip = [
+        is_wall = not is_step and left[WALL] < enough and are_of_size(wall, -1.0)
+        is_strip = [
             step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
             for step, fit, (profile, _, _) in zip(steps, wall, profiles, strict=True)
         ]
-        if has_strip[0] != has_strip[1]:
+        if is_strip[0] != is_strip[1]:
             return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
             # The flanks are more blurred than the tips, because of a wall or of motion, which cannot be distinguished
@@ -166,16 +161,16 @@ def with_profile(
                 best_fit(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
                 for seen, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
             ]
-            is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and _are_of_size(wall, -1.0)
-        chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
-        # There is a wall; the edge lies at the fitted distance, within the uncertainty of the fit.
+            is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and are_of_size(wall, -1.0)
+        chosen = [beyond_wall(fit) for fit in wall] if is_outline else wall
+        # There is a wall, so that the edge may be displaced by the fitted distance plus its uncertainty.
         farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
         unsure = _unsure_of_width(edges, displaced_px)
         if not is_wall:
             return unsure
         # The profile of a wall narrower than the blur does not determine its tone, so that only its width is used.
         is_narrow = any(fit.breadth < RESOLVED_BLURS * fit.blur for fit in wall)
-        return _unsure(unsure if is_narrow else edges, farthest, "wall")
+        return unsure_edges(unsure if is_narrow else edges, farthest, "wall")
     if is_lopsided and left[SHADOW] < enough:
         # A shadow, which the inner flanks cannot distinguish from a wall, is also visible on the outer side.
         beyond = np.array(
@@ -183,7 +178,7 @@ def with_profile(
         )
         both = left[:3] + beyond.sum(axis=0)
         is_likelier = both[SHADOW] + margin[SHADOW] < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
-        if is_likelier and _are_of_size(shadow, -1.0):
+        if is_likelier and are_of_size(shadow, -1.0):
             return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
     widths = [best_fit(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
     is_one_sided = [
@@ -198,38 +193,34 @@ def with_profile(
     # shadow up to two pixels wide only increases the blur: a strip of two equal steps by half of its width.
     wider = [step.blur**2 - width**2 for step, width in zip(steps, widths, strict=True)]
     if min(wider) < -ONE_SIDED * min(step.blur for step in steps) ** 2 and max(wider) > ONE_SIDED * min(widths) ** 2:
-        return _unsure(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
+        return unsure_edges(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
     if all(step.blur**2 > (1.0 + WIDER) * width**2 for step, width in zip(steps, widths, strict=True)):
-        narrow = [best_fit(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
-        remains = sum(fit.squares for fit in narrow)
-        if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
-            chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
-            # Possibly a wall, possibly chance.
-            if is_step and any(fit.breadth < HIDDEN_BLURS * fit.blur for fit in narrow):
-                return _unsure(edges, [abs(fit.position) + 2.0 * fit.u_position for fit in chosen], "wall")
-            return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
+        walled = with_narrow_wall(edges, profiles, [p for p in outer if p], enough, is_outline, displaced_px)
+        if walled is not None:
+            return walled
     flanks, tips = squared_blurs(edges)
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
     if np.any(widened):
         widened *= is_surely_broader(edges, displaced_px)
     if np.any(widened):
-        return _unsure(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
+        return unsure_edges(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
     if is_step:
         return edges
     wall, glare = fits.of(WALL), fits.of(GLARE)
-    if not is_lopsided and left[GLARE] < enough and _are_of_size(glare, 1.0):
-        # With such optics, it is not known whether there is a bright line.
-        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:
-            return _unsure(edges, [abs(fit.position) for fit in glare], "glare")
+    if not is_lopsided and left[GLARE] < enough and are_of_size(glare, 1.0):
+        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of glare may be hidden by such optics
+            return unsure_edges(edges, [abs(fit.position) for fit in glare], "glare")
         return edges
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
-    if not is_lopsided or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
+    if not is_lopsided or left[GLARE] > enough or not is_resolved or not are_of_size(glare, 1.0):
         return edges
     # The bright line is glare on the finger, or a bevel around it; the outline lies between the two positions.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
-    moved = _moved(edges, glare, U_GLARE, all_around, "glare")
+    moved = moved_edges(edges, glare, U_GLARE, all_around, "glare")
     moved = without_additions(upright, moved, light, GLARE, glare)
-    return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
+    return replace(
+        moved, marks=stated_marks(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)])
+    )
 
 
 def _without_shadow(
@@ -242,19 +233,19 @@ def _without_shadow(
     better model is a standard uncertainty.
     """
     squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
-    if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
+    if squares[0] <= squares[1] or not are_of_size(fading, -1.0):
         kind, fits, others = SHADOW, ramps, fading
     else:
         kind, fits, others = FADING, fading, ramps
     beyond = [max(each - bins, np.sqrt(2.0 * bins)) for each in squares]
-    share = min(beyond) / sum(beyond) if _are_of_size(others, -1.0) else 0.0
+    share = min(beyond) / sum(beyond) if are_of_size(others, -1.0) else 0.0
     towards = [share * (other.position - fit.position) for fit, other in zip(fits, others, strict=True)]
     by_pixel = np.hypot(1.0, edges.lines.slope)
-    moved = without_additions(upright, _moved(edges, fits, U_SHADOW, by_pixel, "shadow"), light, kind, fits)
+    moved = without_additions(upright, moved_edges(edges, fits, U_SHADOW, by_pixel, "shadow"), light, kind, fits)
     further = np.array(towards)[:, None] * np.hypot(1.0, moved.lines.slope)
     u_px = [float(np.hypot(mark.shift_px, by)) for mark, by in zip(moved.marks, towards, strict=True)]
     position = moved.position + moved.lines.outward * further
-    return replace(moved, position=position, marks=_stated(moved, u_px))
+    return replace(moved, position=position, marks=stated_marks(moved, u_px))
 
 
 def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
@@ -272,7 +263,7 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
     by_pixel = np.hypot(1.0, edges.lines.slope)
     moved = replace(edges, position=edges.position + edges.lines.outward * moves[:, None] * by_pixel)
     u_px = [U_SHIFT * abs(move) for move in moves.tolist()]
-    return replace(moved, marks=_stated(moved, u_px), beside="sharpening")
+    return replace(moved, marks=stated_marks(moved, u_px), beside="sharpening")
 
 
 def _is_symmetric(flanks: list[Flank], steps: list[ProfileFit]) -> bool:
@@ -291,11 +282,6 @@ def _is_symmetric(flanks: list[Flank], steps: list[ProfileFit]) -> bool:
     return squares < 0.5 * MODEL_LEAVES * bins
 
 
-def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
-    """Whether the fitted structure beside a dark finger's edge has a plausible sign and size."""
-    return all(SHARES[0] < sign * fit.share < SHARES[1] for fit in fits)
-
-
 def _room(edges: EdgePoints) -> int:
     """Largest length (px) of a fit window that does not reach the other finger."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
@@ -304,46 +290,7 @@ def _room(edges: EdgePoints) -> int:
     return int(min(REACH_PX, 0.5 * (real[1].min() - real[0].max())))
 
 
-def _across(edges: EdgePoints) -> Floats:
-    """Displacement along every line of pixels if a side wall displaces the inner edge horizontally by one pixel."""
-    towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
-    return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
-
-
-def _beyond_wall(fit: ProfileFit) -> ProfileFit:
-    """Move the position of a fitted wall from its near to its far edge."""
-    return fit._replace(position=fit.position + fit.breadth)
-
-
-def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats, beside: str) -> EdgePoints:
-    """Move the edges to the positions given by a model, and state the remaining uncertainty."""
-    moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
-    u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
-    position = edges.position + edges.lines.outward * moves
-    return replace(edges, position=position, marks=_stated(edges, u_px), beside=beside)
-
-
-def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Set the blur of the inner flanks to a given value, because a wall beside an edge is not blur."""
-    blur_px = edges.blur_px.copy()
-    blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
-    blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])
-    return replace(edges, blur_px=blur_px)
-
-
-def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Leave the edges in place, with an uncertainty for the possible displacement, because its cause is undecided."""
-    u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
-    return replace(edges, marks=_stated(edges, u_px), beside=beside)
-
-
 def _unsure_of_width(edges: EdgePoints, displaced_px: Displacement) -> EdgePoints:
-    """State how far a side wall may have moved the edges, where only the blur of the edges indicates a wall."""
+    """State how far a side wall may have moved the edges, if only the blur of the edges indicates a wall."""
     limits = wall_limits_px(edges, displaced_px)
-    return edges if limits is None else _unsure(edges, limits, "wall")
-
-
-def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Edge marks with the given uncertainties, one for each finger."""
-    left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
-    return left, right
+    return edges if limits is None else unsure_edges(edges, limits, "wall")

@@ -1,7 +1,7 @@
 """Shift of a fitted edge under another camera response: the uncertainty due to an assumed response."""
 
 from functools import lru_cache
-from math import hypot
+from math import hypot, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ def edge_shift_px(
         Gaussian sigma of the edge (pixels).
     """
     levels = [round(min(max(share, 0.0), 1.0) / LEVEL_STEP) for share in (inside, outside)]
-    blur = round(np.log(max(blur_px, 0.2)) / np.log(BLUR_RATIO))
+    blur = round(log(max(blur_px, 0.2)) / log(BLUR_RATIO))
     return 0.0 if levels[0] == levels[1] else _shift(assumed.name, other.name, *levels, blur)
 
 

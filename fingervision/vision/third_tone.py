@@ -26,10 +26,11 @@ REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
 # Least step at the end of a strip, as a share of the edge's contrast, within this number of pixels; strips are only
 # searched outside the blur of the edge.
 LEAST_STEP, STEP_PX = 0.12, 6
-# Least step at the end of a strip on the finger's side of an edge, as a share of the contrast. If only one finger has
-# such a strip, the strip beyond the other finger's outer edge, if in view, must have the same level within the second
-# share of the contrast, because a shadow has a uniform tone.
-LEAST_SHADE, ALIKE = 0.05, 0.04
+# Fingers have a uniform tone if the ratio of the edge fits' residuals to the noise of the picture's flat parts is below
+# the first value. Beside such fingers, steps down to the second value (share of the contrast) are accepted, if the
+# levels at the ends of the shadow's two strips differ by less than the third value (share of the contrast), because a
+# shadow has a uniform tone, too.
+ONE_TONE, LEAST_SHADE, ALIKE = 1.3, 0.05, 0.04
 
 THIRD_TONE = NoGap(
     Status.NO_FINGERS,
@@ -53,16 +54,19 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     near, lines = edges.reach_px + 1, edges.lines
     seen = (upright, lines.fixed, edges.position, lines.weight, lines.outward)
     room = _room(edges)
-    inner = [_strips(*seen, k, 0, INNER, near, room) for k in range(2)]
+    is_plain = edges.noise < ONE_TONE * edges.noise_flat
+    least = LEAST_SHADE if is_plain else LEAST_STEP
+    inner = [_strips(*seen, k, 0, INNER, near, room, least) for k in range(2)]
     is_in, is_out = ([strip[way] > 0 for strip in inner] for way in range(2))
     if is_in[0] == is_in[1] and not all(is_out):
         return None
-    outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX) for k in range(2)]
+    outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX, least) for k in range(2)]
     if is_in[0] != is_in[1]:
         k = 0 if is_in[0] else 1
         # The same shadow falls outside the other finger, if that side is in view.
         is_in_view = (lines.weight[1 - k, INNER:ROWS] > 0).any()
-        alike = ALIKE * median(np.abs(edges.contrast[k, :INNER][lines.weight[k, :INNER] > 0]))
+        contrast = median(np.abs(edges.contrast[k, :INNER][lines.weight[k, :INNER] > 0]))
+        alike = ALIKE * contrast if is_plain else np.inf
         if not is_in_view or (outer[1 - k][0] > 0 and abs(outer[1 - k][0] - inner[k][0]) < alike):
             return float(inner[k][0])
     if all(is_out) and not any(strip[1] > 0 for strip in outer):

@@ -64,6 +64,13 @@ def wall_limits_px(edges: EdgePoints, displaced_px: Displacement) -> list[float]
     return limits
 
 
+def are_broader_together(edges: EdgePoints, displaced_px: Displacement) -> bool:
+    """Whether the flanks of both fingers together are wider than the tips by more than noise and codec explain."""
+    flanks, tips = squared_blurs(edges)
+    more = float((flanks - tips).sum())
+    return more > BOTH_WIDER * tips.sum() and more > SURE * float(np.hypot(*_u_excess(edges, displaced_px)))
+
+
 def are_outer_flanks_in_view(edges: EdgePoints) -> bool:
     """Whether both fingers' outer flanks can be compared with the inner ones; the picture's border is not a flank."""
     size, is_real = np.abs(edges.contrast), edges.lines.weight > 0

@@ -1,12 +1,12 @@
-"""What the board's firmware holds: the real sketch on an emulated ATmega328P, its client over a pseudo-terminal.
+"""Tests of the board's firmware: the real sketch on an emulated ATmega328P, with its client on a pseudo-terminal.
 
     PYTHONPATH=. python tests/benchmarks/board.py [--seconds 60] [--slower 1]
 
-The host's clock goes with the emulated crystal (0.5 % fast beside it), so that a machine with other work, where the
-emulator gets on slowly, tells the truth too; `--slower 4` is slow motion. Columns say what is measured, over what, what
-it must be and what it is: force samples and their distances in board's time; the joined clock against the true time of
-drive edges spread over the whole time; and the time from the last word of the computer to the drive line's fall, with
-the client cut off while it drives.
+The host's clock follows the emulated crystal (with a rate 0.5 % higher), so that results are valid on a loaded computer
+too, on which the emulator is slow; `--slower 4` slows the emulation further. The program prints three results with
+their required values: lost force samples and their intervals on the board's clock; the error of the converted clock at
+edges of the drive line; and the time from the last message of the computer to the release of the drive line, if the
+client is cut off during a motion.
 """
 
 import argparse
@@ -29,7 +29,7 @@ DRIVE_PIN = WIRING[Role.DRIVE].pin
 
 
 def stream(emulated: EmulatedBoard, seconds: float) -> None:
-    """Stream force for a while, with a motion now and then, and compare all clocks."""
+    """Record force samples during several motions, and compare all clocks."""
     board = opened(emulated.settings(), emulated.clock).hold()
     samples, errors_s, uncertainties_s = list(board.samples()), [], []
     began_s, wall_s = emulated.clock.now_s(), monotonic()
@@ -57,7 +57,7 @@ def stream(emulated: EmulatedBoard, seconds: float) -> None:
 
 
 def edge_error(emulated: EmulatedBoard, board: Board) -> tuple[float, float]:
-    """Error of the joined clock at a drive edge, and its stated uncertainty."""
+    """Error of the converted clock at an edge of the drive line, and its stated uncertainty."""
     since = len(emulated.edges)
     board.run(1, 1.0)
     while Levels.BUSY_SEEN not in board.levels or Levels.BUSY in board.levels:
@@ -70,7 +70,7 @@ def edge_error(emulated: EmulatedBoard, board: Board) -> tuple[float, float]:
 
 
 def silences(emulated: EmulatedBoard) -> None:
-    """Cut the computer off while it drives, and see when the drive line falls."""
+    """Cut the computer off during motions, and measure the time until the drive line is released."""
     falls_ms = []
     for _ in range(SILENCES):
         board = opened(emulated.settings(), emulated.clock).hold()
@@ -91,7 +91,7 @@ def silences(emulated: EmulatedBoard) -> None:
 
 
 def main() -> None:
-    """Print what the firmware holds."""
+    """Run all measurements, and print the results."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--slower", type=int, default=1)

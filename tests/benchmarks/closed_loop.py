@@ -1,13 +1,13 @@
-"""The closed loop on pictures: what is hidden in the simulated bed, and what `bed run` and `diagnose` make of it.
+"""Closed loop on rendered frames: effects added to the simulated test bed, and their diagnosis after `bed run`.
 
 Run as `python tests/benchmarks/closed_loop.py [--part named|open|all] [--out DIR] [--first N] [--seeds N]` from the
-top; the seeds are those from the first on.
+project's folder; N successive seeds are used, starting with the first.
 
-`named` hides each effect alone (usual size), runs RICH, and prints the verdict, the names and the parameters beside the
-truth, and nothing hidden as the last line. `open` begins with POOR, a one-way run of 40 frames; where that leaves the
-answer open it runs what is proposed on the same bed and prints whether the answer is then the truth, and the gain that
-was promised and that came: chi-square by which the rivals fall behind the truth with both runs, less what they were
-behind before.
+The part `named` adds each effect alone (with its usual size), runs RICH, and prints the verdict, and names and
+parameters next to the true values; the last line is without an effect. The part `open` begins with POOR, a one-way run
+of 40 frames. If the diagnosis is then ambiguous, the proposed run is executed on the same test bed. Printed are whether
+the final diagnosis is right, and the predicted and the actual gain: the increase, by the second run, of the chi-square
+by which other explanations are worse than the truth.
 """
 
 import argparse
@@ -46,7 +46,7 @@ POOR: tuple[dict[str, object], ...] = ({"kind": "move", "to_mm": 1.3, "speed_mm_
 
 
 def answered(name: str, seed: int, steps: tuple[dict[str, object], ...], folder: Path) -> dict[str, Any]:
-    """Hide, run, diagnose."""
+    """Add an effect, run the recipe, and diagnose the result."""
     folder.mkdir(parents=True, exist_ok=True)
     recipe = folder / "recipe.toml"
     write_recipe(recipe, "benchmark", steps)
@@ -54,12 +54,12 @@ def answered(name: str, seed: int, steps: tuple[dict[str, object], ...], folder:
 
 
 def hidden_as(name: str) -> Hidden:
-    """One effect in its usual size; nothing for `nothing`."""
+    """One effect with its usual size; no effect for `nothing`."""
     return Hidden({} if name == "nothing" else {name: usual_values(catalogue()[name])})
 
 
 def followed(name: str, seed: int, recipe: Path, out: Path, before: Path | None) -> dict[str, Any]:
-    """Run a recipe, perhaps after another run, and diagnose what is known by then."""
+    """Run a recipe, possibly after an earlier run, and diagnose all data recorded so far."""
     rows = [] if before is None else rows_before(before)
     bed = open_bed("simulated", hidden_as(name), seed=seed, earlier_s=times_of(rows))
     try:
@@ -75,7 +75,7 @@ def followed(name: str, seed: int, recipe: Path, out: Path, before: Path | None)
 
 
 def behind(report: dict[str, Any], truth: str, rival: str) -> float | None:
-    """Chi-square by which a rival is behind the truth; None where the report does not list it."""
+    """Chi-square by which another explanation is worse than the truth; None if the report does not list it."""
     listed = {"+".join(each["effects"]): each["chi_square_more_than_best"] for each in report["runners_up"]}
     best = "+".join(effect["name"] for effect in report["effects"])
     listed[best] = 0.0
@@ -85,7 +85,7 @@ def behind(report: dict[str, Any], truth: str, rival: str) -> float | None:
 
 
 def named(out: Path, seeds: range) -> None:
-    """Print the table of single effects."""
+    """Print the table of results for single effects."""
     print(f"{'hidden':22} {'frames':>6} {'verdict':9} {'found':34} right  truth -> found (s of processor)", flush=True)
     right = 0
     cases = [(name, seed) for seed in seeds for name in (*NAMED, "nothing")]
@@ -110,7 +110,7 @@ def named(out: Path, seeds: range) -> None:
 
 
 def opened(out: Path, seeds: range) -> None:
-    """Print what the proposed second runs were worth."""
+    """Print the predicted and actual gains of the proposed second runs."""
     print(
         f"{'hidden':22} {'first':9} {'alternatives':>12} {'proposed':24} {'then':9} {'found':28} promised  came",
         flush=True,
@@ -158,7 +158,7 @@ def opened(out: Path, seeds: range) -> None:
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print the tables of the selected parts."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", choices=("named", "open", "all"), default="all")
     parser.add_argument("--out", type=Path, default=Path("build/closed_loop"))

@@ -1,10 +1,10 @@
-"""Seconds of a diagnosis by length of the table; prints a table, asserts nothing.
+"""Print the duration of a diagnosis for tables of different length; nothing is asserted.
 
     python -m tests.benchmarks.diagnose_speed [--samples 100,2000,20000] [--hidden backlash,nothing,two]
 
-The bench drives a stage through loops, holds and reversals at two speeds in six runs, reads its input with jitter, and
-hides play, nothing, or play and an offset. Wall time is that of this machine with whatever else runs on it (the load is
-printed); the processor's time is what the diagnosis itself took, on all cores together.
+A stage is simulated in six runs with loops, holds and reversals at two speeds. Its input is read with jitter, and it
+has play, no effect, or play and an offset. Wall time depends on other programs on the computer (the load is printed);
+processor time is that of the diagnosis alone, summed over all cores.
 """
 
 import argparse
@@ -28,7 +28,7 @@ HIDDEN = ("backlash", "nothing", "two")
 
 
 def stage(samples: int, run: int) -> np.ndarray:
-    """Input of one run, shape (samples,), in mm: loops that shrink, then a hold, slower in every other run."""
+    """Input of one run, shape (samples,), in mm: loops of decreasing size, then a hold; every second run is slower."""
     time_s = np.arange(samples) / RATE_HZ
     period = 20.0 if run % 2 else 8.0
     loop = 0.9 * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * time_s / period))
@@ -36,7 +36,7 @@ def stage(samples: int, run: int) -> np.ndarray:
 
 
 def played(u: np.ndarray, play_mm: float) -> np.ndarray:
-    """Input after a play, sample by sample."""
+    """Output of a play operator, computed sample by sample."""
     out = np.empty_like(u)
     at = u[0]
     for i, x in enumerate(u):
@@ -46,7 +46,7 @@ def played(u: np.ndarray, play_mm: float) -> np.ndarray:
 
 
 def write(folder: Path, samples: int, hidden: str, seed: int) -> None:
-    """Write measured.csv and sim.csv."""
+    """Write measured.csv and sim.csv to a folder."""
     rng = np.random.default_rng(seed)
     grid = np.linspace(-1.2, 1.2, 25)
     gap = 8.0 + 6.0 * grid + 0.3 * grid**2
@@ -67,7 +67,7 @@ def write(folder: Path, samples: int, hidden: str, seed: int) -> None:
 
 
 def main() -> None:
-    """Read the options, time, print."""
+    """Read the options, measure the durations, and print the table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--samples", default="100,2000,20000")
     options.add_argument("--hidden", default=",".join(HIDDEN))

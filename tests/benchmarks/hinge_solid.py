@@ -1,7 +1,7 @@
-"""Compliance of a notch hinge by finite elements between rigid end planes: what beam theory is corrected by.
+"""Compliance of a notch hinge between rigid end planes by finite elements, from which beam theory is corrected.
 
-Quadratic quadrilaterals in plane stress, or quadratic bricks; the left end plane is fixed and the right one moved as a
-rigid body in each of its directions, which gives the stiffness there and, inverted, the compliance.
+The elements are quadratic quadrilaterals in plane stress, or quadratic bricks. The left end plane is fixed, and the
+right end plane is moved as a rigid body in each direction, which gives its stiffness and, by inversion, the compliance.
 """
 
 from collections.abc import Callable
@@ -31,25 +31,26 @@ def plane_compliance(
     block_mm: float = 0.0,
     share: float = 0.0,
 ) -> Array:
-    """Compute the in-plane compliance at the right end, x, y, rotation about z.
+    """Compute the in-plane compliance at the right end: x, y, rotation about z.
 
     Parameters
     ----------
     notch : Notch
-        Its shape.
+        Shape of the notch.
     material : Material
-        Linear elastic; plane stress.
+        Linear elastic material, in plane stress.
     along, across : int
         Number of quadratic elements.
     block_mm : float
-        Length of elastic blocks as high as the notch's ends between it and the end planes; 0 for none.
+        Length of elastic blocks between the notch and the end planes, as high as the ends of the notch; 0 for no
+        blocks.
     share : float
-        Of plane strain within the notch, as `width_effect` has it.
+        Weight of plane strain within the notch, as in `width_effect`.
 
     Returns
     -------
     ndarray of float, shape (3, 3)
-        At the outer end of the right block.
+        Compliance at the outer end of the right block.
     """
     plate_mm = notch.plate_mm
 
@@ -76,14 +77,15 @@ def solid_compliance(
     notch, material
         As in `plane_compliance`.
     along, across, through : int
-        Number of bricks along the notch, across it in the plane, and through the plate, close together at its faces.
+        Numbers of bricks along the notch, across the notch in the plane, and through the plate; thinner at the faces of
+        the plate.
     block_mm : float
         As in `plane_compliance`.
 
     Returns
     -------
     ndarray of float, shape (6, 6)
-        Order as in `beam_compliance`.
+        Compliance, with components ordered as in `beam_compliance`.
     """
     E, nu = material.youngs_modulus_mpa, material.poisson_ratio
     lame = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
@@ -106,7 +108,7 @@ def solid_compliance(
 
 
 def _stations(notch: Notch, along: int, block_mm: float) -> Array:
-    """Stations of the elements: angles of x = a sin(angle) within the notch, beyond it the blocks."""
+    """Positions of the element ends: at equal angles of x = a sin(angle) within the notch, then in the blocks."""
     inside = np.arcsin(np.clip(notch.stations_mm(along) / notch.half_length_mm, -1.0, 1.0))
     if block_mm == 0.0:
         return inside

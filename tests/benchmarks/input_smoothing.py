@@ -1,8 +1,8 @@
-"""What smoothing leaves of the recorded input's error, and what it claims to leave, both as shares of its variance.
+"""Error of the recorded input after smoothing, true and as stated, both as shares of the variance before smoothing.
 
     PYTHONPATH=. python tests/benchmarks/input_smoothing.py --records 200 --seed 2
 
-The motions, noises and encoders are those of the hidden-effect benchmark.
+Motions, noise and encoders are those of the benchmark `hidden`.
 """
 
 import argparse
@@ -20,11 +20,11 @@ from tests.benchmarks.hidden.noise import draw_noise, rounded
 
 KINDS: tuple[Kind, ...] = ("rich", "ordinary", "poor")
 SINE = 2
-"""Every fourth run of a rich design, from this one on, swings."""
+"""Number of the first sinusoidal run in a rich design; every fourth run after it is sinusoidal too."""
 
 
 def main() -> None:
-    """Draw records, smooth them, print the table."""
+    """Simulate records, smooth the records, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", type=int, default=200)
     parser.add_argument("--seed", type=int, default=2)

@@ -1,6 +1,6 @@
-"""Print the table of `fingervision/models/fillet_stress.py`: the peak at a fillet over a neck's nominal stress.
+"""Print the table of `fingervision/models/fillet_stress.py`: largest stress at a fillet over nominal stress of a neck.
 
-A neck of thickness 1 between blocks, pulled, and bent by a moment alone; plane stress.
+A neck of thickness 1 between blocks is loaded in tension and in pure bending, in plane stress.
 """
 
 import numpy as np
@@ -16,14 +16,14 @@ from fingervision.models.triangulate import triangulate
 
 UNIT = Material("unit", 1.0, 0.3, 1.0, 1.0)
 STRAIGHT = 2.0
-"""Thicknesses of straight neck on either side of the middle: the fillets do not see each other."""
+"""Length of the straight neck on each side of its middle, in thicknesses; the fillets do not influence each other."""
 BLOCK = 1.5
-"""Heights of the blocks: their ends are far."""
+"""Length of the blocks over their height, large enough that the ends have no influence."""
 ACROSS = 12.0
 
 
 def factors(radius: float, depth: float, straight: float = STRAIGHT) -> tuple[float, float]:
-    """Stress concentration in tension and in bending of a fillet's radius and a shoulder's depth, in thicknesses."""
+    """Stress concentration factors in tension and bending, for a fillet radius and a shoulder depth in thicknesses."""
     half = straight + radius
     flexure = Flexure("neck", "filleted", (0.0, 0.0), 0.0, 1.0, half, depth, radius)
     high = 0.5 + depth
@@ -38,7 +38,7 @@ def factors(radius: float, depth: float, straight: float = STRAIGHT) -> tuple[fl
         [plate.x_dofs[left], plate.x_dofs[right], [plate.y_dofs[middle]]]))  # fmt: skip
     K = plate.stiffness_n_mm
     found = []
-    # The left end keeps x = 0, so that the right one is pulled or turned against it.
+    # The left end is fixed at x = 0, and the right end is displaced or rotated relative to it.
     for motion in (np.ones(right.size), y[right]):
         moved = np.zeros(plate.unknowns)
         moved[plate.x_dofs[right]] = motion
@@ -50,7 +50,7 @@ def factors(radius: float, depth: float, straight: float = STRAIGHT) -> tuple[fl
 
 
 def main() -> None:
-    """Print one row per radius: tension and bending by depth over radius."""
+    """Print one row per radius: factors in tension and bending for each ratio of depth to radius."""
     print(f"r / t | tension, bending at depth / r of {DEPTHS}")
     for radius in RADII:
         cells = [factors(radius, depth * radius) for depth in DEPTHS]

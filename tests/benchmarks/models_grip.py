@@ -1,4 +1,4 @@
-"""Print how the lumped gripper's grip on a part and first mode stand beside finite elements, for unlike joints."""
+"""Compare the lumped gripper's gripping force and first mode with finite elements, for grippers with various hinges."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +13,12 @@ from tests.benchmarks.models_held_out import HELD_OUT, drawn
 ROOT = Path(__file__).parents[2]
 PART = Part(width_mm=2.0, stiffness_n_mm=50.0)
 BEYOND_MM = 0.2
-"""Of input beyond the first touch of the part."""
+"""Input beyond the first touch of the part."""
 JOINTS = (("finger_width_mm", 6.0), ("cross_bar_width_mm", 5.0), ("shuttle_width_mm", 7.0))
 
 
 def cases(sample: Gripper) -> list[tuple[str, Gripper]]:
-    """Give the held-out drawings, and the sample with other joints."""
+    """Yield the drawings of the held-out grippers, and of the published gripper with other hinges."""
     found = [(f"{row[0].name}, t {row[1]:g}, R {row[2]:g}, plate {row[3]:g}", drawn(sample, row)) for row in HELD_OUT]
     return found + [
         (f"sample, {name} = {value:g}", replace(sample, links=replace(sample.links, **{name: value})))
@@ -27,7 +27,7 @@ def cases(sample: Gripper) -> list[tuple[str, Gripper]]:
 
 
 def main() -> None:
-    """Print one line per drawing, in %."""
+    """Print one line per drawing, with differences in %."""
     print("drawing | grip | first mode, drive held | stated: grip, mode")
     for name, gripper in cases(read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")):
         grips, modes = [], []

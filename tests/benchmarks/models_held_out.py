@@ -1,4 +1,4 @@
-"""Print how the kinds stand on grippers that nothing was fitted to: slope, force, stress and modes of each."""
+"""Print the errors of all kinds of model for grippers to which nothing was fitted: slope, force, stress and modes."""
 
 import argparse
 import time
@@ -26,7 +26,7 @@ ABS = Material("ABS", 2200.0, 0.35, 1040.0, 40.0)
 TITANIUM = Material("Ti-6Al-4V", 113800.0, 0.342, 4430.0, 880.0)
 STEEL = Material("spring steel", 210000.0, 0.3, 7850.0, 1200.0)
 SILICON = Material("silicon", 169000.0, 0.28, 2330.0, 1000.0)
-# Material, thickness, radius, plate, l2 longer by, l3 longer by.
+# Columns: material, hinge thickness, radius, plate thickness, increase of l2, increase of l3 (mm).
 HELD_OUT = (
     (PA2200, 1.0, 4.0, 3.0, 0.0, 0.0),
     (ALUMINIUM, 0.05, 4.0, 1.0, 0.0, 0.0),
@@ -39,11 +39,12 @@ HELD_OUT = (
     (STEEL, 0.3, 4.5, 6.0, -6.0, -2.0),
 )
 REFINED = 0.5
-"""Edge lengths of the reference over those of the model: its force is within 0.005 % of the limit for the sample."""
+"""Edge lengths of the reference mesh over those of the model; the reference force of the published gripper is within
+0.005 % of its limit."""
 
 
 def drawn(gripper: Gripper, row: tuple[Material, float, float, float, float, float]) -> Gripper:
-    """Change the sample's drawing."""
+    """Change the drawing of the published gripper."""
     material, thickness_mm, radius_mm, plate_mm, l2_by, l3_by = row
     gripper = replace(
         gripper,
@@ -57,7 +58,7 @@ def drawn(gripper: Gripper, row: tuple[Material, float, float, float, float, flo
 
 
 def drawn_at_random(count: int, seed: int) -> list[tuple[Material, float, float, float, float, float]]:
-    """Draw rows like those of `HELD_OUT`: t / R 0.0125 to 0.4, width over thickness 1 to 20, plates 1 to 20 mm."""
+    """Draw random rows for `HELD_OUT`: t / R from 0.0125 to 0.4, width over thickness 1 to 20, plates of 1 to 20 mm."""
     generator = np.random.default_rng(seed)
     materials = (PA2200, ALUMINIUM, ABS, TITANIUM, STEEL, SILICON)
     found = []
@@ -72,7 +73,9 @@ def drawn_at_random(count: int, seed: int) -> list[tuple[Material, float, float,
 
 
 def main() -> None:
-    """Print errors in % against the plane model on a mesh twice as fine; force and modes with its width effect."""
+    """Print errors in % against the plane model with a mesh twice as fine; its force and modes include the width
+    effect.
+    """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, help="draw others at random; the fixed ones without")
     parser.add_argument("--count", type=int, default=6, help="how many with --seed")
@@ -89,7 +92,7 @@ def main() -> None:
         fine = REFINED * 0.2 * gripper.hinge.thickness_mm
         try:
             mesh = mesh_outline(gripper, ElementSize(fine, REFINED * 2.5))
-        except DataError as error:  # some drawn at random have no body where a notch lies
+        except DataError as error:  # in some random drawings, a notch lies outside the bodies
             print(f"{row[0].name:18s} {row[1]:6.3f} {row[2]:4.2f} {row[3]:5.2f} | {error}", flush=True)
             continue
         reference = FiniteElementGripper(gripper, mesh=mesh)

@@ -1,4 +1,4 @@
-"""Print the tables of `fingervision/models/hinge_correction.py`: bricks and plane stress over beam theory."""
+"""Print the tables of `fingervision/models/hinge_correction.py`: brick elements and plane stress over beam theory."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ PLANAR = [0, 1, 5]
 
 
 def main() -> None:
-    """Print, per t / R, plane stress and what elastic blocks add; then one line per b / t, all six directions."""
+    """Print for each t / R the ratios in plane stress and with elastic blocks, then six ratios for each b / t."""
     for t_over_r in (0.0125, 0.025, 0.05, 0.1, 0.25, 0.5, 0.8, 1.6):
         notch, height = circular_notch(1.0, t_over_r, 1.0), 2.0 + t_over_r
         beam = np.diag(beam_compliance(notch, MATERIAL))[PLANAR]

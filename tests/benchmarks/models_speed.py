@@ -1,4 +1,4 @@
-"""Print the seconds of the gripper's models."""
+"""Print the computing times of the gripper's models."""
 
 import os
 import subprocess
@@ -25,7 +25,7 @@ REPEATS = 3
 
 
 def main() -> None:
-    """Print the median of three runs of each: seconds on the clock, and of the processor (if others use it too)."""
+    """Print the median of three runs of each task: wall time and processor time in seconds."""
     gripper = read_gripper(GRIPPER)
     time_s = np.arange(0.0, 60.0, 0.04)
     inputs = np.interp(time_s, [0.0, 20.0, 40.0, 60.0], [0.0, 1.5, -0.4, 1.0])
@@ -63,7 +63,7 @@ def _command() -> None:
 
 
 def _processor_s() -> float:
-    """Of this process and of those that it has waited for."""
+    """Processor time (s) of this process and of its finished child processes."""
     used = os.times()
     return used.user + used.system + used.children_user + used.children_system
 

@@ -1,4 +1,4 @@
-"""Print the shear of a notch with ends that stay parallel, by which the lumped kind has the compliance of elements."""
+"""Print the shear ratio of a notch with parallel ends, for which the lumped model agrees with finite elements."""
 
 import tomllib
 
@@ -44,7 +44,9 @@ direction = {direction}
 def stiffnesses(
     thickness_mm: float, direction: tuple[int, int], *, poisson: float = 0.34, depth_mm: float = RADIUS_MM
 ) -> tuple[float, float]:
-    """N/mm by finite elements and by the lumped kind, of a notch between blocks that stay parallel, in plane stress."""
+    """Stiffness (N/mm), in plane stress, of a notch between parallel blocks: by finite elements and by the lumped
+    model.
+    """
     text = DRAWING.format(thickness=thickness_mm, direction=list(direction), poisson=poisson, depth=depth_mm)
     mechanism = mechanism_from_tables(tomllib.loads(text), "notch")
     plate, frame = (kind(mechanism, width_effect=False) for kind in (MechanismPlate, MechanismFrame))
@@ -52,7 +54,7 @@ def stiffnesses(
 
 
 def main() -> None:
-    """Print for every t / R the ratio that replaces the present one, and the present error of force in per cent."""
+    """Print for every t / R the ratio required, and the error of the force with the present ratio in per cent."""
     from fingervision.models.hinge_correction import _sway_ratio
 
     for t_over_r in (0.0125, 0.025, 0.05, 0.1, 0.25, 0.5, 0.8):

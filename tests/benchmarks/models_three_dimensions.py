@@ -1,4 +1,4 @@
-"""Print how slope, force and the modes of drawings that nothing was fitted to stand beside CalculiX's wedges."""
+"""Compare slope, force and modes of drawings to which nothing was fitted with wedge elements of CalculiX."""
 
 import argparse
 import shutil
@@ -23,8 +23,8 @@ from tests.benchmarks.models_held_out import ABS, ALUMINIUM, SILICON, STEEL, TIT
 from tests.benchmarks.solid_reference import solid_answer
 
 ROOT = Path(__file__).parents[2]
-# Material, scale of the sample's drawing (its links are 17.7 to 19.4 mm long), then thickness, radius and plate in mm,
-# and what l2 and l3 are longer by before the scale.
+# Columns: material, scale of the published drawing (with links of 17.7 to 19.4 mm), then hinge thickness, radius and
+# plate thickness in mm, and the increase of l2 and l3 before scaling.
 GRIPPERS = (
     (ALUMINIUM, 0.7, 0.05, 4.0, 1.0, 0.0, 0.0),
     (STEEL, 0.55, 0.05, 1.0, 1.0, 2.0, 1.0),
@@ -36,11 +36,11 @@ GRIPPERS = (
     (TITANIUM, 2.0, 0.8, 7.0, 2.5, -2.0, 0.0),
 )
 FINER = (2.0, 0.05)
-"""Triangles across and edge length over the size of the solids' plane mesh."""
+"""Two refinements of the plane mesh of the solid elements: number of triangles across, and edge length over size."""
 
 
 def scaled(thing: Any, factor: float) -> Any:
-    """Multiply every length of a drawing's records."""
+    """Multiply every length in the records of a drawing by a factor."""
     if not is_dataclass(thing):
         return thing
     changed: dict[str, Any] = {}
@@ -63,7 +63,9 @@ def gripper_of(sample: Gripper, row: tuple[Any, ...]) -> Gripper:
 
 
 def slim(gripper: Gripper) -> Gripper:
-    """Draw shuttle and pillar as narrow as the hinges' cuts are wide, which would be closed holes in wider bars."""
+    """Make shuttle and pillar as narrow as the cuts of the hinges are wide; in wider bars the cuts would be closed
+    holes.
+    """
     cut_mm = 2.0 * gripper.hinge.radius_mm + gripper.hinge.thickness_mm
     if cut_mm >= gripper.links.shuttle_width_mm:
         return gripper
@@ -74,7 +76,7 @@ def slim(gripper: Gripper) -> Gripper:
 
 
 def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
-    """Give every drawing: half grippers, an asymmetric whole one, and mechanisms drawn by bodies."""
+    """Yield every drawing: half grippers, a whole asymmetric gripper, and mechanisms described by their bodies."""
     sample = read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")
     found: list[tuple[str, Mechanism, Gripper | None]] = []
     for row in GRIPPERS:
@@ -90,7 +92,7 @@ def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
 
 
 def main() -> None:
-    """Print one line per drawing: errors in % of the plane models against three dimensions."""
+    """Print one line per drawing: errors (%) of the plane models compared with the three-dimensional model."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", type=int, nargs="*", help="places of drawings in the list; all without")
     parser.add_argument("--layers", type=int, default=4, help="wedges through the plate")

@@ -1,4 +1,4 @@
-"""Print the width effect of hinges between elastic blocks: bricks beside the plane model with its share."""
+"""Print the width effect of hinges between elastic blocks: brick elements compared with the plane model."""
 
 import time
 from dataclasses import replace
@@ -11,11 +11,11 @@ from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 ABOUT_Z = 5
 NARROW = 0.25
-"""Width over thickness at which bricks are in plane stress: their mesh's own error cancels in the ratio."""
+"""Width over thickness at which brick elements are in plane stress; the error of their mesh cancels in the ratio."""
 
 
 def main() -> None:
-    """Print one line per t / R, width over thickness and Poisson's ratio."""
+    """Print one line for each t / R, width over thickness, and Poisson's ratio."""
     print(
         "t/R  b/t  nu | bending, bricks over narrow bricks | plane model over plane stress | difference | plane stress"
     )

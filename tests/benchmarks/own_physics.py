@@ -1,7 +1,7 @@
-"""Effects hidden in the mechanics: another gripper is built and run, and the diagnosis has the drawing of this one.
+"""Effects simulated by mechanics: data come from a changed gripper, and the diagnosis has the unchanged drawing.
 
-Run as `python -m tests.benchmarks.own_physics [--no-force]`: one line for each thing hidden, what it was named, and the
-disagreement before and after.
+Run as `python -m tests.benchmarks.own_physics [--no-force]`. Each line shows one simulated change, the named effects,
+and the disagreement before and after the correction.
 """
 
 import sys
@@ -38,11 +38,11 @@ SEED = 5
 CAMERA_ABOVE_MM = 100.0
 """Distance of the camera's centre of projection from the plate."""
 OFF_PLANE_MM = 1.0
-"""How far out of the plate's middle plane the drive pushes."""
+"""Distance of the drive force from the middle plane of the plate."""
 
 
 def longer_lever(gripper: Gripper, by: float) -> Gripper:
-    """Draw hinge 1 and its pillar farther out, by a share of the lever's length."""
+    """Move hinge 1 and its pillar outwards by a share of the lever's length."""
     lever, links = gripper.lever, gripper.links
     by_mm = by * lever.l2_mm
     x0, x1, y0, y1 = links.pillar_and_root_mm
@@ -54,7 +54,7 @@ def longer_lever(gripper: Gripper, by: float) -> Gripper:
 
 
 def halves(right: Gripper, left: Gripper, physics: Physics = LINEAR) -> Callable[[Array], Answer]:
-    """Run two halves in parallel; each is half of a gripper of two such halves."""
+    """Combine two different halves in parallel; each is computed as half of a symmetric gripper."""
 
     def run(input_mm: Array) -> Answer:
         a, b = (LumpedGripper(half, physics).respond(input_mm) for half in (right, left))
@@ -66,11 +66,14 @@ def halves(right: Gripper, left: Gripper, physics: Physics = LINEAR) -> Callable
 
 
 def lifted(gripper: Gripper) -> Callable[[Array], Answer]:
-    """Push off the middle plane: the drive's moment lifts the tips towards a camera above, in three dimensions."""
+    """Apply the drive force off the middle plane: its moment lifts the tips towards a camera above, in three
+    dimensions.
+    """
     model = LumpedGripper(gripper)
     chain = ComplianceChain(skeleton_of(gripper, HingeTheory.CORRECTED, 0))
     tree = chain.skeleton
-    # The actuator guides the drive across the plane and in it; the moment about x of its force turns it.
+    # The actuator guides the drive in the plane and perpendicular to it; the moment of the force about x rotates the
+    # drive.
     stiffness = np.linalg.inv(chain.flexibility(tree.drive, tree.drive))
     lift_mm_per_n_mm = float((chain.flexibility(tree.measured, tree.drive) @ stiffness[:, 3])[2] / stiffness[3, 3])
 
@@ -86,18 +89,18 @@ def lifted(gripper: Gripper) -> Callable[[Array], Answer]:
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """Something that the drawing does not know.
+    """A change of the gripper that the drawing does not contain.
 
     Parameters
     ----------
     effect : str
-        Its name in the catalogue, or two names; empty where nothing is hidden.
+        Name of the effect in the catalogue, or two names; empty for an unchanged gripper.
     words : str
-        What was changed.
+        Description of the change.
     build : callable
-        Drawing to the gripper that is measured: input to left, right and force.
+        Function from the drawing to the measured gripper, which maps input to left, right and force.
     lowest_mm, highest_mm : float
-        Inputs of the runs.
+        Range of inputs of the runs.
     """
 
     effect: str
@@ -149,13 +152,13 @@ CASES = {
 
 
 def triangle(low: float, high: float, seconds: float) -> Array:
-    """Up and down at one speed."""
+    """Input that increases and decreases at one speed."""
     up = np.linspace(low, high, round(seconds * RATE_HZ))
     return np.concatenate([up, up[-2::-1]])
 
 
 def table(hidden: Hidden, folder: Path, *, force: bool, seed: int = SEED) -> Path:
-    """Measure four runs at two speeds, with holds and closing, and write them."""
+    """Simulate four runs at two speeds, with holds and closing, and write the table."""
     rng = np.random.default_rng(seed)
     low, high = hidden.lowest_mm, hidden.highest_mm
     middle = 0.5 * (low + high)
@@ -182,13 +185,13 @@ def table(hidden: Hidden, folder: Path, *, force: bool, seed: int = SEED) -> Pat
 
 
 def answered(hidden: Hidden, folder: Path, *, force: bool, drawing: Path = DRAWING) -> DiagnosisReport:
-    """Measure and diagnose beside the drawing."""
+    """Simulate a measurement, and diagnose the table with the unchanged drawing."""
     measured = read_measured_table(table(hidden, folder, force=force))
     return diagnose(measured, read_model(drawing), seed=SEED).report
 
 
 def main(*, force: bool) -> None:
-    """Print the table."""
+    """Print the table of results."""
     for name, hidden in CASES.items():
         with tempfile.TemporaryDirectory() as folder:
             report = answered(hidden, Path(folder), force=force)

@@ -1,8 +1,8 @@
-"""A mechanism in three dimensions by CalculiX: quadratic wedges through the plate, which share nothing with the models.
+"""A mechanism in three dimensions by CalculiX: quadratic wedge elements, independent of the models of the package.
 
-The plane mesh is a finer one than the model's. Fixed faces are held in all directions, sliding ones in theirs. A face
-that lies along its drive is driven in the mean, as the models do it: an equation over its nodes, and the force is what
-holds the fixed faces.
+The plane mesh is finer than that of the model. Fixed faces are fixed in all directions, sliding faces in their
+constrained direction. A face parallel to its drive's direction is driven in its mean motion, as in the models, by an
+equation for its nodes; the force is then the reaction of the fixed faces.
 """
 
 import subprocess
@@ -25,16 +25,16 @@ _MIDDLES = ((0, 1), (1, 2), (0, 2))
 
 @dataclass(frozen=True, slots=True)
 class SolidAnswer:
-    """What three dimensions give.
+    """Results of the three-dimensional model.
 
     Parameters
     ----------
     force_n : float
-        At the drive by 1 mm of input, small displacements.
+        Force at the drive per 1 mm of input, for small displacements.
     probes_mm : dict of str to (float, float)
-        Motion of the probes by 1 mm of input, at the node of the middle plane nearest to each.
+        Motion of each probe per 1 mm of input, at the nearest node of the middle plane.
     modes : tuple of (float, bool)
-        Natural frequencies with the drive held, each with whether it is out of the plane.
+        Natural frequencies with fixed drive, each with a flag that is True for out-of-plane modes.
     """
 
     force_n: float
@@ -43,16 +43,16 @@ class SolidAnswer:
 
 
 class Wedges:
-    """Fifteen-node wedges over a plane mesh, layers close together at the plate's faces.
+    """Fifteen-node wedge elements on a plane mesh, in layers that are thinner at the plate's faces.
 
     Parameters
     ----------
     mesh : PlaneMesh
         Quadratic triangles.
     plate_mm : float
-        Depth.
+        Thickness of the plate.
     layers : int
-        Even, so that the middle plane holds nodes.
+        Number of layers, even so that the middle plane contains nodes.
     """
 
     def __init__(self, mesh: PlaneMesh, plate_mm: float, layers: int) -> None:
@@ -81,7 +81,7 @@ class Wedges:
         self.elements: Indices = np.hstack([np.array(row) for row in rows]).T
 
     def on(self, face: Face, size_mm: float) -> Indices:
-        """Nodes in a face's box that lie on the outline, at every depth."""
+        """Nodes of the outline in the box of a face, at every depth."""
         x, y = self.plane.nodes_mm
         x0, x1, y0, y1 = face.box_mm
         near = _ON * size_mm
@@ -89,7 +89,7 @@ class Wedges:
         return np.flatnonzero((inside & _on_outline(self.plane))[self.plane_node]) + 1
 
     def mean_over(self, nodes: Indices) -> dict[int, float]:
-        """Weights of nodes of an upright face in its mean motion, from the eight-node faces of the wedges on it."""
+        """Weights of the nodes of a side face in its mean motion, from the eight-node faces of the wedges."""
         on = np.zeros(len(self.nodes_mm) + 1, dtype=bool)
         on[nodes] = True
         weights: dict[int, float] = {}
@@ -105,11 +105,11 @@ class Wedges:
 
 
 _SIDES = tuple(((a, b, b + 3, a + 3), (6 + a, 12 + b, 9 + a, 12 + a)) for a, b in ((0, 1), (1, 2), (2, 0)))
-"""Corners and middles of the upright faces among a wedge's fifteen nodes."""
+"""Corners and middles of the three side faces among the fifteen nodes of a wedge."""
 
 
 def _on_outline(mesh: PlaneMesh) -> NDArray[np.bool_]:
-    """Whether nodes belong to an edge that only one triangle has."""
+    """Whether nodes belong to an edge of only one triangle."""
     edges = np.hstack([np.vstack([np.sort(mesh.triangles[list(pair)], axis=0), mesh.triangles[3 + place]])
                        for place, pair in enumerate(_MIDDLES)])  # fmt: skip
     _, first, counts = np.unique(edges[:2], axis=1, return_index=True, return_counts=True)
@@ -124,11 +124,11 @@ def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, mode
     Parameters
     ----------
     mechanism : Mechanism
-        The drawing, driven along x or y, and free across or held.
+        Drawing of a mechanism that is driven along x or y, with the perpendicular motion free or fixed.
     mesh : PlaneMesh
-        Its triangles.
+        Triangles of the drawing.
     layers, modes : int
-        Wedges through the plate; how many natural frequencies.
+        Number of wedges through the plate, and number of natural frequencies.
     """
     if len(mechanism.drives) > 1:
         raise ValueError("several drives are checked by their energy: tests/models/test_several_drives.py")
@@ -168,7 +168,7 @@ def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, mode
         lines += ["*EQUATION", f"{len(weights) + 1}", *(f"{node},{along},{w:.12g}" for node, w in weights)]
         lines += [f"{count},{along},-1"]
         pushed, reacting = f"{count},{along},{along},{sign:g}", [f"FIXED{i}" for i in range(len(mechanism.fixed))]
-    # The middle plane stays in it: without that a body on slides alone could drift away.
+    # Nodes of the middle plane stay in this plane; otherwise a body with sliding faces only could drift away.
     static = ["*STEP", "*STATIC", "*BOUNDARY", pushed, "DRIVE,3,3", *kept, "*NODE PRINT, NSET=WATCHED", "U"]
     for name in reacting:
         static += [f"*NODE PRINT, NSET={name}, TOTALS=ONLY", "RF"]
@@ -220,7 +220,7 @@ def _frequencies(text: str) -> list[float]:
 
 
 def _out_of_plane(text: str, nodes: int, modes: int) -> list[bool]:
-    """Whether most of each shape's squared displacement is along z, from the fixed columns of a .frd file."""
+    """Whether most of each mode's squared displacement is along z, from the fixed columns of a .frd file."""
     squares: list[Array] = []
     reading = False
     for line in text.splitlines():

@@ -1,12 +1,11 @@
-"""Which hinge, link or pivot is off: hidden in finite elements of the changed outline, looked for by lumped flexures.
+"""Identify a changed hinge, link or pivot by lumped flexures, in data from finite elements of the changed outline.
 
     PYTHONPATH=. python -m tests.benchmarks.which_hinge --tables 60
 
-Every hidden thing is drawn into the outline of the paper's sample and answered by plane-stress finite elements on a
-mesh of its own (a pivot's play by a cut through the neck whose two faces are tied but for the slip); none of it passes
-through the condensed bodies that the diagnosis answers with. Tables have two runs, noise that differs in size and
-correlation from table to table, an input that is off by 0.2 um, and a drawing that lies turned by a milliradian in the
-picture.
+Every change is made in the outline of the published gripper, which is computed by plane-stress finite elements on its
+own mesh. Play of a pivot is modelled by a cut through the neck, whose two faces are tied except for the slip. The
+condensed bodies of the diagnosis are not used for the data. Tables have two runs, noise of various size and
+correlation, an input error of 0.2 um, and a drawing that is rotated by a milliradian in the picture.
 """
 
 import argparse
@@ -45,7 +44,7 @@ NECK_MM = 0.01
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is hidden: the effect, the places that name it, what 1 mm of input does to each channel, the size."""
+    """A simulated change: effect, places that count as right, response of each channel per 1 mm of input, and size."""
 
     effect: str
     places: tuple[str, ...]
@@ -57,13 +56,13 @@ class Hidden:
 
 @cache
 def drawn() -> Mechanism:
-    """Draw the sample."""
+    """Drawing of the published gripper as a mechanism."""
     gripper = read_gripper(Path("sample_frames/paper/gripper.toml"))
     return whole_mechanism(gripper, gripper, "gripper")
 
 
 def slopes_of(mechanism: Mechanism) -> dict[str, float]:
-    """Answer every channel by 1 mm of input, poses about the reference points of the sample as drawn."""
+    """Response of every channel per 1 mm of input; poses refer to the reference points of the unchanged drawing."""
     own = MechanismPlate(mechanism)
     state = own.state(1.0)
     points = {body.name: body.centroid_mm for body in bodies_of(drawn())}
@@ -80,7 +79,7 @@ def _channels(plate, bodies, moved, force_n, probes) -> dict[str, float]:  # typ
 
 
 def thicker(number: int, thickness_mm: float) -> Mechanism:
-    """Give one hinge another thickness."""
+    """Drawing in which one hinge has another thickness."""
     mechanism = drawn()
     flexures = list(mechanism.flexures)
     flexures[number] = replace(flexures[number], thickness_mm=thickness_mm)
@@ -88,7 +87,7 @@ def thicker(number: int, thickness_mm: float) -> Mechanism:
 
 
 def shifted(number: int, x_mm: float, y_mm: float) -> Mechanism:
-    """Let one hinge sit elsewhere."""
+    """Drawing in which one hinge has another position."""
     mechanism = drawn()
     flexures = list(mechanism.flexures)
     x, y = flexures[number].at_mm
@@ -98,10 +97,10 @@ def shifted(number: int, x_mm: float, y_mm: float) -> Mechanism:
 
 @cache
 def slipping_fields(number: int) -> tuple[PlaneStressPlate, Array, Array]:
-    """Cut a neck and tie its faces.
+    """Cut a neck, and tie the two faces of the cut.
 
-    Returned are the plate, its displacements by 1 mm of input and by slips of 1 mm along x and y, shape (unknowns, 3),
-    and the pull of the ties by the same three, shape (2, 3).
+    The function returns the plate; its displacements per 1 mm of input and per slip of 1 mm along x and y, shape
+    (unknowns, 3); and the forces of the ties in these three cases, shape (2, 3).
     """
     mechanism = drawn()
     flexure = mechanism.flexures[number]
@@ -152,7 +151,8 @@ def slipping_fields(number: int) -> tuple[PlaneStressPlate, Array, Array]:
     unit[driven] = 1.0
     right = np.zeros((free.size + 3, 3))
     right[: free.size, 0] = -(K @ unit)[free]
-    # The flexure's axis says which face is the far one: a slip moves the far body against the near one.
+    # The flexure's axis decides which face belongs to the far body: a slip moves the far body relative to the near
+    # body.
     right[free.size, 1], right[free.size + 1, 2] = 1.0, 1.0
     solved = spsolve(whole, right)
     moved = np.zeros((size, 3))
@@ -162,7 +162,7 @@ def slipping_fields(number: int) -> tuple[PlaneStressPlate, Array, Array]:
 
 
 def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
-    """Load on a cut neck by input, stiffness against a slip, and every channel by input and by a slip."""
+    """Load on a cut neck per input, stiffness against a slip, and response of every channel to input and slip."""
     plate, moved, forces = slipping_fields(number)
     x, y = plate.nodes_mm
     mechanism, driven = drawn(), driven_nodes(plate)
@@ -185,7 +185,7 @@ def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
 
 
 def driven_nodes(plate: PlaneStressPlate) -> NDArray[np.bool_]:
-    """Nodes of the drive's face."""
+    """Nodes of the driven face."""
     mechanism, (x, y) = drawn(), plate.nodes_mm
     near = 1e-6 * mechanism.region.size_mm
     x0, x1, y0, _ = mechanism.drives[0].face.box_mm
@@ -200,7 +200,7 @@ def _mean(face: NDArray[np.bool_], dofs: NDArray[np.int64], weight: Array, size:
 
 
 def slip_at(load: Array, stiffness: Array, u: float, radius: float) -> Array:
-    """Find the pin's place in its hole by trying 3600 directions of the rim: slow, and shares nothing."""
+    """Find the position of the pin in its hole by trying 3600 directions: slow, but independent of the package."""
     free = np.linalg.solve(stiffness, load * u)
     if np.hypot(*free) <= radius:
         return np.asarray(free)
@@ -211,11 +211,11 @@ def slip_at(load: Array, stiffness: Array, u: float, radius: float) -> Array:
 
 
 def hidden_things(seed: int) -> list[Hidden]:
-    """Draw what is hidden: nothing, hinges 10 to 20 % off, links 1 to 1.5 % off, pivots with 20 um of play."""
+    """Random changes: none, hinge stiffness by 10 to 20 %, link length by 1 to 1.5 %, play of 20 um in a pivot."""
     rng = np.random.default_rng(seed)
     found = [Hidden("", (), "nothing", slopes_of(drawn()), 0.0)]
     for number, hinge in enumerate(HINGES):
-        # Bending stiffness of a notch goes with t^2.5 / sqrt(R): (1.10 to 1.20)^0.4.
+        # The bending stiffness of a notch is proportional to t^2.5 / sqrt(R); the factor of t is (1.10 to 1.20)^0.4.
         ratio = rng.uniform(0.10, 0.20) * (1.0 if number % 2 else -1.0)
         found.append(Hidden("hinge_stiffness_error", (hinge,), f"{hinge} {100 * ratio:+.0f} %",
                             slopes_of(thicker(number, (1.0 + ratio) ** 0.4)), ratio))  # fmt: skip
@@ -241,7 +241,7 @@ def hidden_things(seed: int) -> list[Hidden]:
 
 
 def table_of(hidden: Hidden, rng: np.random.Generator, rows: int = 200) -> MeasuredTable:
-    """Make a table: two runs, one there and one back."""
+    """Simulate a table with two runs, one opening and one closing."""
     low, high = rng.uniform(-0.45, -0.3), rng.uniform(1.0, 1.5)
     way = np.linspace(low, high, rows // 2)
     u = np.concatenate([way, way[::-1]])
@@ -280,7 +280,7 @@ def table_of(hidden: Hidden, rng: np.random.Generator, rows: int = 200) -> Measu
 
 
 def gap_alone(table: MeasuredTable) -> MeasuredTable:
-    """Return what two fingertips alone show: both tips across the fingers."""
+    """Reduce a table to the motions of both fingertips across the fingers."""
     left, right = table.midline_mm - 0.5 * table.gap_mm, table.midline_mm + 0.5 * table.gap_mm
     seen = np.ones(left.size, dtype=bool)
     own = {name: Channel(side, seen, table.u_random_mm) for name, side in zip(TIPS, (left, right), strict=True)}
@@ -288,7 +288,7 @@ def gap_alone(table: MeasuredTable) -> MeasuredTable:
 
 
 def judged(hidden: Hidden, answers: PlaceAnswers, table: MeasuredTable) -> tuple[str, int, str, float | None]:
-    """Say whether an answer holds the truth, how many places are in it, what it is, and the size's error in u."""
+    """Judge an answer: whether it contains the true place, number of places, words, and error of the size in u."""
     evidence, _ = body_evidence(table, answers, table.input_mm, np.random.default_rng(1))
     if evidence is None:
         return "nothing", 0, "", None
@@ -303,7 +303,7 @@ def judged(hidden: Hidden, answers: PlaceAnswers, table: MeasuredTable) -> tuple
 
 
 def together(one: Hidden, other: Hidden) -> Hidden:
-    """Hide two things at once: what each does to the slopes is added, which holds to their product, some 1e-4."""
+    """Combine two changes by adding their effects on the slopes; the neglected product is about 1e-4."""
     plain = slopes_of_drawn()
     slopes = {name: one.slopes[name] + other.slopes[name] - plain[name] for name in plain}
     slips = [each for each in (one, other) if each.slip is not None]
@@ -313,12 +313,12 @@ def together(one: Hidden, other: Hidden) -> Hidden:
 
 @cache
 def slopes_of_drawn() -> dict[str, float]:
-    """Answer the sample as drawn."""
+    """Response of the unchanged drawing."""
     return slopes_of(drawn())
 
 
 def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng: np.random.Generator) -> None:
-    """Print what tables with two things hidden come to: a wrong place is one that neither of them is in."""
+    """Print results for tables with two changes; a named place is wrong if it contains neither change."""
     counts: dict[str, int] = {"one of them, or both in a set": 0, "wrong place": 0, "unknown": 0, "nothing": 0}
     for _ in range(tables):
         first, second = (things[k] for k in rng.choice(np.arange(1, len(things)), 2, replace=False))
@@ -329,7 +329,7 @@ def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng
         findings = None if evidence is None else evidence.findings
         keys = [] if findings is None else [m.candidate.key for m in findings.members]
         true = {f"{each.effect}@{place}" for each in (first, second) for place in each.places}
-        # Two links that mirror each other are one explanation: the pair, named by one of them.
+        # Two links that are mirror images form one explanation, which has the name of one of the links.
         pairs = {key for key in keys for each in (first, second) for place in each.places if f"@{place} and its" in key}
         if findings is not None and findings.structure:
             said = "unknown"
@@ -344,7 +344,7 @@ def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the tables that were answered, and the figures."""
+    """Print the results of all tables, and their statistics."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tables", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
@@ -360,7 +360,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sizes: dict[str, list[int]] = {"gap": [], "bodies": []}
     rng = np.random.default_rng(given.seed + 1000)
     for number in range(given.tables):
-        # Every fourth table hides nothing.
+        # Every fourth table contains no change.
         thing = things[0] if number % 4 == 0 else things[1 + (number - number // 4 - 1) % (len(things) - 1)]
         table = table_of(thing, rng)
         verdict, size, words, off = judged(thing, answers, table)

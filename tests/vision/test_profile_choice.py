@@ -29,6 +29,7 @@ CLASSES = {
     "shadow": (partial(shadow, share=0.2, over_px=6.0), 0.15),
     "long shadow": (partial(shadow, share=0.4, over_px=12.0), 0.6),
     "wall": (partial(wall, breadth_px=4.0), 0.5),
+    "narrow wall": (partial(wall, breadth_px=1.3), 0.5),
     "glare": (partial(glare, inside_px=4.0), 0.5),
     "motion": (partial(motion, way_px=6.0), 0.3),
 }

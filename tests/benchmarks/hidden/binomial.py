@@ -7,18 +7,18 @@ from scipy.stats import beta
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """So many of so many."""
+    """A count of successes out of a number of cases."""
 
     hits: int
     of: int
 
     @property
     def percent(self) -> float:
-        """The rate in per cent; 0 of 0 is 0."""
+        """Rate in per cent; 0 if there are no cases."""
         return 100.0 * self.hits / self.of if self.of else 0.0
 
     def interval(self) -> tuple[float, float]:
-        """95 % interval in per cent."""
+        """Interval (95 %) of the rate in per cent."""
         if self.of == 0:
             return 0.0, 100.0
         low = 0.0 if self.hits == 0 else float(beta.ppf(0.025, self.hits, self.of - self.hits + 1))

@@ -1,4 +1,4 @@
-"""Every effect that may be named on a table: parameters, bounds and where a search for it begins."""
+"""Every effect that may be named for a table: parameters, bounds and starting values of a search."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -15,20 +15,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """One effect of the catalogue on this table.
+    """One effect of the catalogue, for a given table.
 
     Parameters
     ----------
     name : str
-        Canonical name.
+        Name in the catalogue.
     lower, upper : ndarray, shape (p,)
-        Bounds, as effects.md gives them for this table.
+        Bounds according to effects.md for the table.
     starts : tuple of ndarray, shape (p,)
-        Beginnings of a search; small sizes, so that each is also a linear signature (`columns` of them together).
+        Starting values of a search, with small sizes, so that each is also a linear signature.
     groups : tuple of tuple of int
-        Which starts act together as one linear signature.
+        Groups of starting values that form one linear signature.
     names : tuple of str
-        Names of the parameters.
+        Names of the parameters of the effect.
     """
 
     name: str
@@ -53,7 +53,7 @@ def _many(name: str, names: tuple[str, ...], lower: list[float], upper: list[flo
 
 
 def map_candidate(width_mm: float) -> Candidate:
-    """The map of position errors, as the judge has it."""
+    """The map of position errors, in the form used by the benchmark."""
     count = len(MAP_WAVES)
     names = tuple(f"wave_{k}_mm" for k in MAP_WAVES)
     begins = (1e-3 * width_mm * np.eye(count)).tolist()
@@ -63,9 +63,9 @@ def map_candidate(width_mm: float) -> Candidate:
 def candidates(
     model: Simulated, at: Samples, noise: Noise, *, time_restarts: bool, has_force: bool, with_map: bool = False
 ) -> list[Candidate]:
-    """All effects that this table allows, in the catalogue's order.
+    """All effects that a table allows, in the catalogue's order.
 
-    The map of position errors, which many tables could take in at the price of its freedom, is there only where asked.
+    The map of position errors is included only on request, because its many parameters fit many tables.
     """
     u = at.input_mm
     low, high = float(u.min()), float(u.max())
@@ -93,7 +93,7 @@ def candidates(
     depths = width * np.array([0.01, 0.03, 0.07, 0.14, 0.25])
     stops = [[high - d, low] for d in depths] + [[high, low + d] for d in depths]
     found.append(_many("end_stop", ("upper_mm", "lower_mm"), [low, low], [high, high], stops))
-    # Below the fastest motion it acts; the slowest, and its corners, must still be followed.
+    # The speed limit must be below the fastest motion, but above the slowest motion including its reversals.
     speeds = np.abs(np.diff(u)) / np.maximum(np.diff(at.run_time_s), 1e-9)
     speeds = speeds[(np.diff(at.run_time_s) > 0) & (steps > 1e-3 * steps.max())]
     slowest, fastest = (float(q) for q in np.quantile(speeds, [0.02, 0.98]))

@@ -1,8 +1,8 @@
-"""The catalogue's definitions, written anew from effects.md: what each effect does to a simulation at the samples.
+"""Independent implementation of the definitions in effects.md: change of a simulation by each effect, at the samples.
 
-The judge's own implementation. Every effect is a function of its parameters in the order of the table in effects.md.
-Effects with memory start each run where nobody saw them: `RUN_START` (plays and sliders) and `CREEP_START` stand beside
-the effects, one number in -1..1 a run; without them the play is centred, the sliders relaxed, creep settled.
+Every effect is a function of its parameters, in the order of the table in effects.md. The start states of effects with
+memory are unknown in each run: `RUN_START` (plays and sliders) and `CREEP_START` contain one number from -1 to 1 per
+run. Without these entries, the play is centred, the sliders are relaxed, and the creep is settled.
 """
 
 from dataclasses import dataclass
@@ -16,20 +16,21 @@ Array = NDArray[np.float64]
 CREEP_TAU_S = np.array([1.0, 4.0, 16.0, 64.0])
 RUN_START, CREEP_START = "run_start", "creep_start"
 WITH_START = {"backlash": RUN_START, "friction_hysteresis": RUN_START, "viscoelastic_creep": CREEP_START}
-"""Effects whose start is a nuisance, and under which key it stands."""
+"""Effects whose start state is a nuisance parameter, with the key of this parameter."""
 MAP = "position_error_map"
 MAP_WAVES = np.arange(1, 15)
-"""Half waves over the travel of the judge's map of position errors; the tool's is a Gaussian process."""
+"""Numbers of half waves over the travel in the map of position errors; the diagnosis uses a Gaussian process
+instead."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Where the judge evaluates: true inputs and times at the frames, all runs one after another.
+    """True inputs and times at the frames, for all runs in succession.
 
     Parameters
     ----------
     input_mm, run_time_s, table_time_s : ndarray, shape (n,)
-        Input and the two clocks.
+        Input, time since the start of the run, and time since the start of the table.
     starts : ndarray of int, shape (runs + 1,)
         First sample of each run, and n.
     """
@@ -40,7 +41,7 @@ class Samples:
     starts: NDArray[np.int64]
 
     def late(self, values: Array, delay_s: float) -> Array:
-        """Values of `delay_s` ago, linear between samples, held before each run's start."""
+        """Values delayed by `delay_s`, linear between samples and constant before each run's start."""
         out = np.empty_like(values)
         for a, b in zip(self.starts[:-1], self.starts[1:], strict=True):
             out[a:b] = np.interp(self.run_time_s[a:b] - delay_s, self.run_time_s[a:b], values[a:b])
@@ -49,7 +50,7 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulated:
-    """The simulation table, with a far row at each end so that the line goes on, and its place in the picture."""
+    """The simulation table, extended linearly by a distant row at each end, with its position in the picture."""
 
     input_mm: Array
     gap_mm: Array
@@ -60,7 +61,7 @@ class Simulated:
 
     @property
     def rest_gap_mm(self) -> float:
-        """Gap at zero input."""
+        """Simulated gap at zero input."""
         return float(np.interp(0.0, self.input_mm, self.gap_mm))
 
 
@@ -72,9 +73,10 @@ def extended(
     placement_mm: float = 0.0,
     travel_mm: tuple[float, float] | None = None,
 ) -> Simulated:
-    """Add the far rows: slope of a line through the last quarter of the rows there.
+    """Extend a table by a distant row at each end, on a line through the quarter of the rows at that end.
 
-    `travel_mm` are the ends over which a map of position errors has neither mean nor line; the table's by default.
+    `travel_mm` contains the ends of the range over which a map of position errors has zero mean and slope; by default
+    those of the table.
     """
     travel = travel_mm or (float(input_mm[0]), float(input_mm[-1]))
     quarter = max(2, len(input_mm) // 4)
@@ -91,7 +93,7 @@ def extended(
 
 
 def map_errors(u: Array, travel_mm: tuple[float, float], heights_mm: Array) -> Array:
-    """Map of position errors at inputs: half waves, each without its straight line over the travel."""
+    """Map of position errors at given inputs: half waves, each minus its straight line over the travel."""
     even = np.linspace(0.0, 1.0, 201)
     z = np.clip((u - travel_mm[0]) / (travel_mm[1] - travel_mm[0]), -0.1, 1.1)
     out = np.zeros_like(u)
@@ -102,16 +104,16 @@ def map_errors(u: Array, travel_mm: tuple[float, float], heights_mm: Array) -> A
 
 
 Effects = dict[str, Array]
-"""Parameters of the effects that act, by name; arrays in the order of effects.md. The starts may stand among them."""
+"""Parameters of the acting effects by name, in the order of effects.md; start states may be included."""
 
 
 def without_starts(acting: Effects) -> Effects:
-    """The effects alone."""
+    """Effects without the entries of start states."""
     return {name: values for name, values in acting.items() if name not in (RUN_START, CREEP_START)}
 
 
 def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Array, Array]:
-    """Gap, midline and force at the samples, with the effects acting in the catalogue's order."""
+    """Gap, midline and force at the samples; the effects act in the catalogue's order."""
     u = at.input_mm
     zero = np.zeros(1)
     centred = np.zeros(len(at.starts) - 1)

@@ -1,4 +1,4 @@
-"""Designs of an experiment: rich, ordinary and poor, as diagnosing.md section 5 defines them."""
+"""Designs of experiments (rich, ordinary, poor), as defined in section 5 of diagnosing.md."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -21,13 +21,13 @@ class Design:
         Rich: at least 4 runs and 1000 samples, two speeds, reversals, holds, closing. Ordinary: 2 runs, at least 200
         samples, one reversal. Poor: one one-way run of at most 40 samples.
     motions : tuple of Motion
-        One a run.
+        One motion per run.
     rate_hz : float
         Samples per second.
     time_restarts : bool
-        Whether `time_s` begins again with each run.
+        Whether `time_s` restarts with each run.
     pause_s : float
-        Time between runs where it does not.
+        Time between runs, if the time does not restart.
     """
 
     kind: Kind
@@ -64,7 +64,7 @@ def _rich_run(rng: np.random.Generator, inputs: InputRange, index: int, fast: bo
 
 
 def draw_design(rng: np.random.Generator, kind: Kind, inputs: InputRange) -> Design:
-    """Draw the runs of one experiment within the inputs."""
+    """Draw random runs of one experiment within a range of inputs."""
     restarts = bool(rng.random() < 0.35)
     if kind == "rich":
         runs = int(rng.integers(4, 7))
@@ -81,12 +81,12 @@ def draw_design(rng: np.random.Generator, kind: Kind, inputs: InputRange) -> Des
         return Design(kind, (one, two), max(4.0, rng.uniform(210, 400) / total_s), restarts, rng.uniform(2, 30))
     count = int(rng.integers(15, 41))
     path = through([inputs.lower_mm, inputs.upper_mm], _speed(inputs, rng.uniform(10, 60)))
-    # A single run has the one clock there is.
+    # With a single run, the time cannot restart.
     return Design(kind, (path,), (count - 1) / path.duration_s, False, 0.0)
 
 
 def unseen_motion(inputs: InputRange) -> Motion:
-    """A run that no design holds: a slow loop, a hold and a quick small loop."""
+    """A run that occurs in no design: a slow loop, a hold and a fast small loop."""
     low, high = inputs.lower_mm, inputs.upper_mm
     path = through([0.0, 0.95 * low, 0.95 * high, 0.3 * high], _speed(inputs, 9.0)).then(hold(0.3 * high, 6.0))
     return path.then(through([0.3 * high, -0.1 * high, 0.5 * high, 0.2 * low], _speed(inputs, 8.0)))

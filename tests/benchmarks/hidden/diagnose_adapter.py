@@ -1,4 +1,4 @@
-"""The one door to the tool: files in, report.json out, through the public command."""
+"""Run `fingervision diagnose`, the public command, on files; its result is read from report.json."""
 
 import json
 import time
@@ -11,18 +11,18 @@ from click.testing import CliRunner
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a method said about a table.
+    """Answer of a method for a table.
 
     Parameters
     ----------
     verdict : str
         `agrees`, `named`, `ambiguous`, `unknown`, or `failed`.
     sets : tuple of frozenset of str
-        Every explanation given, the best first; empty for `agrees` and `unknown`.
+        All stated explanations, the best one first; empty for `agrees` and `unknown`.
     seconds : float
         Wall time.
     report : dict
-        The whole report, where there is one.
+        Content of report.json, if there is one.
     """
 
     verdict: str

@@ -1,7 +1,8 @@
-"""What the mechanism really receives: drives integrated sample by sample, in forms that are not the catalogue's.
+"""Effects of the drive, integrated sample by sample with formulas that differ from the catalogue's.
 
-Every function takes the fine input u (mm, shape (n,)) of one run and gives the input that comes out of that part. A
-`start` in -1..1 says where a play or a friction stands when the run begins: -1 where upward motion has left it.
+Every function takes the finely sampled input u (mm, shape (n,)) of one run and returns the output of that part of the
+drive. The parameter `start`, from -1 to 1, is the state of a play or friction at the start of the run: -1 is the state
+after upward motion.
 """
 
 import numpy as np
@@ -13,18 +14,18 @@ Array = NDArray[np.float64]
 
 
 def late(time_s: Array, u_mm: Array, delay_s: float) -> Array:
-    """Transport delay, on the fine grid."""
+    """Dead time, on the fine grid."""
     return np.interp(time_s - delay_s, time_s, u_mm)
 
 
 def cyclic_error(u_mm: Array, amplitude_mm: float, period_mm: float, phase_rad: float) -> Array:
-    """A lead screw's error: the period and a small second harmonic, as real screws have it."""
+    """Cyclic error of a lead screw, with a small second harmonic as for real screws."""
     angle = 2 * np.pi * u_mm / period_mm + phase_rad
     return u_mm + amplitude_mm * (np.sin(angle) + 0.06 * np.sin(2 * angle + 0.7))
 
 
 def stopped(u_mm: Array, lower_mm: float | None, upper_mm: float | None) -> Array:
-    """An elastic stop: beyond it the stage creeps on by 1 % of the commanded way."""
+    """An elastic end stop, beyond which the stage moves by 1 % of the commanded distance."""
     give = 0.01
     if upper_mm is not None:
         u_mm = np.where(u_mm > upper_mm, upper_mm + give * (u_mm - upper_mm), u_mm)
@@ -34,7 +35,7 @@ def stopped(u_mm: Array, lower_mm: float | None, upper_mm: float | None) -> Arra
 
 
 def mapped(u_mm: Array, travel_mm: tuple[float, float], heights_mm: Array) -> Array:
-    """Smooth map of position errors: a natural spline through its heights, without its line over the travel."""
+    """Smooth map of position errors: a natural spline minus its straight line over the travel."""
     knots = np.linspace(travel_mm[0], travel_mm[1], heights_mm.size)
     spline = CubicSpline(knots, heights_mm, bc_type="natural")
     even = np.linspace(travel_mm[0], travel_mm[1], 401)
@@ -54,7 +55,7 @@ def _limited(u: Array, way: float) -> Array:
 
 
 def limited(time_s: Array, u_mm: Array, speed_mm_s: float) -> Array:
-    """A drive that cannot follow faster, step by step on the fine grid."""
+    """A drive with limited speed, computed step by step on the fine grid."""
     return np.asarray(_limited(u_mm, speed_mm_s * (time_s[1] - time_s[0])))
 
 
@@ -75,7 +76,7 @@ def _plays(u: Array, half: Array, start: float) -> Array:
 
 
 def backlash(u_mm: Array, play_mm: float, start: float = 0.0) -> Array:
-    """Clearance whose flanks engage over 6 % of the play: the mean of five plays, all from one start."""
+    """Play that engages gradually over 6 % of its width: mean of five play operators with one start state."""
     return np.asarray(_plays(u_mm, 0.5 * play_mm * np.linspace(0.97, 1.03, 5), start))
 
 
@@ -91,10 +92,11 @@ def _jumps(u: Array, jump: float, every: int) -> Array:
 
 
 def stick_slip(u_mm: Array, jump_mm: float, every: int) -> Array:
-    """Sticks until the strain exceeds the jump, then follows at once; looked at every so many fine steps.
+    """Output that sticks until the input is farther away than the jump, then follows at once; tested every `every` fine
+    steps.
 
-    Looked at between the frames as well, every jump would land elsewhere than the definition's, and the places would
-    drift apart along a run: that would be another effect, not another form of this one.
+    If the condition were also tested between frames, the jumps would occur at other positions than by the definition,
+    and the positions would diverge along a run: this would be a different effect.
     """
     return np.asarray(_jumps(u_mm, jump_mm, every))
 
@@ -117,9 +119,10 @@ def _dahl(u: Array, reach: float, steepness: float, start: float) -> Array:
 
 
 def dahl_friction(u_mm: Array, fraction: float, reach_mm: float, start: float = 0.0) -> Array:
-    """Dahl's friction (1968): bristles that yield smoothly instead of eight sliders.
+    """Friction model of Dahl (1968): bristles that yield smoothly, instead of eight sliders.
 
-    `reach_mm` is that of the catalogue's longest slider; its eight sliders level out at 9/16 of it on average.
+    `reach_mm` is the reach of the longest slider in the catalogue's model; the mean reach of its eight sliders is 9/16
+    of this value.
     """
     return u_mm - fraction * np.asarray(_dahl(u_mm, 9 / 16 * reach_mm, 1.0, start))
 
@@ -137,7 +140,7 @@ def _sliders(u: Array, reach: Array, weight: Array, start: float) -> Array:
 
 
 def slider_friction(u_mm: Array, fraction: float, reach_mm: float, start: float = 0.0) -> Array:
-    """Another spectrum of elastic sliders: thirteen, from 4 to 104 % of the reach, the long ones a little heavier."""
+    """Friction by thirteen elastic sliders of 4 to 104 % of the reach, with slightly larger weights for long ones."""
     reach = reach_mm * np.linspace(0.04, 1.04, 13)
     weight = np.linspace(0.9, 1.1, 13)
     return u_mm - fraction * np.asarray(_sliders(u_mm, reach, weight / weight.sum(), start))

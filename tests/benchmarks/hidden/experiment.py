@@ -1,4 +1,4 @@
-"""One experiment with its truth: drawn from a seed, sized to a signal-to-noise ratio."""
+"""One random experiment with its truth, whose effects are scaled to a signal-to-noise ratio."""
 
 from dataclasses import dataclass, replace
 
@@ -17,31 +17,31 @@ TRIES = 200
 
 
 class NotDrawnError(ValueError):
-    """No effect of the wanted size fits into its bounds on this gripper."""
+    """No effect of the required size is within its bounds for the gripper."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What a row of the table asks for.
+    """Specification of one row of the benchmark's table.
 
     Parameters
     ----------
     name : str
-        As the table prints it.
+        Name that is printed in the table.
     kinds : tuple of str
-        Designs to draw from.
+        Designs from which one is drawn.
     hidden : int
-        How many effects of the catalogue.
+        Number of effects of the catalogue.
     foreign : bool
-        Whether a thing from outside acts.
+        Whether an effect from outside the catalogue acts.
     snr : tuple of float
-        Ratios to draw from; 0 means the everyday size as it falls.
+        Signal-to-noise ratios from which one is drawn; 0 means an ordinary size without scaling.
     names : tuple of str
-        Effects to draw from; the whole catalogue of the first rows where empty.
+        Effects from which one is drawn; if empty, the whole catalogue of the first rows.
     beside : tuple of str
-        What the second effect is drawn from; the same as the first where empty.
+        Effects from which the second effect is drawn; if empty, the same as for the first effect.
     free_start : bool
-        Whether plays and frictions start each run anywhere, two times of three at an end, instead of centred.
+        Whether plays and frictions have random start states (at an end in two of three runs) instead of centred ones.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
-    """Everything about one table: the bench, the runs, the noise, and the seed of its noise."""
+    """Complete description of one table: gripper and effects, runs, noise, and seed of the noise."""
 
     plant: Plant
     design: Design
@@ -65,7 +65,7 @@ class Experiment:
     seed: int
 
     def starts_s(self) -> list[float]:
-        """When each run begins, since the table's first frame."""
+        """Start times of the runs since the first frame of the table."""
         starts, now = [], 0.0
         for motion in self.design.motions:
             starts.append(now)
@@ -73,7 +73,7 @@ class Experiment:
         return starts
 
     def traces(self) -> list[Trace]:
-        """The runs without noise."""
+        """Simulated runs without noise."""
         return [
             self.plant.trace(motion, self.design.rate_hz, start, k)
             for k, (motion, start) in enumerate(zip(self.design.motions, self.starts_s(), strict=True))
@@ -81,20 +81,20 @@ class Experiment:
 
 
 def edges(traces: list[Trace]) -> Array:
-    """Left and right of all runs, shape (2, n), in mm."""
+    """Left and right edge in all runs, shape (2, n), in mm."""
     return np.array([np.concatenate([t.left_mm for t in traces]), np.concatenate([t.right_mm for t in traces])])
 
 
 def run_of(traces: list[Trace]) -> NDArray[np.int64]:
-    """Number of the run of each sample, shape (n,)."""
+    """Run number of each sample, shape (n,)."""
     return np.repeat(np.arange(len(traces)), [len(t.input_mm) for t in traces])
 
 
 def remaining_rms_mm(signal: Array, run: NDArray[np.int64]) -> float:
-    """RMS over left and right of what remains after the midline's constant and the runs' offsets.
+    """RMS of both edges after subtraction of the midline's constant and the offsets of the runs.
 
-    The offsets of the runs have no free mean (else no offset could ever be found): what is taken away per edge is each
-    run's departure from the mean of the runs.
+    Only the deviations of each run's mean from the mean of all runs are subtracted for each edge; otherwise an offset
+    could not be found.
     """
     gap, midline = signal[1] - signal[0], signal.mean(axis=0)
     for channel, constant_is_free in ((gap, False), (midline, True)):
@@ -116,7 +116,7 @@ def _signal(plant: Plant, experiment: Experiment) -> Array:
 
 
 def ratio(plant: Plant, experiment: Experiment) -> float:
-    """Signal-to-noise ratio of what acts in the plant (for the force: over the noise of the force)."""
+    """Signal-to-noise ratio of the simulated effects; for effects on the force, with the noise of the force."""
     force = any(h.name == "hinge_stiffness_error" for h in plant.hidden)
     signal = _signal(plant, experiment)
     if force:
@@ -159,7 +159,7 @@ def _sized_foreign(thing: Foreign, experiment: Experiment, snr: float) -> Foreig
 
 
 def draw_experiment(seed: int, row: Row) -> Experiment:
-    """Draw one experiment of a row; the same seed gives the same experiment."""
+    """Draw a random experiment of a row; the same seed gives the same experiment."""
     rng = np.random.default_rng([seed, *row.name.encode()])
     for _ in range(TRIES):
         try:
@@ -217,7 +217,7 @@ def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
 
 
 def measured(experiment: Experiment, traces: list[Trace], rng: np.random.Generator) -> dict[str, list[Array]]:
-    """Columns of the measured table, one array a run."""
+    """Columns of the measured table, one array per run."""
     noise = experiment.noise
     columns: dict[str, list[Array]] = {key: [] for key in ("time_s", "input_mm", "left_mm", "right_mm", "force_n")}
     for trace in traces:
@@ -232,5 +232,5 @@ def measured(experiment: Experiment, traces: list[Trace], rng: np.random.Generat
 
 
 def first_columns(experiment: Experiment) -> dict[str, list[Array]]:
-    """Columns of the experiment's own runs, with the noise that its table has."""
+    """Columns of the experiment's runs, with the same noise as in its table."""
     return measured(experiment, experiment.traces(), np.random.default_rng([experiment.seed, 7]))

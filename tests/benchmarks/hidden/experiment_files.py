@@ -1,4 +1,4 @@
-"""An experiment as the tool's files, with its truth beside them."""
+"""Files of an experiment: the input files of a diagnosis, and the truth."""
 
 import json
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""Fits of single effects and pairs to an experiment's curve, first linear, then in the chain."""
+"""Fits of single effects and pairs to the curve of an experiment, first linearised, then in the complete chain."""
 
 from dataclasses import dataclass
 
@@ -15,11 +15,11 @@ from tests.benchmarks.hidden.weights import Weights
 
 Array = NDArray[np.float64]
 REFINED = 20
-"""Pairs of the smallest linear rest that are refitted in the chain."""
+"""Number of pairs with the smallest linear residual that are refitted in the chain."""
 
 
 def problem_of(experiment: Experiment, traces: list[Trace], *, known_input: bool) -> Problem:
-    """The judge's problem for an experiment's runs."""
+    """Estimation problem for the runs of an experiment."""
     table, noise = experiment.plant.table, experiment.noise
     counts = [len(t.input_mm) for t in traces]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -43,13 +43,13 @@ def problem_of(experiment: Experiment, traces: list[Trace], *, known_input: bool
 
 
 def curve_of(traces: list[Trace]) -> Curve:
-    """Gap, midline and force without noise."""
+    """Gap, midline and force of simulated runs without noise."""
     left, right = edges(traces)
     return right - left, (left + right) / 2, np.concatenate([t.force_n for t in traces])
 
 
 def known_effects(experiment: Experiment, problem: Problem, *, with_map: bool = False) -> list[Candidate]:
-    """The candidates on this experiment; the map of position errors where it is hidden or asked for."""
+    """Candidate effects for an experiment; the map of position errors only if simulated or requested."""
     return candidates(
         problem.model,
         problem.at,
@@ -62,7 +62,7 @@ def known_effects(experiment: Experiment, problem: Problem, *, with_map: bool = 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Search:
-    """Fits of many explanations to one curve; `sure` is the problem with the input known exactly."""
+    """Fits many explanations to one curve; `sure` is the estimation problem with an exactly known input."""
 
     problem: Problem
     sure: Problem
@@ -84,7 +84,7 @@ class Search:
         return sorted(found, key=lambda f: f.distance)
 
     def pairs(self, target: Curve, without: set[str], limit: float) -> tuple[list[Fit], float]:
-        """Pairs refitted, and the smallest linear rest of those that were not."""
+        """Refitted pairs, and the smallest linear residual of all other pairs."""
         signal = self.signal(target)
         found, skipped = [], np.inf
         for rest, groups in self.library.left_over(signal, 2):
@@ -98,7 +98,7 @@ class Search:
         return sorted(found, key=lambda f: f.distance), skipped
 
     def exchanged(self, form: Curve, own: Fit) -> list[Fit]:
-        """Pairs that keep one of two hidden effects and exchange the other for its likeliest look-alikes."""
+        """Pairs in which one of two simulated effects is replaced by the most similar other effects."""
         found = []
         for kept in own.names if len(own.names) == 2 else ():
             alone = respond(self.problem.model, self.problem.at, {kept: own.effects[kept]})
@@ -121,7 +121,7 @@ class Search:
 
 
 def more_beginnings(candidate: Candidate) -> list[Array]:
-    """Further beginnings where a search stands still easily: what has no amplitude."""
+    """Further starting values for effects without an amplitude, whose search may not converge."""
     if candidate.name in ("slew_limit", "backlash", "stick_slip", "structural_resonance"):
         picked = np.linspace(0, len(candidate.starts) - 1, 4).astype(int)
         return [candidate.starts[k] for k in picked]
@@ -133,7 +133,7 @@ def more_beginnings(candidate: Candidate) -> list[Array]:
 def search_of(
     experiment: Experiment, traces: list[Trace], *, known_input: bool, with_map: bool = False
 ) -> tuple[Search, Curve]:
-    """A search on an experiment's runs, and their curve without noise."""
+    """Search for the runs of an experiment, and their curve without noise."""
     problem = problem_of(experiment, traces, known_input=known_input)
     known = known_effects(experiment, problem, with_map=with_map)
     bare = respond(problem.model, problem.at, {})

@@ -1,4 +1,4 @@
-"""Least squares of effects of the catalogue to a curve without noise, and linear bounds on what they can reach."""
+"""Least-squares fits of catalogue effects to a curve without noise."""
 
 from dataclasses import dataclass
 
@@ -20,15 +20,15 @@ from tests.benchmarks.hidden.weights import Weights
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array, Array]
-"""Gap, midline and force at the samples."""
+"""Curve of an experiment: gap, midline and force at the samples."""
 STEP = 1e-4
 AT_AN_END = 0.97
-"""A start that is tried: at an end of its room, and yet inside."""
+"""Start state that is tried: near an end of its range, but inside."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Effects at their best, the starts of the runs among them, and how far they stay away."""
+    """Best fit of effects, including start states of the runs, with its squared distance."""
 
     names: tuple[str, ...]
     effects: Effects
@@ -36,13 +36,13 @@ class Fit:
 
     @property
     def alone(self) -> Effects:
-        """The effects without the starts of the runs."""
+        """Effects without the start states of the runs."""
         return without_starts(self.effects)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """What the judge fits: a simulation at samples, under weights."""
+    """An estimation problem: a simulation at samples, with weights."""
 
     model: Simulated
     at: Samples
@@ -54,7 +54,7 @@ class Problem:
         return self.weights.apply(*(a - b for a, b in zip(answer, target, strict=True)))
 
     def distance(self, target: Curve, effects: Effects) -> float:
-        """Squared whitened distance."""
+        """Squared whitened distance between the effects' response and a curve."""
         r = self.residual(target, effects)
         return float(r @ r)
 
@@ -69,11 +69,11 @@ def fit(
     begun: Effects | None = None,
     creep_starts: bool = False,
 ) -> Fit:
-    """Best parameters of all chosen effects together, inside the chain, from one start.
+    """Fit the parameters of all given effects jointly in the chain, from one set of starting values.
 
-    Where the runs start is fitted along: for plays and sliders always, for creep where `creep_starts` says so. `begun`
-    may hold starts to begin with. After the search each run's start is tried at both ends and in the middle, and the
-    search goes on from there where that is better.
+    Start states of the runs are fitted too: always for plays and sliders, and for creep if `creep_starts` is True.
+    `begun` may contain initial start states. After the search, each run's start state is tried at both ends and in the
+    middle, and the search continues from any better state.
     """
     left = frozenset[str]() if creep_starts else frozenset({CREEP_START})
     keys = sorted({WITH_START[c.name] for c in chosen if c.name in WITH_START} - left)
@@ -100,7 +100,7 @@ def fit(
 def _search(
     problem: Problem, target: Curve, chosen: list[Candidate], start: list[Array], starts: Effects, evaluations: int
 ) -> Fit:
-    """Least squares over the parameters of the chosen effects and the starts of the runs."""
+    """Least squares over the parameters of given effects and the start states of the runs."""
     count = sum(len(c.lower) for c in chosen)
     nuisances = sum(values.size for values in starts.values())
     sizes = [len(c.lower) for c in chosen] + [values.size for values in starts.values()]
@@ -118,11 +118,12 @@ def _search(
         return dict(zip(labels, np.split(np.clip(z * scale, lower, upper), cuts), strict=True))
 
     inside = np.clip(begin, lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower)) / scale
-    # A start moves the curve in proportion to the play: a step of 1e-3 of its room is no less smooth.
+    # The influence of a start state is proportional to the play, so that a step of 1e-3 of its range is smooth enough.
     share = np.where(np.arange(begin.size) < count, STEP, 10 * STEP)
 
     def jacobian(z: Array) -> Array:
-        # Steps are shares of the start, not of where the search is: a search that crosses zero would stand still there.
+        # Difference steps are shares of the starting value, not of the present value; otherwise a search would stop at
+        # zero.
         base = problem.residual(target, effects_of(z))
         steps = share * np.maximum(1.0, np.abs(z))
         steps = np.where(z + steps > upper / scale, -steps, steps)

@@ -1,4 +1,4 @@
-"""Things from outside the catalogue: what a bench can do that no named effect describes."""
+"""Effects outside the catalogue: behaviour of a set-up that no named effect describes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
-    """One thing from outside.
+    """One effect from outside the catalogue.
 
     Parameters
     ----------
     name : str
         A key of `FOREIGN`.
     size_mm : float
-        Its amplitude on the gap, or on one edge.
+        Amplitude on the gap, or on one edge.
     place, width : float
-        Where and how wide, as fractions of the range of time or input.
+        Position and width, as fractions of the range of time or input.
     count : float
-        Periods over the range, for what repeats.
+        Number of periods over the range, for periodic effects.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Foreign:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """What a foreign thing may depend on; arrays of shape (n,) over one run's fine grid.
+    """Variables on which such an effect may depend; arrays of shape (n,) over one run's fine grid.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Moment:
     travel : ndarray
         Input over the range, from 0 to 1.
     moving : ndarray
-        Sign of the velocity, smoothed over a short way.
+        Sign of the velocity, smoothed over a short distance.
     run : int
         Number of the run.
     """
@@ -141,10 +141,10 @@ FOREIGN: dict[str, Callable[[Foreign, Moment], tuple[Array, Array]]] = {
 
 
 def draw_foreign(rng: np.random.Generator, within_runs: list[tuple[float, float]]) -> Foreign:
-    """Any of them, at a place that the runs reach.
+    """Draw one of these effects, at a position that the runs reach.
 
-    `within_runs` are beginning and end of each run on the clock from 0 to 1: a step happens well inside a run that is
-    neither the first nor the last, for between two runs it would be nothing but an offset of runs.
+    `within_runs` contains start and end of each run on a clock from 0 to 1. A step occurs well inside a run that is
+    neither the first nor the last one; between two runs, it would only be an offset of runs.
     """
     name = str(rng.choice(list(FOREIGN)))
     place = rng.uniform(0.25, 0.75)

@@ -1,4 +1,4 @@
-"""Simulation tables of made-up grippers: straight or curved, with or without the two edges."""
+"""Random simulation tables of grippers: straight or curved, with or without the two edges."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,14 +11,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GripperTable:
-    """What a simulation says: gap and midline over the input.
+    """A simulation table: gap and midline over the input.
 
     Parameters
     ----------
     input_mm, gap_mm, midline_mm : ndarray, shape (n,)
-        Increasing input; the midline is zero where the simulation knows no edges.
+        Increasing input, gap, and midline; the midline is zero if the simulation has no edges.
     has_edges : bool
-        Whether `simulation.csv` carries left and right.
+        Whether `simulation.csv` has the columns left and right.
     force_n : ndarray, shape (n,), or None
         Force at the drive.
     """
@@ -39,7 +39,7 @@ class GripperTable:
         return inside
 
     def gap(self, u_mm: Array) -> Array:
-        """Simulated gap in mm; beyond the ends the straight line through the last quarter of the rows."""
+        """Simulated gap (mm); beyond an end, on the straight line through the quarter of the rows at that end."""
         return self._along(self.gap_mm, u_mm)
 
     def midline(self, u_mm: Array) -> Array:
@@ -47,7 +47,7 @@ class GripperTable:
         return self._along(self.midline_mm, u_mm)
 
     def force(self, u_mm: Array) -> Array:
-        """Simulated force in N; zero where the simulation has none."""
+        """Simulated force (N); zero if the simulation has no force."""
         return np.zeros_like(u_mm) if self.force_n is None else self._along(self.force_n, u_mm)
 
     @property
@@ -61,7 +61,7 @@ class GripperTable:
         return (self.gap(u_mm + step) - self.gap(u_mm - step)) / (2 * step)
 
     def write(self, path: Path) -> None:
-        """Write the table as a program for finite elements would export it."""
+        """Write the table in the form that a finite-element program exports."""
         columns = {"input_mm": self.input_mm, "gap_mm": self.gap_mm}
         if self.has_edges:
             columns |= {"left_mm": self.midline_mm - self.gap_mm / 2, "right_mm": self.midline_mm + self.gap_mm / 2}
@@ -76,19 +76,19 @@ class GripperTable:
 
 @dataclass(frozen=True, slots=True)
 class InputRange:
-    """The inputs that a run may use, in mm."""
+    """Range of inputs that a run may use, in mm."""
 
     lower_mm: float
     upper_mm: float
 
     @property
     def width_mm(self) -> float:
-        """Upper less lower."""
+        """Width of the range."""
         return self.upper_mm - self.lower_mm
 
 
 def draw_table(rng: np.random.Generator, *, with_force: bool = False) -> tuple[GripperTable, InputRange]:
-    """A gripper of 1.5 to 4.5 mm rest gap that closes to some tenths of a millimetre, and the inputs for it."""
+    """A gripper with a rest gap of 1.5 to 4.5 mm that closes to some tenths of a millimetre, and its input range."""
     rest_mm = rng.uniform(1.5, 4.5)
     slope = rng.uniform(2.0, 8.0)
     closed_mm = rng.uniform(0.15, 0.5)

@@ -1,7 +1,8 @@
-"""The judge answering from noisy data: told the noise and the true input, but not what is hidden.
+"""Ideal method for noisy data: noise and true input are known, but not the simulated effects.
 
-It shows what the tables allow. A right answer that even this misses is a fault of the benchmark or the luck of the
-noise; it knows no `unknown`, so rows from outside do not concern it.
+The ideal method shows which answers the tables allow. A right answer that this method misses is due to the noise or to
+a fault of the benchmark. The method has no verdict `unknown`, so that rows with effects outside the catalogue do not
+apply.
 """
 
 import numpy as np
@@ -14,12 +15,13 @@ from tests.benchmarks.hidden.measured_table import read_measured
 from tests.benchmarks.hidden.table_cache import JudgedTable
 
 CLAIM = 20.0
-"""Chi-square beyond the parameters that a claim needs: the family has some hundred shapes."""
+"""Gain in chi-square, in addition to the number of parameters, that a named effect requires; some hundred shapes are
+tried."""
 ONE_SET = 9.0
 
 
 def _noisy(table: JudgedTable, truth: Curve) -> Curve:
-    """The measured curve, its gross errors taken out by comparison with the truth."""
+    """Measured curve, without gross errors, which are found by comparison with the truth."""
     measured = read_measured(table.folder / "measured.csv")
     noise = table.experiment.noise
     out = []
@@ -32,7 +34,9 @@ def _noisy(table: JudgedTable, truth: Curve) -> Curve:
 
 
 def ideal(table: JudgedTable) -> Answer:
-    """Best explanation by BIC among nothing, singles and the likeliest pairs; the set by D below 9."""
+    """Best explanation by BIC among no effect, single effects and the most promising pairs; the set contains distances
+    below 9.
+    """
     traces = table.experiment.traces()
     search, truth = search_of(table.experiment, traces, known_input=True)
     target = _noisy(table, truth)

@@ -1,4 +1,4 @@
-"""Linear signatures of every effect at every shape, and bounds on what they can reach."""
+"""Linear signatures of every effect at every starting value, and bounds of their fits."""
 
 from dataclasses import dataclass
 
@@ -15,21 +15,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Library:
-    """Linear signatures of every candidate at every shape, and the Gram matrix between them.
+    """Linear signatures of every candidate at every starting value, with their Gram matrix.
 
     Parameters
     ----------
     owner : ndarray of int, shape (groups,)
-        Candidate of each group of columns.
+        Number of the candidate to which each group of columns belongs.
     starts : tuple of tuple of int
-        The candidate's starts that a group holds.
+        Starting values of the candidate in each group.
     first, size : ndarray of int, shape (groups,)
-        Columns of a group: `size` of them from `first` on.
+        First column and number of columns of each group.
     gram : ndarray, shape (columns, columns)
     columns : ndarray, shape (m, columns)
-        Of unit length.
+        Signatures, scaled to unit length.
     lengths : ndarray, shape (columns,)
-        Length of each column before.
+        Length of each column before scaling.
     """
 
     owner: NDArray[np.int64]
@@ -42,7 +42,7 @@ class Library:
 
     @classmethod
     def of(cls, problem: Problem, known: list[Candidate]) -> "Library":
-        """Evaluate the chain once per start of each candidate."""
+        """Evaluate the chain once for each starting value of each candidate."""
         bare = respond(problem.model, problem.at, {})
         columns, owner, first, size, starts = [], [], [], [], []
         for j, candidate in enumerate(known):
@@ -60,7 +60,7 @@ class Library:
         return cls(np.array(owner), tuple(starts), np.array(first), np.array(size), matrix.T @ matrix, matrix, lengths)
 
     def left_over(self, signal: Array, together: int) -> list[tuple[float, tuple[int, ...]]]:
-        """Linear rest of each candidate (together 1) or pair (2) with the groups that reach it, smallest first."""
+        """Linear residual of each candidate (`together` 1) or pair (2) with its groups, smallest first."""
         reach = self.columns.T @ signal
         rests = _rests(self.gram, reach, float(signal @ signal), self.first, self.size, together == 2)
         best: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
@@ -72,7 +72,7 @@ class Library:
         return list(best.values())
 
     def begin(self, known: list[Candidate], groups: tuple[int, ...], signal: Array) -> list[Array]:
-        """Parameters at which the linear picture would begin a nonlinear fit, one array a group."""
+        """Starting values of a nonlinear fit from the linear fit, one array per group."""
         index = np.concatenate([np.arange(self.first[g], self.first[g] + self.size[g]) for g in groups])
         gram = self.gram[np.ix_(index, index)] + 1e-6 * np.eye(len(index))
         weights = np.linalg.solve(gram, self.columns[:, index].T @ signal) / self.lengths[index]
@@ -85,7 +85,7 @@ class Library:
 
 
 def enlarged(candidate: Candidate, starts: list[Array], share: Array) -> Array:
-    """Small starts multiplied by what the linear picture says, within the bounds."""
+    """Starting values multiplied by the coefficients of the linear fit, within the bounds."""
     match candidate.name:
         case "encoder_cyclic_error":
             amplitude = starts[0][0] * np.hypot(*share)

@@ -1,4 +1,4 @@
-"""The measured table as a peer sees it: recorded inputs and edges read back from the file, nothing else."""
+"""The measured table for other methods: recorded inputs and edges, read from the file only."""
 
 import csv
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredTable:
-    """Samples with their recorded inputs, gap, midline and force (zeros where there is none)."""
+    """Samples with recorded input, gap, midline and force (zero if there is none)."""
 
     at: Samples
     gap_mm: Array

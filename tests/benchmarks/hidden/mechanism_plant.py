@@ -1,4 +1,4 @@
-"""How the body answers: mechanisms integrated in time, in forms that are not the catalogue's."""
+"""Effects of the mechanism, integrated in time with formulas that differ from the catalogue's."""
 
 import numpy as np
 from numba import njit
@@ -9,7 +9,7 @@ CREEP_TIMES_S = np.array([1.5, 3.0, 7.0, 20.0, 45.0])
 
 
 def arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
-    """Large rotation by its series to fifth order with the cross term of a circular arc to fourth."""
+    """Large rotation by a series to fifth order, with the cross term of a circular arc to fourth order."""
     x = opening_mm / reach_mm
     return opening_mm * (1 - x**2 / 6 + x**4 / 130) + cross * reach_mm * (x**2 / 2 - x**4 / 26)
 
@@ -28,7 +28,7 @@ def _creep(o: Array, dt: float, tau: Array, share: Array) -> Array:
 
 
 def creep(opening_mm: Array, dt_s: float, shares: Array) -> Array:
-    """A standard linear solid with five times of relaxation (1.5 to 45 s), none of them the catalogue's."""
+    """A linear viscoelastic solid with five relaxation times (1.5 to 45 s) that differ from the catalogue's."""
     return np.asarray(_creep(opening_mm, dt_s, CREEP_TIMES_S, shares))
 
 
@@ -42,7 +42,7 @@ def _swing(o: Array, dt: float, omega: float, zeta: float, hardening: float) -> 
     for i in range(1, o.size):
         for p in range(parts):
             drive = o[i - 1] + (o[i] - o[i - 1]) * (p + 0.5) / parts
-            # Leapfrog: half a kick, drift, half a kick, with the damping implicit in the second half.
+            # Leapfrog integration, with implicit damping in the second half step of the velocity.
             d = x - drive
             v += 0.5 * h * (-(omega**2) * d * (1 + hardening * d * d) - 2 * zeta * omega * v)
             x += h * v
@@ -53,16 +53,16 @@ def _swing(o: Array, dt: float, omega: float, zeta: float, hardening: float) -> 
 
 
 def resonance(opening_mm: Array, dt_s: float, frequency_hz: float, damping_ratio: float) -> Array:
-    """A mass on a slightly hardening spring, damped to ground, stepped by leapfrog on the fine grid."""
+    """A mass on a slightly hardening spring with damping, integrated by the leapfrog method on the fine grid."""
     return np.asarray(_swing(opening_mm, dt_s, 2 * np.pi * frequency_hz, damping_ratio, 0.02))
 
 
 def soft_contact(gap_mm: Array, floor_mm: float, remaining_slope: float, softness_mm: float) -> Array:
-    """Fingers that meet over an asperity layer: the slope changes smoothly within `softness_mm`."""
+    """Contact of fingers with rough surfaces: the slope changes smoothly within `softness_mm`."""
     above = softness_mm * np.logaddexp(0.0, (gap_mm - floor_mm) / softness_mm)
     return floor_mm + above + remaining_slope * (gap_mm - floor_mm - above)
 
 
 def warming(time_s: Array, amplitude_mm: float, tau_s: float) -> Array:
-    """Two bodies that warm up one behind the other: a fast skin of 8 % and the bulk."""
+    """Warming of two bodies in series: a fast skin with 8 % of the effect, and the bulk."""
     return amplitude_mm * (1 - 0.92 * np.exp(-time_s / (1.05 * tau_s)) - 0.08 * np.exp(-time_s / (0.5 * tau_s)))

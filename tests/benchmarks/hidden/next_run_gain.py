@@ -1,4 +1,4 @@
-"""What the proposed run was worth: chi-square that it put between two explanations, against what was promised."""
+"""Actual and predicted gain of a proposed run: the chi-square by which the run separates two explanations."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +22,7 @@ GROSS_SIGMAS = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Promised chi-square with its 95 % interval, and what came."""
+    """Predicted gain in chi-square with its 95 % interval, and actual gain."""
 
     promised: float
     low: float
@@ -31,7 +31,7 @@ class Gain:
 
 
 def promise_of(report: dict[str, Any]) -> tuple[float, float, float] | None:
-    """Promised gain and its interval, in any of the spellings that design.md leaves open; None without a proposal."""
+    """Predicted gain and its interval, in any of the forms that design.md allows; None without a proposal."""
     run = report.get("next_run")
     if not run or run.get("promised") is None:
         return None
@@ -54,7 +54,7 @@ def _names(spoken: Any) -> frozenset[str]:
 
 
 def separated(answer: Answer) -> list[frozenset[str]]:
-    """The explanations that the proposed run is meant to separate from one another."""
+    """Explanations that the proposed run is intended to separate."""
     spoken = (answer.report.get("next_run") or {}).get("separates") or []
     if spoken and isinstance(spoken[0], list) and spoken[0] and isinstance(spoken[0][0], list):
         spoken = spoken[0]
@@ -62,18 +62,18 @@ def separated(answer: Answer) -> list[frozenset[str]]:
 
 
 Columns = dict[str, list[Array]]
-"""Columns of a measured table, one array a run."""
+"""Columns of a measured table, one array per run."""
 
 
 def with_second(experiment: Experiment, traces: list[Trace]) -> Columns:
-    """Columns of the table as it was measured, and of further runs behind it."""
+    """Columns of the table as measured, followed by those of further runs."""
     old = first_columns(experiment)
     new = measured(experiment, traces, np.random.default_rng([experiment.seed, 13]))
     return {key: old[key] + new[key] for key in old}
 
 
 def _joined(table: JudgedTable, traces: list[Trace], columns: Columns) -> tuple[Problem, Curve]:
-    """Noisy runs as the judge fits them."""
+    """Estimation problem and target for noisy runs."""
     problem = problem_of(table.experiment, traces, known_input=False)
     left, right, recorded, force = (
         np.concatenate(columns[key]) for key in ("left_mm", "right_mm", "input_mm", "force_n")
@@ -83,9 +83,10 @@ def _joined(table: JudgedTable, traces: list[Trace], columns: Columns) -> tuple[
 
 
 def gain_that_came(table: JudgedTable, answer: Answer) -> Gain | None:
-    """Drive the proposed run with the same plant and fit both explanations to old and new runs together.
+    """Simulate the proposed run with the same effects, and fit both explanations to old and new runs together.
 
-    None where nothing was promised, nothing was to be separated, or the recipe asks for more than motion.
+    The function returns None if no gain was predicted, nothing was to be separated, or the recipe has other steps than
+    motions.
     """
     promise, apart = promise_of(answer.report), separated(answer)
     own = frozenset(h.name for h in table.experiment.plant.hidden)
@@ -106,7 +107,7 @@ def gain_that_came(table: JudgedTable, answer: Answer) -> Gain | None:
 
 
 def _without_gross_errors(problem: Problem, target: Curve, found: Fit) -> Curve:
-    """Put what is expected in the place of samples that lie too far from it."""
+    """Replace samples that are too far from their expected value by this value."""
     expected = respond(problem.model, problem.at, found.effects)
     shift = np.median(target[1] - expected[1])
     gap, midline = target[0] - expected[0], target[1] - expected[1] - shift
@@ -127,13 +128,14 @@ def _advantage(
     problem: Problem,
     target: Curve,
 ) -> list[float]:
-    """Chi-square by which what is hidden fits noisy runs better than each rival."""
+    """Chi-square by which the simulated effects fit noisy runs better than each other explanation."""
     known = known_effects(table.experiment, problem)
     reported = reported_effects(answer.report, known)
     distances: list[float] = []
     for names in (own, *rivals):
         chosen = [c for c in known if c.name in names]
-        # What a rival shares with the truth or the answer stands near where it stands there: a period is hard to find.
+        # Effects that another explanation shares with the truth or the answer start from the values there, because a
+        # period is hard to find.
         begins = [
             [values.get(c.name, c.starts[k * (len(c.starts) - 1) // 3]) for c in chosen]
             for values in ({}, table.judgement.effects, reported)
@@ -141,7 +143,7 @@ def _advantage(
         ]
         best = min((fit(problem, target, chosen, begin, 80) for begin in begins), key=lambda found: found.distance)
         if not distances:
-            # Gross errors are seen beside what is hidden, and say nothing about its rivals.
+            # Gross errors are determined with the simulated effects, and do not influence the comparison.
             target = _without_gross_errors(problem, target, best)
             best = fit(problem, target, chosen, [best.effects[c.name] for c in chosen], 80)
         distances.append(best.distance)

@@ -1,4 +1,4 @@
-"""What the bench adds to the truth: edge noise, offsets of runs, outliers, errors and steps of the recorded input."""
+"""Simulated errors of measurement: edge noise, offsets of runs, outliers, errors and steps of the recorded input."""
 
 from dataclasses import dataclass
 
@@ -18,17 +18,17 @@ class Noise:
     edge_mm : float
         Standard deviation of one edge.
     correlation : float
-        AR(1) coefficient from frame to frame within a run.
+        AR(1) coefficient between successive frames of a run.
     run_offset_mm : float
         Standard deviation of one edge's offset per run.
     outlier_share : float
         Share of frames with a gross error on one edge.
     pixel_mm : float
-        Edges are rounded to this; 0 for none.
+        Rounding step of the edges; 0 for no rounding.
     input_mm : float
-        Standard deviation of the recorded input, white.
+        Standard deviation of the white noise of the recorded input.
     encoder_step_mm : float
-        The recorded input is rounded to this; 0 for none.
+        Rounding step of the recorded input; 0 for no rounding.
     force_n : float
         Standard deviation of the force.
     """
@@ -44,17 +44,17 @@ class Noise:
 
     @property
     def input_variance_mm2(self) -> float:
-        """Variance of the recorded input, its steps included."""
+        """Variance of the recorded input, including rounding."""
         return self.input_mm**2 + self.encoder_step_mm**2 / 12
 
     @property
     def edge_variance_mm2(self) -> float:
-        """Variance of one edge, its rounding included."""
+        """Variance of one edge, including rounding."""
         return self.edge_mm**2 + self.pixel_mm**2 / 12
 
 
 def draw_noise(rng: np.random.Generator, runs: int, slope: float, width_mm: float) -> Noise:
-    """Any mixture of the kinds; each is absent about half of the time."""
+    """Draw a random mixture of all kinds of noise; each kind is absent in about half of the cases."""
     edge = float(np.exp(rng.uniform(np.log(0.002), np.log(0.01))))
     correlation = float(rng.choice([0.0, 0.0, 0.3, 0.5, 0.8]))
     offset = edge * rng.uniform(0.3, 1.0) if runs > 1 and rng.random() < 0.4 else 0.0
@@ -85,5 +85,5 @@ def edge_errors(rng: np.random.Generator, noise: Noise, count: int) -> Array:
 
 
 def rounded(values_mm: Array, step_mm: float) -> Array:
-    """Values to whole steps; unchanged for a step of 0."""
+    """Round values to whole steps; unchanged for a step of 0."""
     return values_mm if step_mm == 0 else step_mm * np.round(values_mm / step_mm)

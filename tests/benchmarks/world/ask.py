@@ -1,4 +1,4 @@
-"""The one door to the tool: a process a table, files in, report.json out, through the public command."""
+"""Run `fingervision diagnose`, the public command, in one process per table; its result is read from report.json."""
 
 import json
 import subprocess
@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 COMMAND = (sys.executable, "-c", "from fingervision.cli import main; main()")
-"""The public command of this tree, whatever is installed."""
+"""Public command of this source tree, independent of the installed version."""
 LONGEST_S = 240.0
-"""As score.py of the real rigs."""
+"""Time limit, as in score.py for measured tables."""
 
 
 def ask(folder: Path, out: Path, *, again: bool = False) -> dict[str, Any]:
-    """Diagnose a folder's table; the answer is kept under `out` and taken from there the next time."""
+    """Diagnose the table of a folder; the answer is stored in `out` and read from there the next time."""
     kept = out / "answer.json"
     if kept.exists() and not again:
         return dict(json.loads(kept.read_text(encoding="utf-8")))

@@ -1,4 +1,4 @@
-"""Rigs that move, wait and are read: stages against a laser, slits, slow drifts."""
+"""Set-ups that are read at rest after each motion: stages measured with a laser, slits, slow drifts."""
 
 from dataclasses import dataclass, field, replace
 
@@ -11,15 +11,15 @@ from tests.benchmarks.world.rig import Array, Booleans, Hidden, Integers, Path, 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stations:
-    """Where the stage goes, one station after another, over all runs.
+    """Successive positions (stations) of the stage, over all runs.
 
     Parameters
     ----------
     position_mm, time_s : ndarray, shape (m,)
-        Set positions, and when they are read; the time may restart with a run.
+        Set positions, and the times of their readings; the time may restart with each run.
     run : ndarray of int, shape (m,)
     read, listed : ndarray of bool, shape (m,)
-        Whether a reading is taken there, and whether the station is in the table at all.
+        Whether a reading is taken at the station, and whether the table contains the station.
     """
 
     position_mm: Array
@@ -31,19 +31,19 @@ class Stations:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """What is hidden in the stage.
+    """Simulated errors of the stage.
 
     Parameters
     ----------
     play_mm, start : float
-        Clearance, and where it stands before the first station (-1 where upward motion pushes).
+        Play, and its state before the first station (-1: engaged by upward motion).
     error_map : ErrorMap or None
     ratio : float
-        The input's unit is off.
+        Relative error of the input's scale.
     offset_mm : float
-        The gap's zero is off.
+        Error of the gap's zero.
     drift_mm, drift_tau_s : float
-        Warming from the first station on.
+        Amplitude and time constant of a warming that starts at the first station.
     """
 
     play_mm: float = 0.0
@@ -57,20 +57,20 @@ class Parts:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How the stage is read.
+    """Properties of the readings.
 
     Parameters
     ----------
     noise_mm, resolution_mm : float
-        Standard deviation of a reading, and the last digit.
+        Standard deviation of a reading, and unit of its last digit.
     gap_at_zero_mm : float
-        Gap where the input is zero.
+        Gap at zero input.
     simulation : str
-        `line`: target is position; `map`: the mean of all readings at each place, as reports tabulate it.
+        `line`: the position equals the target; `map`: mean of all readings at each position, as in published reports.
     zeroed : bool
-        The reference is set to zero at the first reading.
+        Whether the reference is set to zero at the first reading.
     correlation : float
-        AR(1) from reading to reading.
+        Coefficient of the AR(1) noise between successive readings.
     """
 
     noise_mm: float
@@ -84,7 +84,7 @@ class Reading:
 
 
 def placed(stations: Stations, parts: Parts) -> Array:
-    """Where the stage really stands at each station, in mm of input."""
+    """Actual position of the stage at each station, in mm of input."""
     u = stations.position_mm * (1 + parts.ratio)
     if parts.error_map is not None:
         u = u + parts.error_map(u)
@@ -92,7 +92,7 @@ def placed(stations: Stations, parts: Parts) -> Array:
 
 
 def hidden_of(parts: Parts, shift_mm: float, places_mm: Array) -> tuple[Hidden, ...]:
-    """The parts by their canonical names; `shift_mm` is how far the zero of the gap is off altogether."""
+    """Simulated errors by the names of the catalogue; `shift_mm` is the total error of the gap's zero."""
     found = []
     if parts.ratio:
         found.append(Hidden("input_scale", {"ratio": parts.ratio}))
@@ -109,7 +109,7 @@ def hidden_of(parts: Parts, shift_mm: float, places_mm: Array) -> tuple[Hidden, 
 
 
 def clean_gap(stations: Stations, parts: Parts, gap_at_zero_mm: float, place_mm: Array | None = None) -> Array:
-    """Gap at each station without the noise of reading."""
+    """Gap at each station without reading noise."""
     gap = gap_at_zero_mm + parts.offset_mm + (placed(stations, parts) if place_mm is None else place_mm)
     if parts.drift_mm:
         gap = gap + physics.warming(stations.time_s, parts.drift_mm, parts.drift_tau_s)
@@ -119,7 +119,7 @@ def clean_gap(stations: Stations, parts: Parts, gap_at_zero_mm: float, place_mm:
 def read_at_rest(
     rng: np.random.Generator, stations: Stations, parts: Parts, reading: Reading, place_mm: Array | None = None
 ) -> Rig:
-    """Read a stage at its stations; `place_mm` where it stands by other physics than that of `placed`."""
+    """Simulate readings at all stations; `place_mm` replaces the positions computed by `placed`."""
     clean = clean_gap(stations, parts, reading.gap_at_zero_mm, place_mm)
     noise = physics.slow_noise(rng, clean.size, reading.noise_mm, reading.correlation)
     read = stations.read & stations.listed
@@ -141,7 +141,7 @@ def read_at_rest(
         simulation = Simulation(
             rows, np.concatenate([[seen[0] + ends[0] - places[0]], seen, [seen[-1] + ends[1] - places[-1]]])
         )
-        # The readings' own noise is in the table of means, so what is left of it in the difference is less.
+        # The table of means contains the noise of the same readings, so that the difference contains less noise.
         clean = clean + np.interp(stations.position_mm, places, seen - wanted)
         hidden_map = False
         drifted = physics.warming(stations.time_s, parts.drift_mm, parts.drift_tau_s) if parts.drift_mm else None
@@ -166,19 +166,21 @@ def read_at_rest(
 
 
 def _means(stations: Stations, read: Booleans, gap: Array, places: Array) -> Array:
-    """Mean of the readings at each place, each direction having the same weight as in a report."""
+    """Mean of the readings at each position; both directions have the same weight, as in published reports."""
     return np.array([gap[read & (stations.position_mm == p)].mean() for p in places])
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw evenly in the logarithm."""
+    """Draw a number whose logarithm is uniformly distributed."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def bidirectional(
     targets_mm: Array, cycles: int, overshoot_mm: float, dwell_s: float, move_s: float, *, listed: bool
 ) -> Stations:
-    """ISO 230-2: up and down over the targets, an overshoot beyond each end, listed as rows without a gap or not."""
+    """Cycles of ISO 230-2 over the targets with overshoots at the ends, which are rows without a gap or not in the
+    table.
+    """
     low, high = float(targets_mm[0]) - overshoot_mm, float(targets_mm[-1]) + overshoot_mm
     position, read = [], []
     for _ in range(cycles):
@@ -186,7 +188,7 @@ def bidirectional(
             position += [end, *way.tolist()]
             read += [False] + [True] * way.size
     steps = [move_s if not r else dwell_s for r in read]
-    # The way from an overshoot back to the first target is short; every other reading comes after its dwell.
+    # The distance from an overshoot back to the first target is short; all other readings follow a dwell.
     time = np.concatenate([[0.0], np.cumsum([move_s if not read[i] else steps[i + 1] for i in range(len(read) - 1)])])
     seen = np.array(read)
     run = np.zeros(len(position), dtype=np.int64)

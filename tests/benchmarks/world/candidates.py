@@ -1,4 +1,4 @@
-"""Effects that may be named on a table, with the bounds of effects.md and places where a search begins."""
+"""Effects that may be named for a table, with the bounds in effects.md and starting values of a search."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -8,11 +8,11 @@ import numpy as np
 from tests.benchmarks.world.rig import Array, Rig
 
 WITH_START = ("backlash", "friction_hysteresis")
-"""Effects whose state at the start of a run is a nuisance."""
+"""Effects whose state at the start of a run is a nuisance parameter."""
 NEEDS_MOTION = ("drive_lag", "camera_latency", "slew_limit", "structural_resonance")
-"""Excluded where the rig waits before each reading."""
+"""Effects that are excluded if the set-up rests before each reading."""
 CLOCKED = ("thermal_drift", "camera_scale_drift")
-"""Excluded where the time restarts between runs."""
+"""Effects that are excluded if the time restarts between runs."""
 OFFSETS = frozenset({"input_offset", "rest_gap_error", "edge_bias"})
 RATIOS = frozenset({"input_scale", "lever_ratio_error", "scale_error"})
 MAP = "position_error_map"
@@ -20,7 +20,7 @@ MAP = "position_error_map"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """Parameters of one effect: names, bounds and beginnings, each of shape (p,)."""
+    """Parameters of one effect: names, bounds and starting values, each of shape (p,)."""
 
     name: str
     names: tuple[str, ...]
@@ -35,12 +35,12 @@ def _of(name: str, names: tuple[str, ...], bounds: list[tuple[float, float]], be
 
 
 def time_restarts(rig: Rig) -> bool:
-    """Whether `time_s` begins again with a run."""
+    """Whether `time_s` restarts with a run."""
     return bool(np.any(np.diff(rig.time_s) < 0))
 
 
 def candidates(rig: Rig, size_mm: float) -> dict[str, Candidate]:
-    """All effects that the table allows; `size_mm` is how far it disagrees with the simulation."""
+    """All effects that the table allows; `size_mm` is the size of its disagreement with the simulation."""
     u, path = rig.path.input_mm, rig.path
     low, high = float(u.min()), float(u.max())
     width = high - low

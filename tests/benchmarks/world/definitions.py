@@ -1,8 +1,8 @@
-"""The definitions of effects.md at the rows of a table: the judge's own form of each effect, gap only.
+"""The definitions in effects.md at the rows of a table: an independent program for each effect, for the gap only.
 
-Halves are symmetric, so what moves both points together (`camera_drift`, `assembly_asymmetry`) changes nothing here.
-The play and the sliders share one start a run in -1..1. `position_error_map` is not here: it is linear in its curve and
-is projected out where a set holds it (`nearest.py`).
+Halves are symmetric, so that effects that move both points together (`camera_drift`, `assembly_asymmetry`) do not
+change the gap. The play and the sliders share one start state per run, from -1 to 1. The effect `position_error_map` is
+not in this module: it is linear in its curve, which is projected out for sets that contain the effect (`nearest.py`).
 """
 
 import numpy as np
@@ -10,14 +10,15 @@ import numpy as np
 from tests.benchmarks.world.rig import Array, Path, Rig
 
 Effects = dict[str, Array]
-"""Parameters by name, in the order of effects.md."""
+"""Parameters of each effect by name, in the order of effects.md."""
 CREEP_TAUS_S = (1.0, 4.0, 16.0, 64.0)
 
 
 def clipped_along(lower: Array, upper: Array, first: Array) -> Array:
-    """State that is clipped to [lower, upper] at each point in turn, from `first` on; shape (k, m), all k at once.
+    """State that starts at `first` and is clipped to [lower, upper] at successive points, for k cases at once; shape
+    (k, m).
 
-    A clip after a clip is a clip, so all of them are found by doubling (Hillis & Steele 1986).
+    Two successive clips are equivalent to one clip, so that all states are found by doubling (Hillis & Steele 1986).
     """
     low, high = lower.copy(), upper.copy()
     shift = 1
@@ -32,7 +33,7 @@ def clipped_along(lower: Array, upper: Array, first: Array) -> Array:
 
 
 def places(path: Path, u: Array, half_mm: Array, start: Array) -> Array:
-    """Places of plays of several half widths, shape (k, m)."""
+    """Outputs of play operators of several half widths, shape (k, m)."""
     out = np.empty((half_mm.size, u.size))
     for r, (a, b) in enumerate(zip(path.starts[:-1], path.starts[1:], strict=True)):
         first = u[a] + start[r] * half_mm
@@ -79,7 +80,8 @@ def _low_passed(path: Path, o: Array, tau_s: float) -> Array:
         out[a] = o[a]
         for i in range(a + 1, b):
             dt = path.time_s[i] - path.time_s[i - 1]
-            # At rest the step comes at once and is waited for; else the input is linear between points.
+            # If readings are at rest, each step is complete before the reading; otherwise the input is linear between
+            # points.
             slope = 0.0 if path.at_rest or dt == 0 else (o[i] - o[i - 1]) / dt
             before = o[i] if path.at_rest else o[i - 1]
             settled = before - slope * tau_s
@@ -112,7 +114,7 @@ def _ringing(path: Path, o: Array, frequency_hz: float, damping: float) -> Array
 
 
 def driven(path: Path, acting: Effects, start: Array) -> Array:
-    """Input that the mechanism receives, along the path; a command's dead time is in the path already."""
+    """Input that the mechanism receives, along the path, which already includes the dead time of a command."""
     u, zero = path.input_mm, np.zeros(1)
     if "drive_lag" in acting and not path.commanded:
         u = _late(path, u, acting["drive_lag"][0])
@@ -130,14 +132,14 @@ def driven(path: Path, acting: Effects, start: Array) -> Array:
         u = _jumped(path, u, acting["stick_slip"][0])
     if "friction_hysteresis" in acting:
         fraction, reach = acting["friction_hysteresis"]
-        # A slider that lets go at a strain is what is left of the input beside a play of that half width.
+        # The extension of a slider is the difference between the input and the output of a play of that half width.
         strains = u - places(path, u, reach * np.arange(1, 9) / 8, start)
         u = u - fraction * strains.mean(axis=0)
     return u
 
 
 def respond(rig: Rig, acting: Effects, start: Array) -> Array:
-    """Gap at the rows that were read."""
+    """Gap at the rows with a reading."""
     path, zero = rig.path, np.zeros(1)
     if path.commanded and "drive_lag" in acting:
         path = path.delayed(acting["drive_lag"][0])

@@ -1,8 +1,9 @@
-"""Draw tables that look like other people's rigs.
+"""Simulate tables that resemble those of other set-ups.
 
     python -m tests.benchmarks.world.draw --seed 7 --tables 6 --rows iso_cycles,sparse --out results/world
 
-Writes a folder ROW_INDEX a table with measured.csv, simulation.csv and truth.json; the same seed gives the same files.
+For each table, a folder ROW_INDEX with measured.csv, simulation.csv and truth.json is written; the same seed gives the
+same files.
 """
 
 import argparse
@@ -19,11 +20,12 @@ from tests.benchmarks.world.rows.catalogue import ENCODER_KINDS, ROWS
 
 TRIES = 30
 FORM_SHARE = 0.01
-"""The catalogue's form leaves at most 1 % of the hidden chi-square (10 % of the amplitude), or 20: else drawn again."""
+"""Largest share of the simulated chi-square that the catalogue's formula may leave (10 % of the amplitude), or 20;
+otherwise a table is drawn again."""
 
 
 def fair(rig: Rig, right: RightAnswers, judge: Judge) -> bool:
-    """Whether the table asks what its row asks: its truth is near the catalogue, or truly outside."""
+    """Whether the table suits its row: its true effects are near the catalogue's formulas, or clearly outside."""
     if rig.wrong_sign:
         return right.nothing > FAR
     if rig.outside:
@@ -32,12 +34,12 @@ def fair(rig: Rig, right: RightAnswers, judge: Judge) -> bool:
 
 
 def drawn(row: str, seed: int, index: int, attempt: int) -> Rig:
-    """One attempt at a table: the same numbers give the same table."""
+    """Simulate one table; the same arguments give the same table."""
     return (ROWS | ENCODER_KINDS)[row](np.random.default_rng([seed, index, attempt, *row.encode()]))
 
 
 def draw_judged(row: str, seed: int, index: int) -> tuple[Rig, Judge, RightAnswers, dict[str, object]]:
-    """Draw one table of a row with its right answers and its numbers; again where the question is not fair."""
+    """Draw one table of a row with its right answers; draw again until the table is suitable (`fair`)."""
     for attempt in range(TRIES):
         rig = drawn(row, seed, index, attempt)
         right, judge = right_answers(rig)
@@ -47,7 +49,7 @@ def draw_judged(row: str, seed: int, index: int) -> tuple[Rig, Judge, RightAnswe
 
 
 def draw_table(row: str, seed: int, index: int, out: Path) -> Path:
-    """Draw and write one table, unless it is there."""
+    """Draw and write one table, unless it exists."""
     folder = out / f"{row}_{index}"
     if not (folder / "truth.json").exists():
         write(*draw_judged(row, seed, index), folder)
@@ -55,7 +57,7 @@ def draw_table(row: str, seed: int, index: int, out: Path) -> Path:
 
 
 def main() -> None:
-    """Read the options and write the folders."""
+    """Read the options, and write the folders."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--tables", type=int, default=6, help="tables a row")

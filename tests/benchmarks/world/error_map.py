@@ -1,4 +1,4 @@
-"""Smooth maps of position errors, as screws and scales have them."""
+"""Smooth maps of position errors, as of screws and scales."""
 
 from dataclasses import dataclass
 
@@ -9,16 +9,16 @@ from tests.benchmarks.world.rig import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorMap:
-    """A sum of cosines over the travel, its straight line taken away and scaled to an RMS over the travel.
+    """A sum of cosines over the travel, with its straight line subtracted, scaled to an RMS over the travel.
 
     Parameters
     ----------
     low_mm, high_mm : float
         Ends of the travel.
     weights, phases : ndarray, shape (k,)
-        Of the waves with 1/2, 1, 3/2, ... periods over the travel.
+        Weights and phases of the cosines with 1/2, 1, 3/2, ... periods over the travel.
     line : ndarray, shape (2,)
-        What is taken away.
+        Coefficients of the subtracted straight line.
     scale : float
     """
 
@@ -35,13 +35,13 @@ class ErrorMap:
         return np.cos(np.pi * np.multiply.outer(z, count) + self.phases) @ self.weights
 
     def __call__(self, u_mm: Array) -> Array:
-        """Error in mm at each place."""
+        """Error (mm) at each position."""
         z = (np.asarray(u_mm) - self.low_mm) / (self.high_mm - self.low_mm)
         return np.asarray(self.scale * (self._waves(u_mm) - np.polyval(self.line, z)))
 
 
 def draw_map(rng: np.random.Generator, places_mm: Array, rms_mm: float, waves: int) -> ErrorMap:
-    """Draw a map; line and RMS are those over `places_mm`, the places that are read."""
+    """Draw a map; its line and RMS are computed over `places_mm`, the positions of readings."""
     low, high = float(np.min(places_mm)), float(np.max(places_mm))
     count = np.arange(1, waves + 1)
     weights = rng.standard_normal(waves) / (1 + count)

@@ -1,4 +1,4 @@
-"""A drawn table on disk: measured.csv, simulation.csv and the truth that score.py of the real rigs reads."""
+"""Files of a simulated table: measured.csv, simulation.csv and truth.json, in the form that score.py reads."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,8 @@ from tests.benchmarks.world.rig import Rig
 from tests.benchmarks.world.right_answers import FAR, RightAnswers
 
 SIZE_SHARE, SIZE_SIGMAS = 0.15, 3.0
-"""A size is right within 15 % (another form of the same effect) or three standard deviations of the best fit."""
+"""Tolerances of a right size: 15 % (for another formula of the same effect) or three standard deviations of the best
+fit."""
 
 
 def _lines(header: list[str], columns: list[list[str]]) -> str:
@@ -20,7 +21,7 @@ def _lines(header: list[str], columns: list[list[str]]) -> str:
 
 
 def write_tables(rig: Rig, folder: Path) -> None:
-    """Write measured.csv and simulation.csv; a row that was not read has an empty gap."""
+    """Write measured.csv and simulation.csv; a row without a reading has an empty gap."""
     folder.mkdir(parents=True, exist_ok=True)
     header, columns = [], []
     if len(np.unique(rig.run)) > 1:
@@ -34,7 +35,7 @@ def write_tables(rig: Rig, folder: Path) -> None:
 
 
 def sizes(rig: Rig, judge: Judge, right: RightAnswers) -> dict[str, dict[str, float]]:
-    """Each needed effect's parameters in the catalogue's form, with a tolerance."""
+    """Parameters of each required effect by the catalogue's formula, with a tolerance."""
     names = [n for n in right.parameters if n in judge.known]
     values = [right.parameters[n] for n in names]
     cuts = np.cumsum([v.size for v in values])[:-1]
@@ -67,7 +68,7 @@ def sizes(rig: Rig, judge: Judge, right: RightAnswers) -> dict[str, dict[str, fl
 
 
 def pure_error_mm(rig: Rig) -> float | None:
-    """Pooled scatter of the readings of one place approached from one side; None in motion or without repeats."""
+    """Pooled scatter of readings at one position approached from one side; None in motion or without repeats."""
     u = rig.input_mm
     way = np.sign(np.diff(u, prepend=u[0] - 1e-9))
     for i in range(1, way.size):
@@ -85,7 +86,7 @@ def pure_error_mm(rig: Rig) -> float | None:
 
 
 def truth_of(rig: Rig, judge: Judge, right: RightAnswers, numbers: dict[str, object]) -> dict[str, object]:
-    """The keys of the real rigs' truth.json, then what only a drawn table knows."""
+    """Content of truth.json: the keys used for measured tables, then keys of simulated tables only."""
     noise = rig.gap_mm[rig.read] - rig.clean_gap_mm[rig.read]
     form = right.own / noise.size * float(np.mean(judge.sd_mm**2))
     bare = rig.gap_mm[rig.read] - rig.simulation.gap(rig.input_mm[rig.read])
@@ -130,7 +131,7 @@ def _parameters(name: str, drawn: dict[str, float], judge: Judge, right: RightAn
     if name not in right.parameters:
         return drawn
     fitted = dict(zip(judge.known[name].names, (float(v) for v in right.parameters[name]), strict=True))
-    # An end stop has two sides, and one of them is hidden.
+    # An end stop has two sides, of which only one is simulated.
     return {key: v for key, v in fitted.items() if key in drawn or name != "end_stop"}
 
 

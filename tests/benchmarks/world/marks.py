@@ -1,4 +1,4 @@
-"""What an answer is worth: exact, set with the truth, part, wrong, unknown, false `agrees`; and its intervals."""
+"""Marks of an answer (exact, set with the truth, part, wrong, unknown, false `agrees`) and of its intervals."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +12,7 @@ from tests.benchmarks.world.nearest import Judge
 from tests.benchmarks.world.right_answers import LAGS, threshold
 
 LEFT_SHARE, LEFT_NOISES = 0.05, 3.0
-"""The issue: no name may leave more than 5 % of the disagreement or 3 times the noise, whichever is larger."""
+"""Limits of a named answer: it may leave at most 5 % of the disagreement or 3 times the noise, whichever is larger."""
 SIGN_WORDS = (
     "swapped",
     "exchanged",
@@ -29,7 +29,7 @@ COVERAGE_FACTOR = 1.96
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """The mark of one answer.
+    """Mark of one answer.
 
     Parameters
     ----------
@@ -37,13 +37,13 @@ class Mark:
         `right` (nothing hidden and `agrees`, or outside and `unknown`), `claim` (nothing hidden, and anything else
         said), `exact`, `set`, `part`, `wrong`, `unknown`, `false agrees`, `no report`.
     leaves : bool
-        It names, and leaves more standing than the issue allows.
+        Whether it names effects, and leaves more of the disagreement than allowed.
     sign_said : bool or None
-        Whether the wrong sign is said, where there is one.
+        Whether a wrong sign is reported, if the table has one.
     deviations : dict
-        (value - truth) / u of each parameter, where the hidden effects were named exactly.
+        (value - truth) / u of each parameter, if exactly the simulated effects were named.
     sizes : dict
-        Whether each parameter of a needed effect that is named lies within the tolerance of truth.json.
+        Whether each parameter of a named, required effect lies within the tolerance in truth.json.
     """
 
     result: str
@@ -54,12 +54,12 @@ class Mark:
 
 
 def _turned(angle_rad: float) -> float:
-    """An angle within half a turn of zero."""
+    """The equivalent angle from -pi to pi."""
     return float((angle_rad + np.pi) % (2 * np.pi) - np.pi)
 
 
 class Marker:
-    """Marks answers about one drawn table; an unforeseen set is fitted to the truth before it is called wrong."""
+    """Marks answers to one simulated table; an unforeseen set is fitted to the truth before it is marked as wrong."""
 
     def __init__(self, truth: dict[str, Any]) -> None:
         self.truth = truth
@@ -71,16 +71,16 @@ class Marker:
 
     @cached_property
     def judge(self) -> Judge:
-        """Distances on the table, drawn again from its numbers."""
+        """Distances for the table, which is simulated again from its numbers."""
         return Judge.of(drawn(**self.truth["drawn_from"]))
 
     def exchangeable(self, names: frozenset[str]) -> bool:
-        """Whether a set says what the truth says: by the groups that were found when drawing, or by its distance."""
+        """Whether a set of effects is equivalent to the truth: by the groups in truth.json, or by its distance."""
         rest = names - self.allowed
         taken = [next((i for i, group in enumerate(self.core) if n in group), None) for n in rest]
         if None not in taken and len(set(taken)) == len(taken) == len(self.core):
             return True
-        # More than the truth: every name beyond it claims something.
+        # A set with more effects than the truth makes a wrong claim by each additional effect.
         if len(rest) > max(len(self.core), 1):
             return False
         fitted = frozenset("drive_lag" if n in LAGS else n for n in names)
@@ -91,12 +91,12 @@ class Marker:
         return self.judge.nearest(fitted, begin, threshold(own)).distance < threshold(own)
 
     def part(self, names: frozenset[str]) -> bool:
-        """Whether all of it is true, and something is missing."""
+        """Whether all effects of a set are true, but a required effect is missing."""
         known = self.allowed.union(self.names, *self.core)
         return bool(names) and names <= known
 
     def mark(self, report: dict[str, Any] | None, exit_code: int | None = 0) -> Mark:
-        """Mark a report; where there is none, exit code 1 says that the tool refused with a sentence."""
+        """Mark a report; if there is no report, exit code 1 means that the table was refused with a sentence."""
         if report is None:
             return Mark("right" if exit_code == 1 and self.truth.get("may_refuse") else "no report")
         verdict = report["verdict"]
@@ -120,7 +120,7 @@ class Marker:
                     if true is not None:
                         away, room = float(p["value"]) - true["value"], true["tolerance"]
                         if key == "phase_rad":
-                            # A phase has no size of its own: 15 % of a radian.
+                            # For a phase, a relative tolerance is meaningless: 15 % of a radian is used.
                             away, room = _turned(away), max(room, 0.15)
                         found[key] = abs(away) <= room
         return found
@@ -145,7 +145,7 @@ class Marker:
     def _leaves(self, report: dict[str, Any]) -> bool:
         d = report["disagreement"]
         before, after = (float(d[k] or 0.0) for k in ("before_rms_mm", "after_rms_mm"))
-        # The noise that the table has, not the one that the report takes what it left for.
+        # The true noise of the table, not the noise that the report states.
         return after > max(LEFT_SHARE * before, LEFT_NOISES * float(self.truth["noise_with_input_mm"]))
 
     def _deviations(self, report: dict[str, Any], names: bool) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Rigs that are read while they move: samples ten to fifty times a second."""
+"""Set-ups that are read in motion, ten to fifty times a second."""
 
 import itertools
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from tests.benchmarks.world.rig import Array, Hidden, Integers, Path, Rig, Simul
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Samples of one or more runs: true input, times (may restart) and run numbers, each of shape (n,)."""
+    """Samples of one or more runs: true input, times (which may restart) and run numbers, each of shape (n,)."""
 
     time_s: Array
     input_mm: Array
@@ -24,7 +24,7 @@ class Motion:
 
 
 def smooth_strokes(corners_mm: Array, speed_mm_s: float, rate_hz: float, rest_s: float = 0.0) -> tuple[Array, Array]:
-    """Times and places of strokes from corner to corner, each speeding up and slowing down evenly."""
+    """Times and positions of strokes between reversals, with constant acceleration and deceleration."""
     time, place = [np.zeros(1)], [np.array([corners_mm[0]])]
     now = 0.0
     for a, b in itertools.pairwise(corners_mm):
@@ -47,7 +47,7 @@ def smooth_strokes(corners_mm: Array, speed_mm_s: float, rate_hz: float, rest_s:
 
 
 def joined(runs: list[tuple[Array, Array]]) -> Motion:
-    """Runs one after another; the time restarts."""
+    """Join runs; the time restarts with each run."""
     run = np.concatenate([np.full(t.size, k + 1) for k, (t, _) in enumerate(runs)])
     return Motion(np.concatenate([t for t, _ in runs]), np.concatenate([u for _, u in runs]), run.astype(np.int64))
 
@@ -65,7 +65,7 @@ def moving_rig(
     path: Path | None = None,
     **more: object,
 ) -> Rig:
-    """Put a table together in which every row is read."""
+    """Compose a table in which every row has a reading."""
     return Rig(
         kind=kind,
         run=motion.run,
@@ -83,13 +83,13 @@ def moving_rig(
 
 
 def line_over(u_mm: Array, gap_at_zero_mm: float, slope: float = 1.0) -> Simulation:
-    """A straight simulation over a little more than the inputs."""
+    """Straight-line simulation over a range slightly larger than that of the inputs."""
     reach = 0.1 * float(np.ptp(u_mm)) + 1e-3
     ends = np.array([u_mm.min() - reach, u_mm.max() + reach])
     return Simulation(ends, gap_at_zero_mm + slope * ends)
 
 
 def read(rng: np.random.Generator, clean_mm: Array, noise_mm: float, resolution_mm: float) -> tuple[Array, float]:
-    """Readings, and their standard deviation with the rounding."""
+    """Simulated readings, and their standard deviation including rounding."""
     gap = physics.rounded(clean_mm + noise_mm * rng.standard_normal(clean_mm.size), resolution_mm)
     return gap, float(np.hypot(noise_mm, resolution_mm / np.sqrt(12)))

@@ -1,8 +1,8 @@
-"""How near a set of effects comes to a table's truth: the distance that decides what is exchangeable.
+"""Distance of a set of effects from the truth of a table, by which sets count as equivalent.
 
-The set is fitted, start states included, to the curve without reading noise, in units of the noise that the table has.
-The map of position errors is linear in its curve: a spline, free of mean and straight line,
-is projected out; gains of the runs are given their prior.
+The set is fitted, including start states, to the curve without reading noise, in units of the table's noise. The map of
+position errors is linear in its curve: a spline without mean and straight line is projected out. Gains of the runs have
+their prior distribution.
 """
 
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ from tests.benchmarks.world.definitions import Effects, respond
 from tests.benchmarks.world.rig import Array, Rig
 
 HOPELESS = 30.0
-"""A search that ends this many times above the distance that is asked for is not begun again elsewhere."""
+"""Ratio of the found to the required distance above which a search is not repeated from other starting values."""
 BEGINNINGS = 3
-"""Searches of a set, from the likeliest places."""
+"""Number of searches for a set, from the most promising starting values."""
 KNOTS_AT_REST, KNOTS_MOVING = 10, 24
-"""Pieces of the map's spline over the travel: as many as an ISO 230-2 cycle has targets; in motion eight for each of
-the three periods that a drawn map has at most, which leaves less than 1 % of its amplitude."""
+"""Number of pieces of the map's spline over the travel: at rest, about the number of targets of an ISO 230-2 cycle; in
+motion, eight for each of at most three periods of a simulated map, which leaves less than 1 % of its amplitude."""
 EVALUATIONS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """A set at its nearest to the truth: parameters, squared whitened distance."""
+    """Best fit of a set to the truth: parameters, and squared whitened distance."""
 
     effects: Effects
     distance: float
@@ -37,7 +37,7 @@ class Nearest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judge:
-    """Distances on one table."""
+    """Computes distances for one table."""
 
     rig: Rig
     known: dict[str, Candidate]
@@ -47,7 +47,7 @@ class Judge:
 
     @classmethod
     def of(cls, rig: Rig) -> "Judge":
-        """Set up for a table."""
+        """Prepare the computation for a table."""
         u = rig.path.input_mm[rig.path.row][rig.read]
         target = rig.clean_gap_mm[rig.read]
         span = float(np.ptp(rig.path.input_mm))
@@ -75,9 +75,9 @@ class Judge:
         return spline, gains
 
     def nearest(self, names: frozenset[str], begin: Effects | None = None, asked: float = np.inf) -> Nearest:
-        """Fit the set; where an effect is not allowed on this table, the distance is infinite.
+        """Fit a set; the distance is infinite if the table does not allow one of the effects.
 
-        `begin` gives parameters to begin at; `asked` is the distance that decides, beside which the search may stop.
+        `begin` contains starting values; `asked` is the limit of the distance, below which the search may stop.
         """
         if not names - {MAP} <= set(self.known):
             return Nearest({}, np.inf, np.zeros(self.rig.runs))
@@ -159,7 +159,7 @@ class Judge:
 
 
 def _map_columns(u_mm: Array, slope: Array, pieces: int, *, moving: bool) -> Array:
-    """Splines without the straight line that they have over the travel, or over the places that are read at rest."""
+    """Splines minus their straight lines over the travel or, for readings at rest, over their positions."""
     low, high = float(u_mm.min()), float(u_mm.max())
     places = np.unique(u_mm)
     if high - low < 1e-12 or places.size < 4:

@@ -1,4 +1,4 @@
-"""What acts in a made-up rig, followed point by point along its path."""
+"""Physics of the simulated set-ups, computed point by point along the path."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from tests.benchmarks.world.rig import Array
 
 
 def play(u_mm: Array, width_mm: float, start: float) -> Array:
-    """A loose nut of `width_mm` clearance; `start` -1 rests on the flank that upward motion pushes, 1 on the other."""
+    """Play of width `width_mm`; the start state is -1 if engaged by upward motion, 1 if engaged by downward motion."""
     half = 0.5 * width_mm
     place = u_mm[0] + start * half
     out = []
@@ -20,7 +20,7 @@ def play(u_mm: Array, width_mm: float, start: float) -> Array:
 
 
 def friction_loop(u_mm: Array, fraction: float, reach_mm: float, start: float) -> Array:
-    """Eight elastic sliders in parallel, each let go at its own strain."""
+    """Eight elastic sliders in parallel, each of which slips at its own extension."""
     limits = reach_mm * np.arange(1, 9) / 8
     strain = start * limits
     out = [u_mm[0] - fraction * strain.mean()]
@@ -31,12 +31,12 @@ def friction_loop(u_mm: Array, fraction: float, reach_mm: float, start: float) -
 
 
 def late(time_s: Array, u_mm: Array, delay_s: float) -> Array:
-    """Dead time."""
+    """Delay a signal by a dead time."""
     return np.interp(time_s - delay_s, time_s, u_mm)
 
 
 def at_limited_speed(time_s: Array, u_mm: Array, speed_mm_s: float) -> Array:
-    """Follows the input at most at a speed."""
+    """Output that follows the input at no more than a given speed."""
     place = float(u_mm[0])
     out = [place]
     for dt, u in zip(np.diff(time_s).tolist(), u_mm[1:].tolist(), strict=True):
@@ -47,7 +47,7 @@ def at_limited_speed(time_s: Array, u_mm: Array, speed_mm_s: float) -> Array:
 
 
 def maxwell(time_s: Array, opening_mm: Array, shares: Array, taus_s: Array) -> Array:
-    """Generalised Maxwell solid under an input that is linear between points; relaxed at the first."""
+    """Response of a generalised Maxwell solid to an input that is linear between points; relaxed at the first point."""
     slow = np.full(taus_s.size, opening_mm[0])
     out = [opening_mm[0]]
     for i in range(1, time_s.size):
@@ -60,12 +60,12 @@ def maxwell(time_s: Array, opening_mm: Array, shares: Array, taus_s: Array) -> A
 
 
 def warming(time_s: Array, amplitude_mm: float, tau_s: float) -> Array:
-    """One body that warms up from the first reading on."""
+    """Warming of one body from the first reading on."""
     return amplitude_mm * (1 - np.exp(-(time_s - time_s[0]) / tau_s))
 
 
 def slow_noise(rng: np.random.Generator, count: int, sd_mm: float, correlation: float) -> Array:
-    """Reading noise, AR(1) from row to row; white for a correlation of 0."""
+    """Reading noise as an AR(1) process over the rows; white for a correlation of 0."""
     out = [float(rng.standard_normal())]
     for kick in rng.standard_normal(count - 1).tolist():
         out.append(correlation * out[-1] + float(np.sqrt(1 - correlation**2)) * kick)
@@ -73,5 +73,5 @@ def slow_noise(rng: np.random.Generator, count: int, sd_mm: float, correlation: 
 
 
 def rounded(values: Array, step: float) -> Array:
-    """Values to whole steps; unchanged for a step of 0."""
+    """Round values to whole steps; unchanged for a step of 0."""
     return values if step == 0 else step * np.round(values / step)

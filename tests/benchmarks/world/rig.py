@@ -1,4 +1,4 @@
-"""A measured table of a made-up rig, with everything that is known about it."""
+"""A simulated measured table, with the truth about it."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ Parameters = dict[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """One effect that acts, with its parameters in the definitions of effects.md."""
+    """A simulated effect, with its parameters as defined in effects.md."""
 
     name: str
     parameters: Parameters
@@ -21,21 +21,20 @@ class Hidden:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """The true way of the input.
+    """True path of the input.
 
     Parameters
     ----------
     time_s, input_mm : ndarray, shape (m,)
-        Linear between these points where the rig moves continuously; places of rest, one after another, where it is
-        read at rest.
+        Points between which the input is linear in continuous motion, or successive positions at rest.
     row : ndarray of int, shape (n,)
         Point of the path at which each row of the table was taken.
     starts : ndarray of int, shape (runs + 1,)
-        First point of each run, and m.
+        First point of each run, and m at the end.
     at_rest : bool
-        Whether the rig moves from point to point and waits there before it is read.
+        Whether the set-up moves from point to point and rests before each reading.
     commanded : bool
-        Whether the input is a command, of one run, whose corners are among the points: it is delayed exactly.
+        Whether the input is a command of one run whose corners are among the points, so that it can be delayed exactly.
     """
 
     time_s: Array
@@ -46,7 +45,7 @@ class Path:
     commanded: bool = False
 
     def delayed(self, delay_s: float) -> "Path":
-        """A command's path after a dead time: its corners come later, the rows stay."""
+        """Path of a command after a dead time: its corners are later, its rows are unchanged."""
         rows_s = self.time_s[self.row]
         time = np.union1d(rows_s, self.time_s + delay_s)
         u = np.interp(time - delay_s, self.time_s, self.input_mm)
@@ -54,7 +53,7 @@ class Path:
 
     @classmethod
     def of_rows(cls, time_s: Array, input_mm: Array, run: Integers, *, at_rest: bool) -> "Path":
-        """The rows themselves are the points."""
+        """Path whose points are the rows of the table."""
         changes = np.flatnonzero(np.diff(run)) + 1
         starts = np.concatenate([[0], changes, [len(run)]]).astype(np.int64)
         return cls(time_s, input_mm, np.arange(len(run)), starts, at_rest)
@@ -62,13 +61,13 @@ class Path:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """Rows of the simulation table, linear between them."""
+    """The simulation table, linearly interpolated between its rows."""
 
     input_mm: Array
     gap_mm: Array
 
     def gap(self, input_mm: Array) -> Array:
-        """Gap in mm; beyond the table's end on a line through its last quarter of rows."""
+        """Gap (mm); beyond an end of the table, on a line through the quarter of the rows at that end."""
         quarter = max(2, len(self.input_mm) // 4)
         inside = np.interp(input_mm, self.input_mm, self.gap_mm)
         for end, rows in ((0, slice(0, quarter)), (-1, slice(-quarter, None))):
@@ -81,44 +80,44 @@ class Simulation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """A measured table, its simulation and its truth.
+    """A simulated measured table with its simulation table and its truth.
 
     Parameters
     ----------
     kind : str
-        The variant within its row, for a person who asks.
+        Variant within the row of the benchmark, for information.
     run : ndarray of int, shape (n,)
-        Number of the run; one number alone writes no column.
+        Number of the run; the table has no such column if there is only one run.
     time_s, input_mm, gap_mm : ndarray, shape (n,)
-        The table's columns; `time_s` may restart with each run.
+        Columns of the table; `time_s` may restart with each run.
     read : ndarray of bool, shape (n,)
-        Rows with a gap; the others are part of the path.
+        Rows with a gap; all other rows belong to the path only.
     clean_gap_mm : ndarray, shape (n,)
-        The gap without the noise of reading.
+        Gap without reading noise.
     noise_mm : float
-        Standard deviation of one reading, rounding included.
+        Standard deviation of one reading, including rounding.
     simulation : Simulation
     path : Path
-        True input.
+        True path of the input.
     hidden : tuple of Hidden
     input_error_mm : float
-        Standard deviation of the recorded input about the true one.
+        Standard deviation of the recorded input about the true input.
     correlation : float
-        AR(1) coefficient of the reading noise from row to row.
+        AR(1) coefficient of the reading noise over the rows.
     run_gain : float
-        Standard deviation of the gain from run to run, relative.
+        Relative standard deviation of the gain between runs.
     outside : str or None
-        What no entry of the catalogue can be.
+        Description of an effect that no entry of the catalogue can explain.
     wrong_sign : str or None
-        What is turned round in the table: `directions`, `input` or `gap`.
+        Quantity with the wrong sign in the table: `directions`, `input` or `gap`.
     exact_forms : bool
-        Whether the drawn parameters are those of the catalogue's definitions, so that intervals may be held to them.
+        Whether the parameters are those of the catalogue's definitions, so that stated intervals can be tested.
     may_refuse : bool
-        Whether a sentence and no report is a right answer.
+        Whether a refusal with a sentence, without a report, is a right answer.
     may_agree : bool
-        Whether `agrees` is right although something is there: it could be a large reading noise.
+        Whether `agrees` is right in spite of a simulated effect, which could be a large reading noise.
     note : str
-        What a reader of the folder should know.
+        Remark for readers of the folder.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""The right answers for one drawn table: what must be named, what may be, and what the data contradict."""
+"""The right answers for one simulated table: effects that must be named, may be named, or are contradicted."""
 
 from dataclasses import dataclass
 
@@ -10,34 +10,35 @@ from tests.benchmarks.world.nearest import Judge
 from tests.benchmarks.world.rig import Rig
 
 NEAR, FAR = 4.0, 20.0
-"""Squared whitened distances, as in the hidden-effect benchmark: nearer than 4 cannot be told, farther than 20 can."""
+"""Squared whitened distances, as in the benchmark `hidden`: below 4 indistinguishable, above 20 distinguishable."""
 AS_GOOD = 1.5
-"""Where the truth's own form leaves something, a set that leaves at most half as much again is as good a form."""
+"""If the catalogue's formula of the true effects leaves a residual, a set with at most 1.5 times this residual counts
+as equivalent."""
 BESIDE_OUTSIDE = frozenset({"friction_hysteresis", "thermal_drift"})
-"""What a careful reader may say of a part of a thing outside: a loop, a change with time."""
+"""Effects that may be named for a part of an effect outside the catalogue: a loop, a change with time."""
 LAGS = frozenset({"drive_lag", "camera_latency"})
-"""A dead time before a stage or after it: nothing between the two knows the time of day."""
+"""Dead times before and after a stage, which are equivalent if nothing in between depends on time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RightAnswers:
-    """What may be said of a table.
+    """Right answers for a table.
 
     Parameters
     ----------
     core : tuple of frozenset of str
-        For each effect that is needed, the names that are exchangeable with it; the first set's members are each one
-        answer.
+        For each required effect, the names that are equivalent to it.
     needed : frozenset of str
-        The hidden effects that are needed.
+        Simulated effects that are required.
     allowed : frozenset of str
-        What may stand beside them: hidden effects too small to be needed, and the line that a map may have.
+        Effects that may be named in addition: simulated effects too small to be required, and the line that a map may
+        have.
     nothing : float
-        Distance of no effect at all.
+        Distance of the model without an effect.
     own : float
-        What the catalogue's form of the hidden effects leaves.
+        Distance that the catalogue's formulas of the simulated effects leave.
     parameters : dict
-        The hidden effects in the catalogue's form, by name.
+        Parameters of the simulated effects by the catalogue's formulas, by name.
     """
 
     core: tuple[frozenset[str], ...]
@@ -49,12 +50,12 @@ class RightAnswers:
 
 
 def threshold(own: float) -> float:
-    """Distance up to which another set is as good as the truth."""
+    """Distance up to which another set counts as equivalent to the truth."""
     return AS_GOOD * own + FAR
 
 
 def begin_of(rig: Rig, judge: Judge) -> Effects:
-    """The drawn parameters as a beginning of the fit of the truth's own form."""
+    """Simulated parameters as starting values of the fit of the catalogue's formulas."""
     begin: Effects = {}
     for h in rig.hidden:
         if h.name in judge.known:
@@ -65,7 +66,7 @@ def begin_of(rig: Rig, judge: Judge) -> Effects:
 
 
 def right_answers(rig: Rig) -> tuple[RightAnswers, Judge]:
-    """Judge a table from its truth."""
+    """Find the right answers for a table from its truth."""
     judge = Judge.of(rig)
     nothing = judge.nearest(frozenset()).distance
     own = judge.nearest(rig.names, begin_of(rig, judge))
@@ -73,7 +74,7 @@ def right_answers(rig: Rig) -> tuple[RightAnswers, Judge]:
     if MAP in rig.names or rig.outside:
         allowed |= OFFSETS | RATIOS
     if rig.run_gain:
-        # The gains of a few runs have a mean of their own.
+        # The mean of the gains of a few runs is not zero.
         allowed |= RATIOS
     if rig.outside:
         allowed |= BESIDE_OUTSIDE
@@ -96,7 +97,7 @@ def right_answers(rig: Rig) -> tuple[RightAnswers, Judge]:
             if found.distance < limit:
                 same.add(other)
         core.append(frozenset(same | (LAGS if same & LAGS else set())))
-    # What merely stands for something too small to be needed may be said by any of its family.
+    # An effect too small to be required may be replaced by any equivalent effect.
     for family in (OFFSETS, RATIOS):
         if allowed & family:
             allowed |= family
@@ -105,7 +106,7 @@ def right_answers(rig: Rig) -> tuple[RightAnswers, Judge]:
 
 
 def outside_enough(rig: Rig, judge: Judge, least: float = 25.0) -> bool:
-    """Whether no single effect, and no pair with a play, a map or a drift, comes near."""
+    """Whether no single effect, and no pair with a play, a map or a drift, is close to the truth."""
     helpers = [n for n in ("backlash", MAP, "thermal_drift") if n in judge.known or n == MAP]
     for name in [*judge.known, MAP]:
         for more in [(), *[(h,) for h in helpers]]:

@@ -1,9 +1,10 @@
-"""Ask the tool about drawn rigs and print a table of marks.
+"""Diagnose simulated tables, and print a table of marks.
 
     python -m tests.benchmarks.world.run --seed 1 --tables 20 --rows iso_cycles,sparse --jobs 2 --minutes 30
 
-Tables and answers are kept under --out: a run may be stopped and goes on, --minutes 0 prints what is kept, --again asks
-anew. --tables-from DIR takes drawn tables from another folder. Build with seeds below 1000, judge with others.
+Tables and answers are stored under --out, so that a run may be stopped and continued. With --minutes 0 the stored
+results are printed; with --again the diagnoses are repeated. With --tables-from DIR the tables of another folder are
+used. Seeds below 1000 are for development, other seeds for results.
 """
 
 import argparse
@@ -28,7 +29,7 @@ NAMES = ("named", "ambiguous")
 
 
 def work(row: str, seed: int, index: int, tables: Path, answers: Path, again: bool, kept_only: bool) -> Result | None:
-    """Draw, ask and mark one table; None where only kept answers are wanted and there is none."""
+    """Draw, diagnose and mark one table; None if only stored answers are requested and there is none."""
     folder, out = tables / f"{row}_{index}", answers / f"{row}_{index}"
     if kept_only and not (out / "answer.json").exists():
         return None
@@ -47,7 +48,7 @@ def work(row: str, seed: int, index: int, tables: Path, answers: Path, again: bo
 
 
 def row_lines(row: str, found: list[Result]) -> list[str]:
-    """The row's figures."""
+    """Lines with the results of a row."""
     null = [r for r in found if not r["hidden"] and not r["outside"]]
     inside = [r for r in found if r["hidden"] and not r["outside"]]
     outside = [r for r in found if r["outside"]]
@@ -90,7 +91,7 @@ def row_lines(row: str, found: list[Result]) -> list[str]:
 
 
 def summary(found: list[Result]) -> list[str]:
-    """All rows together, against the issue's bars."""
+    """Summary of all rows, compared with the required values."""
     lines = ["all rows", *row_lines("all", found)[1:]] if found else ["no answers"]
     seconds = [r["seconds"] for r in found]
     if seconds:
@@ -100,7 +101,7 @@ def summary(found: list[Result]) -> list[str]:
 
 
 def tell(r: Result) -> None:
-    """One line for an answer that is not right."""
+    """Line that describes an answer that is not right."""
     if r["result"] in ("right", "exact", "set"):
         return
     hidden = "+".join(r["hidden"]) or ("outside" if r["outside"] else "-")
@@ -110,7 +111,7 @@ def tell(r: Result) -> None:
 
 
 def main() -> None:
-    """Read the options, work, print."""
+    """Read the options, process the tables, and print the results."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--tables", type=int, default=6, help="tables a row")
@@ -131,7 +132,7 @@ def main() -> None:
     tables = chosen.tables_from.absolute() if chosen.tables_from else base / "tables"
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     begun, found = time.perf_counter(), list[Result]()
-    # The rows grow together: a run that is stopped has as many tables of each.
+    # All rows are processed in turn, so that an interrupted run has equal numbers of tables for each row.
     tasks = [(row, index) for index in range(chosen.first, chosen.first + chosen.tables) for row in rows]
     with ProcessPoolExecutor(chosen.jobs) as pool:
         kept_only = chosen.minutes == 0

@@ -1,6 +1,7 @@
-"""Tables that a careful metrologist would not trust: times that say nothing, other units, rows that are wrong.
+"""Tables with poor data: meaningless times, other units, wrong rows.
 
-The tool may refuse those with a sentence (exit code 1), or leave what needs times unsaid; it may not name confidently.
+A right answer refuses the table with a sentence (exit code 1), or does not use the times; no effect may be named with
+confidence.
 """
 
 from dataclasses import replace
@@ -17,7 +18,7 @@ KINDS = ("equal times", "whole seconds", "one visit", "micrometres", "two thirds
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """One of the five."""
+    """Draw one of the five kinds of table."""
     kind = str(rng.choice(KINDS))
     match kind:
         case "equal times":
@@ -44,7 +45,7 @@ def _stage(rng: np.random.Generator, kind: str) -> Rig:
 
 
 def _one_visit(rng: np.random.Generator, kind: str) -> Rig:
-    """Thirty places, each read once on one way up."""
+    """Thirty positions, each read once in one upward motion."""
     ends = draw_targets(rng)
     targets = np.linspace(ends[0], ends[-1], 30).round(3)
     seen = np.ones(targets.size, dtype=bool)
@@ -56,7 +57,7 @@ def _one_visit(rng: np.random.Generator, kind: str) -> Rig:
 
 
 def _mostly_wrong(rng: np.random.Generator, kind: str) -> Rig:
-    """Two rows of three hold anything at all."""
+    """Table in which two of three rows have arbitrary values."""
     stations, targets = draw_stations(rng, listed=False)
     reading = draw_reading(rng, targets, "line", zeroed=False, kind=kind)
     rig = read_at_rest(rng, stations, Parts(), reading)

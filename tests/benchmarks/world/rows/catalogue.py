@@ -49,4 +49,4 @@ ENCODER_KINDS: dict[str, Callable[[np.random.Generator], Rig]] = {
     for true_zero in (True, False)
     for jitter_um in (0, 1, 3)
 }
-"""Six kinds of encoder, drawn on demand only (`--rows encoder_kinds`)."""
+"""Six kinds of encoder, used only on request (`--rows encoder_kinds`)."""

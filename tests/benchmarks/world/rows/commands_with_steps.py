@@ -1,6 +1,6 @@
-"""A servo that follows commands: steps, staircases and ramps, after a dead time and at a limited speed.
+"""A servo that follows commands (steps, staircases and ramps) after a dead time and at a limited speed.
 
-The input is the command at the moment of each log line; a step is commanded at its line, not before.
+The input is the command at the time of each row; a step is commanded at the time of its row, not before.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from tests.benchmarks.world.moving import Motion, line_over, moving_rig
 from tests.benchmarks.world.rig import Array, Hidden, Path, Rig
 
 CORNER_S = 1e-6
-"""A step of the command takes this long."""
+"""Duration (s) of a step of the command."""
 
 
 def _command(rng: np.random.Generator, shape: str, size: float, hold_s: float, total_s: float, t: Array) -> Array:
@@ -27,7 +27,7 @@ def _command(rng: np.random.Generator, shape: str, size: float, hold_s: float, t
 
 
 def _path(time: Array, asked: Array, *, stepwise: bool) -> Path:
-    """The rows, and before each step a corner at the old command."""
+    """Path of the rows, with an additional corner at the old command before each step."""
     steps = np.flatnonzero(np.diff(asked)) + 1 if stepwise else np.zeros(0, dtype=int)
     every = np.concatenate([time, time[steps] - CORNER_S])
     order = np.argsort(every)
@@ -39,7 +39,7 @@ def _path(time: Array, asked: Array, *, stepwise: bool) -> Path:
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """Dead time with or without a limit of speed; a tenth follow at once."""
+    """Dead time with or without a limit of speed; a tenth of the tables are without an effect."""
     rate = float(rng.uniform(10, 50))
     count = int(rng.integers(250, 700))
     time = (np.arange(count) + rng.uniform(-0.02, 0.02, count)) / rate
@@ -48,7 +48,7 @@ def draw(rng: np.random.Generator) -> Rig:
     size = log_uniform(rng, 1.0, 10.0)
     hold_s = float(rng.uniform(1.0, 3.0))
     asked = _command(rng, shape, size, hold_s, float(time[-1]), time)
-    # Between two lines a step holds the last command and a ramp goes on.
+    # Between two rows, the command is constant for steps, and continues for ramps.
     stepwise = shape != "ramps"
     path = _path(time, asked, stepwise=stepwise)
     nothing = rng.random() < 0.1

@@ -1,4 +1,4 @@
-"""Inputs recorded by an encoder of 10 to 50 um whose zero lies anywhere within a step, with jitter on the record."""
+"""Inputs recorded by an encoder of 10 to 50 um whose zero lies anywhere within a step, with jitter."""
 
 from dataclasses import replace
 
@@ -14,7 +14,9 @@ from tests.benchmarks.world.rows.free_start import draw_start
 def drawn_with(
     rng: np.random.Generator, step_mm: float, jitter_mm: float, play_mm: float, *, kind: str, true_zero: bool
 ) -> Rig:
-    """A lever behind a stage with play; `true_zero` keeps the record right on average, else its zero is off."""
+    """A lever driven by a stage with play; with `true_zero` the mean of the record is right, otherwise it has an
+    offset.
+    """
     slope = log_uniform(rng, 1.0, 8.0)
     width = float(rng.uniform(1.0, 3.0))
     rate = float(rng.uniform(5, 20))
@@ -39,7 +41,7 @@ def drawn_with(
     hidden: tuple[Hidden, ...] = () if true_zero else (Hidden("input_offset", {"offset_mm": zero}),)
     if play_mm:
         hidden += (Hidden("backlash", {"play_mm": play_mm}),)
-    # What the record says but for rounding and jitter: its zero is off by an offset of the input.
+    # The record without rounding and jitter: its zero differs by an offset of the input.
     said = motion if true_zero else replace(motion, input_mm=motion.input_mm - zero)
     return moving_rig(
         said, recorded, clean, gap, simulation, hidden,
@@ -48,7 +50,7 @@ def drawn_with(
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """Steps of 10 to 50 um, jitter of 1 to 5, a play of 20 to 150 um; a tenth hide nothing."""
+    """Steps of 10 to 50 um, jitter of 1 to 5 um, a play of 20 to 150 um; a tenth of the tables have no effect."""
     step, jitter = float(rng.uniform(0.01, 0.05)), float(rng.uniform(0.001, 0.005))
     nothing = rng.random() < 0.1
     true_zero = nothing or bool(rng.random() < 0.6)
@@ -58,11 +60,11 @@ def draw(rng: np.random.Generator) -> Rig:
 
 
 def draw_bar(rng: np.random.Generator) -> Rig:
-    """The issue's bar: a step of 30 um, a jitter of 3 um, a play of 50 um."""
+    """Fixed case with required results: a step of 30 um, a jitter of 3 um, a play of 50 um."""
     true_zero = bool(rng.random() < 0.5)
     return drawn_with(rng, 0.03, 0.003, 0.05, kind="true zero" if true_zero else "zero off", true_zero=true_zero)
 
 
 def draw_kind(rng: np.random.Generator, jitter_mm: float, *, true_zero: bool) -> Rig:
-    """One of the six kinds of encoder: a step of 30 um and a play of 50 um, zero on or off a step, and jitter."""
+    """One of six kinds of encoder, with a step of 30 um and a play of 50 um: zero on or off a step, various jitter."""
     return drawn_with(rng, 0.03, jitter_mm, 0.05, kind="true zero" if true_zero else "zero off", true_zero=true_zero)

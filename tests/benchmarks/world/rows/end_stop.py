@@ -1,4 +1,4 @@
-"""A servo or stage that is driven into its stop while the command moves on; readings in whole counts."""
+"""A servo or stage that is driven into its end stop while the command continues; readings in whole counts."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from tests.benchmarks.world.rig import Hidden, Rig
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """One way or there and back, at an end or at neither (a seventh)."""
+    """Motion in one or both directions, with a stop at one end, or without a stop (a seventh of the tables)."""
     width = log_uniform(rng, 0.5, 5.0)
     count = int(rng.integers(60, 200))
     low = float(rng.choice([0.0, -width, -0.5 * width]))
@@ -33,7 +33,7 @@ def draw(rng: np.random.Generator) -> Rig:
     zero = float(np.ceil(1.5 - low))
     clean = zero + place
     noisy = clean + noise * rng.standard_normal(u.size)
-    # A stage that presses against its stop does not shake.
+    # A stage that presses against its stop has no jitter.
     gap = physics.rounded(np.where(stands, clean, noisy), counts)
     motion = Motion(time, u, np.zeros(u.size, dtype=np.int64))
     return moving_rig(

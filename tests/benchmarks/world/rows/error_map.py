@@ -1,4 +1,6 @@
-"""Continuous strokes of a stage with a smooth map of position errors, mostly with play; several cycles both ways."""
+"""Continuous strokes of a stage with a smooth map of position errors, mostly with play; several cycles in both
+directions.
+"""
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from tests.benchmarks.world.rows.free_start import draw_start
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """Map and play, a map alone, or (a tenth) nothing."""
+    """Map and play, a map alone, or no effect (a tenth of the tables)."""
     width = log_uniform(rng, 2.0, 100.0)
     cycles = int(rng.integers(2, 5))
     rate = float(rng.choice([10.0, 20.0, 50.0]))

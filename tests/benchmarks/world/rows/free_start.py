@@ -1,4 +1,4 @@
-"""Dense records of a stage or rotary table whose play or friction stands anywhere at the start, mostly at an end."""
+"""Dense records of a stage or rotary table whose play or friction has any start state, mostly at an end."""
 
 import numpy as np
 
@@ -11,12 +11,12 @@ RATES_HZ = (10.0, 25.0, 50.0)
 
 
 def draw_start(rng: np.random.Generator) -> float:
-    """At an end in two of three records."""
+    """Start state, at one of the ends in two of three records."""
     return float(rng.choice([-1.0, 1.0])) if rng.random() < 0.67 else float(rng.uniform(-1, 1))
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """Play, a friction loop, or nothing; a third of the references are zeroed where the record begins."""
+    """Play, a friction loop, or no effect; in a third of the tables, the reference is set to zero at the first row."""
     width = log_uniform(rng, 0.2, 20.0)
     rate = float(rng.choice(RATES_HZ))
     way = float(rng.choice([-1, 1]))
@@ -31,7 +31,7 @@ def draw(rng: np.random.Generator) -> Rig:
     motion = joined(runs)
     noise = log_uniform(rng, 0.0003, 0.003)
     kind = str(rng.choice(["play", "play", "play", "friction", "null"]))
-    # Not more than two fifths of the travel: the play must be taken up somewhere.
+    # Not more than two fifths of the travel, so that the play is taken up within the travel.
     play = min(log_uniform(rng, 0.005, 0.1), 0.4 * width)
     fraction, reach = float(rng.uniform(0.05, 0.4)), width * float(rng.uniform(0.05, 0.4))
     place = motion.input_mm.copy()

@@ -1,4 +1,4 @@
-"""Hours of sparse readings while something warms up; or nothing but a reading noise that wanders."""
+"""Hours of sparse readings during a warming, or with slowly varying reading noise only."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tests.benchmarks.world.rig import Rig
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """A few places in turn, minutes apart; a third hide nothing but slow noise."""
+    """A few positions in turn, minutes apart; a third of the tables have slow noise only."""
     count = int(rng.integers(60, 160))
     every_s = float(rng.uniform(40, 200))
     places = np.linspace(0, log_uniform(rng, 1.0, 50.0), int(rng.integers(2, 6))).round(3)

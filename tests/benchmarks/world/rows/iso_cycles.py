@@ -1,4 +1,4 @@
-"""ISO 230-2 cycles of a linear stage against a laser: targets, both directions, overshoots listed without a gap."""
+"""ISO 230-2 cycles of a linear stage measured with a laser: both directions, overshoots as rows without a gap."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from tests.benchmarks.world.rig import Array, Rig
 
 
 def draw_targets(rng: np.random.Generator) -> Array:
-    """Five to eleven targets; evenly spaced, or with the random parts that ISO 230-2 asks for."""
+    """Five to eleven targets, evenly spaced, or with the random shifts that ISO 230-2 requires."""
     travel = log_uniform(rng, 8.0, 300.0)
     count = int(rng.integers(5, 12))
     low = float(rng.choice([0.0, -travel / 2, 0.05 * travel]))
@@ -19,7 +19,7 @@ def draw_targets(rng: np.random.Generator) -> Array:
 
 
 def draw_stations(rng: np.random.Generator, *, listed: bool = True) -> tuple[Stations, Array]:
-    """Cycles of a stage and its targets."""
+    """Stations of ISO 230-2 cycles, and their targets."""
     targets = draw_targets(rng)
     dwell_s, move_s = float(rng.uniform(5, 40)), float(rng.uniform(4, 8))
     if rng.random() < 0.3:
@@ -30,7 +30,7 @@ def draw_stations(rng: np.random.Generator, *, listed: bool = True) -> tuple[Sta
 
 def draw_parts(rng: np.random.Generator, stations: Stations, targets: Array, *, play: float, bent: float,
                warm: float, scaled: float) -> Parts:  # fmt: skip
-    """Parts of a stage, each there with its probability."""
+    """Errors of a stage, each present with a given probability."""
     total_s = float(np.ptp(stations.time_s))
     sizes = {"error_map": None}
     if rng.random() < bent:
@@ -47,7 +47,7 @@ def draw_parts(rng: np.random.Generator, stations: Stations, targets: Array, *, 
 
 
 def draw_reading(rng: np.random.Generator, targets: Array, simulation: str, *, zeroed: bool, kind: str) -> Reading:
-    """A laser's noise and last digit."""
+    """Noise and last digit of a laser."""
     noise = log_uniform(rng, 0.0002, 0.005)
     resolution = float(rng.choice([1e-6, 1e-5, 1e-4, 1e-3]))
     resolution = min(resolution, 10 ** np.floor(np.log10(noise)))
@@ -55,7 +55,7 @@ def draw_reading(rng: np.random.Generator, targets: Array, simulation: str, *, z
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """One stage; a fifth hide nothing."""
+    """Table of one stage; a fifth of the tables are without an effect."""
     stations, targets = draw_stations(rng)
     simulation = str(rng.choice(["line", "map"]))
     nothing = rng.random() < 0.2

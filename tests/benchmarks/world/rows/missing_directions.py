@@ -1,4 +1,4 @@
-"""Only one direction of each cycle is read; the way back is listed without a gap, or each cycle is a run of its own."""
+"""Only one direction of each cycle is read; the return has rows without a gap, or each cycle is a separate run."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ KINDS = ("null", "play", "map", "scale", "offset", "drift")
 
 
 def one_way(rng: np.random.Generator, stations: Stations, *, upward: bool, way_back: bool) -> Stations:
-    """Readings of one direction alone; without the way back each cycle is a run."""
+    """Readings in one direction only; without the return motion, each cycle is a run."""
     position = stations.position_mm
     rising = np.concatenate([[True], np.diff(position) > 0])
     wanted = stations.read & (rising == upward)
@@ -25,7 +25,7 @@ def one_way(rng: np.random.Generator, stations: Stations, *, upward: bool, way_b
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """A play is engaged throughout: an offset and nothing else."""
+    """Table in which a play is always engaged, so that it is equivalent to an offset."""
     stations, targets = draw_stations(rng)
     way_back = bool(rng.random() < 0.5)
     stations = one_way(rng, stations, upward=bool(rng.random() < 0.5), way_back=way_back)

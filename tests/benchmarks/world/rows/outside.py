@@ -1,4 +1,4 @@
-"""What no entry of the catalogue is: play that depends on the place, run-in, dead-band stairs, dry damping."""
+"""Effects outside the catalogue: play that depends on position, run-in, steps of a dead band, dry damping."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from tests.benchmarks.world.rows.iso_cycles import draw_stations
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """One of the four."""
+    """Draw a table with one of the four effects."""
     return (_place_dependent_play, _run_in, _stairs, _dry_damping)[int(rng.integers(4))](rng)
 
 

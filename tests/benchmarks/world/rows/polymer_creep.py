@@ -1,4 +1,4 @@
-"""A polymer finger: holds after steps, a generalised Maxwell solid; the gain differs a little from run to run."""
+"""A polymer finger (generalised Maxwell solid) with holds after steps; the gain differs slightly between runs."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def _held(rng: np.random.Generator, width: float, rate: float) -> tuple[Array, A
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """Creep in the catalogue's four times or in three others, or (a seventh) none."""
+    """Creep with the catalogue's four time constants or with three others, or no creep (a seventh of the tables)."""
     width, rate = log_uniform(rng, 0.5, 5.0), float(rng.choice([5.0, 10.0]))
     motion = joined([_held(rng, width, rate) for _ in range(int(rng.integers(2, 5)))])
     nothing = rng.random() < 0.14

@@ -1,4 +1,4 @@
-"""One way at constant speed past a resolver whose error repeats with its turn."""
+"""Motion in one direction at constant speed, measured by a resolver with a cyclic error."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from tests.benchmarks.world.rig import Hidden, Rig
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """A ripple, or (a seventh) none; a third have a weak second harmonic."""
+    """A cyclic error, in a third of the tables with a weak second harmonic, or no effect (a seventh of the tables)."""
     period = log_uniform(rng, 0.05, 2.0)
     per_period = float(rng.uniform(12, 50))
     count = int(rng.integers(300, 1400))

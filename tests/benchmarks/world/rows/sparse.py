@@ -1,4 +1,4 @@
-"""Forty to a hundred readings at rest, seconds apart, nothing listed but the readings; one effect or none."""
+"""Forty to a hundred readings at rest, seconds apart, without other rows; one effect or none."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def _up_and_down(rng: np.random.Generator, both: bool) -> tuple[Stations, np.nda
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """One stage, or a set-up stage by hand."""
+    """Table of a motorised stage, or of a stage that is set by hand."""
     both = bool(rng.random() < 0.6)
     stations, targets = _up_and_down(rng, both)
     kind = str(rng.choice(KINDS))
@@ -35,7 +35,7 @@ def draw(rng: np.random.Generator) -> Rig:
 
 
 def one_part(rng: np.random.Generator, kind: str, reading: Reading, targets: np.ndarray) -> Parts:
-    """A single hidden thing, 2 to 30 times the noise of a reading."""
+    """A single effect, 2 to 30 times the noise of a reading."""
     size = reading.noise_mm * log_uniform(rng, 2.0, 30.0)
     sign = float(rng.choice([-1, 1]))
     parts = Parts(start=float(rng.choice([-1.0, 1.0, rng.uniform(-1, 1)])))

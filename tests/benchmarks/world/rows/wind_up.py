@@ -1,6 +1,6 @@
-"""Slits against a resolver: a sweep both ways, then places approached again and again from below and from above.
+"""Slits measured against a resolver: a sweep in both directions, then positions approached repeatedly from both sides.
 
-Play or wind-up of 0.3 to 3 um under a noise of 0.03 um; the report prints four digits.
+Play or wind-up is 0.3 to 3 um, the noise 0.03 um; readings have four digits.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ def _stations(rng: np.random.Generator) -> Stations:
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """One slit; a sixth hide nothing."""
+    """Table of one slit; a sixth of the tables are without an effect."""
     stations = _stations(rng)
     nothing = rng.random() < 0.16
     noise = float(rng.uniform(0.03, 0.06)) * 1e-3

@@ -1,4 +1,4 @@
-"""Tables turned round: directions swapped, the input mirrored, the gap mirrored."""
+"""Tables with a wrong sign: directions exchanged, the input mirrored, or the gap mirrored."""
 
 from dataclasses import replace
 
@@ -11,12 +11,12 @@ from tests.benchmarks.world.rows.iso_cycles import draw_stations
 
 
 def draw(rng: np.random.Generator) -> Rig:
-    """One of the three."""
+    """Draw one of the three kinds of table."""
     return (_directions, _input, _gap)[int(rng.integers(3))](rng)
 
 
 def _directions(rng: np.random.Generator) -> Rig:
-    """The report calls forward what was an approach from above: a play with the wrong sign."""
+    """Approaches from above are called forward, so that a play has the wrong sign."""
     stations, targets = draw_stations(rng, listed=bool(rng.random() < 0.6))
     noise = log_uniform(rng, 0.0002, 0.002)
     play = noise * log_uniform(rng, 10.0, 40.0)
@@ -29,7 +29,7 @@ def _directions(rng: np.random.Generator) -> Rig:
 
 
 def _input(rng: np.random.Generator) -> Rig:
-    """The input's sign is turned round about zero; the stage is sound."""
+    """The input has the wrong sign; the stage is without an error."""
     width, rate = log_uniform(rng, 1.0, 10.0), 20.0
     corners = width * np.array([0.0, 0.6, -0.4, 0.5, 0.0])
     motion = joined([smooth_strokes(corners, width / rng.uniform(4, 8), rate)])
@@ -47,7 +47,7 @@ def _input(rng: np.random.Generator) -> Rig:
 
 
 def _gap(rng: np.random.Generator) -> Rig:
-    """The gap falls where it should rise: an encoder read the other way round, its zero at the middle."""
+    """The gap decreases instead of increasing, as for an encoder with reversed direction and its zero in the middle."""
     width, rate = log_uniform(rng, 1.0, 10.0), 20.0
     corners = width * np.array([0.0, 1.0, 0.0, 0.6, 0.1])
     motion = joined([smooth_strokes(corners, width / rng.uniform(4, 8), rate)])
