@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.loops import loop
-from fingervision.domain.quantiser import Quantiser
+from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.median import middle
 from fingervision.vision.orientation import Orientation

@@ -1,6 +1,6 @@
 """Side walls that broaden the inner flanks of both fingers and leave the outer ones as they are."""
 
-import numpy as np
+from math import hypot
 
 from fingervision.vision.blur_uncertainty import Displacement
 from fingervision.vision.edge_moves import are_of_size, beyond_wall, moved_by_wall, moved_edges, with_blur
@@ -38,7 +38,7 @@ def with_narrow_wall(
         wide.append(best_fit(STEP, own, weight, blur))
         widths.append(best_fit(STEP, other, weight, blur).blur)
         parts = [u_squared_width(p, weight, blur, by_codec) for p in (own, other)]
-        u_more.append(float(np.hypot(*parts)))
+        u_more.append(hypot(*parts))
     more = [step.blur**2 - width**2 for step, width in zip(wide, widths, strict=True)]
     if any(each < max(WIDER * width**2, SURE * u) for each, width, u in zip(more, widths, u_more, strict=True)):
         return None

@@ -151,7 +151,7 @@ def with_profile(
             step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
             for step, fit, (profile, _, _) in zip(steps, wall, profiles, strict=True)
         ]
-        if has_strip[0] != has_strip[1]:
+        if is_strip[0] != is_strip[1]:
             return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
             # The flanks are more blurred than the tips, because of a wall or of motion, which cannot be distinguished
