@@ -104,7 +104,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             listed = ", ".join(f"'{raw.columns[k].name}'" for k in free[:12]) + (" ..." if len(free) > 12 else "")
             about.questions.append(
                 Question(
-                    f"no column is called as the {role} is (the columns are {listed or 'taken'})",
+                    f"no column has a usual name for the {role} (the columns are {listed or 'taken'})",
                     f"columns.{role}={suggest(role, free) if free else 'NAME'}",
                     CANONICAL[role],
                 )
