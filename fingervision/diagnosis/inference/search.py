@@ -41,6 +41,8 @@ LIKELIEST = 6
 """Explanations, best first, among which Schwarz's criterion chooses: those of one prediction are seldom more."""
 TRIPLES_REFITTED = 24
 """Triples refitted jointly, those first whose signatures take the most: a fifth of what all pairs would be."""
+EVEN_ODDS = 6.0
+"""Difference of BIC below which the data do not speak for either explanation: odds of 20 to 1."""
 BASES = 14
 """Number of single effects to which a second effect is added."""
 
@@ -241,4 +243,7 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     holding = [explanation for explanation in found if able <= set(explanation.names)]
     begin = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able} | dict(state.best.values)
     together = fit(problem, tuple(begin), begin, iterations=20)
-    return replace(state, best=likeliest([*holding, together], state.values), imitation=None)
+    best = likeliest([*holding, together], state.values)
+    # As good as any: what the data name by themselves stays, and a required scale is not set off against another one.
+    beside = together.bic(state.values) - best.bic(state.values) < EVEN_ODDS
+    return replace(state, best=together if beside else best, imitation=None)
