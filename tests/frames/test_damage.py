@@ -1,4 +1,4 @@
-"""Damaged recordings: every frame that is passed on as undamaged shows the undamaged recording's picture of that time."""
+"""Damaged recordings: every frame passed on as undamaged shows the undamaged recording's picture of that time."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -48,7 +48,7 @@ def read(path: Path) -> list[Frame | LostFrame]:
 
 
 def nothing_wrong(path: Path, change: Callable[[bytearray], object]) -> tuple[list[Frame | LostFrame], int]:
-    """Read the file with a fault; every undamaged frame must equal that of the file without the fault at the same time."""
+    """Read the file with a fault; every undamaged frame must equal that of the intact file at the same time."""
     truth = {item.time_s: item.pixels for item in read(path) if isinstance(item, Frame)}
     assert len(truth) == COUNT
     content = bytearray(path.read_bytes())

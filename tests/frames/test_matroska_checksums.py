@@ -1,4 +1,4 @@
-"""Checksums of Matroska clusters: for a codec without own checksums, the cluster is lost and no wrong picture is shown."""
+"""Checksums of Matroska clusters: for a codec without own checksums, the cluster is lost no wrong picture shown."""
 
 from fractions import Fraction
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Pictures of a camera with gamma, drawn by the third renderer: with known and assumed response, at several bit depths."""
+"""Pictures of a camera with gamma, drawn by the third renderer: known or assumed response, several bit depths."""
 
 import numpy as np
 import pytest

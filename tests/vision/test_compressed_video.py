@@ -1,4 +1,4 @@
-"""The errors in compressed recordings are below two uncertainties, even if an edge is parallel to the codec's blocks."""
+"""Errors in compressed recordings are below two uncertainties, even if an edge is parallel to the codec's blocks."""
 
 from dataclasses import replace
 

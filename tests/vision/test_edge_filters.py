@@ -1,4 +1,4 @@
-"""The table of linear filters against an ordinary least-squares fit, on edges that were integrated by another method."""
+"""The table of linear filters against an ordinary least-squares fit, on edges integrated by another method."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Sides of a body with another blur than the other sides: a shadow's effect is detected, a lens's effect is accepted."""
+"""Sides of a body with another blur than the other sides: a shadow is detected, a lens's effect accepted."""
 
 import numpy as np
 import pytest

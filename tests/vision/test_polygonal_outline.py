@@ -21,7 +21,7 @@ DEPTH = 2e-3
 
 
 def _chamfered(rng: np.random.Generator, cut_px: float, deep_px: float) -> OutlinePoints:
-    """Points of a finger 80 px wide with two chamfers and its inner flank at x = 0: rows on flanks, columns on the top."""
+    """Points of a finger 80 px wide with two chamfers and its inner flank at x = 0: rows on flanks, columns on top."""
     corners = np.array(
         [(-80.0, 60.0), (-80.0, deep_px), (-80.0 + cut_px, 0.0), (-cut_px, 0.0), (0.0, deep_px), (0.0, 60.0)]
     )

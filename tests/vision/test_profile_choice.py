@@ -117,7 +117,7 @@ def test_a_wall_in_a_lossy_clip_is_stated(breadth_px: float, tmp_path: Path) -> 
 
 
 def test_the_sample_has_no_wall_where_its_outer_flanks_leave_the_picture() -> None:
-    """The codec increases the squared blur of flanks relative to tips by up to 15 %, which its quantiser steps permit."""
+    """The codec increases the squared blur of flanks relative to tips by up to 15 %, as its quantiser steps permit."""
     frames = islice(VideoFile(str(SAMPLE)), 98, 134)
     found = [measure_frame(frame, Settings(BELOW_PX)) for frame in frames if isinstance(frame, Frame)]
     assert [each.beside for each in found if isinstance(each, GapMeasurement)] == [""] * 36

@@ -16,7 +16,7 @@ ROUGH = 0.2
 
 
 def outline(is_cut: bool, rng: np.random.Generator) -> OutlinePoints:
-    """Points in rows and columns, with independent scatter, of a vertical bar from x = -90 to 0 with its top at y = 0."""
+    """Points in rows and columns, with independent scatter, of an upright bar from x = -90 to 0, its top at y = 0."""
     y, x = np.arange(0.5, 50.0), np.arange(-WIDTH + 0.5, 0.0)
 
     def inset(d: np.ndarray) -> np.ndarray:

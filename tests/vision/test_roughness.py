@@ -91,7 +91,7 @@ def rounded(rng: np.random.Generator, errors: Roughness, radius: float) -> tuple
 
 
 def test_a_rough_fillet_is_as_sure_as_it_says() -> None:
-    """Errors of tip and edge on a slanted fillet due to waves of known covariance, in units of the stated uncertainty."""
+    """Errors of tip and edge on a slanted fillet with waves of known covariance, in stated uncertainties."""
     errors = Roughness(0.3**2 * np.exp(-0.5 * (np.arange(65.0) / 4.0) ** 2))
     rng, below, radius = np.random.default_rng(21), 6.0, 25.0
     truth = np.array((0.0, np.sqrt(radius**2 - (radius - below) ** 2) - radius))
@@ -108,7 +108,7 @@ def test_a_rough_fillet_is_as_sure_as_it_says() -> None:
 
 
 def test_a_row_sees_more_of_roughness_on_a_slant() -> None:
-    """On a fillet at 45 degrees, a point moves along its row by sqrt(2) times the edge's displacement along its normal."""
+    """On a fillet at 45 degrees, a point moves along its row by sqrt(2) times the edge's normal displacement."""
     errors, radius = Roughness(0.3**2 * np.exp(-0.5 * (np.arange(65.0) / 4.0) ** 2)), 25.0
     points = rounded(np.random.default_rng(1), errors, radius)[1]
     at_45 = np.argmin(np.abs(points.y[points.side == 0] - (1.0 - np.sqrt(0.5)) * radius))

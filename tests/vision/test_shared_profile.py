@@ -1,4 +1,4 @@
-"""An error that all rows of an edge share appears in their mean residual, which is insignificant in ordinary pictures."""
+"""An error that all rows of an edge share appears in their mean residual, insignificant in ordinary pictures."""
 
 import cv2
 import numpy as np
