@@ -1,4 +1,4 @@
-"""The page in Firefox: live view, run folder and recording on three screens and in both colour schemes, without errors."""
+"""The page in Firefox: live view, run folder and recording on three screens, in both colour schemes, no errors."""
 
 import csv
 import os
