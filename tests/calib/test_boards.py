@@ -1,4 +1,4 @@
-"""Boards: rendered and photographed ones, lens, plane, scale, and other boards refused."""
+"""Calibration boards, rendered and photographed: lens, plane and scale; other boards are refused."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ def rendered(
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.0, 12.0), (8.0, -10.0)])
 def test_one_picture_gives_the_plane(tilt: tuple[float, float]) -> None:
-    """Distances across the whole board come out right however the plane is tilted."""
+    """Distances across the whole board are correct for any tilt of the plane."""
     corners = find_corners(rendered(tilt), BOARD, "board.png")
     fit = scale_from_board([corners], BOARD, FRAME, Limits())
     assert fit.lens is None

@@ -1,4 +1,4 @@
-"""Camera responses: the standards' own numbers, bad curves, and exposures of a drawn scene."""
+"""Camera responses: values stated in the standards, invalid curves, and exposures of a computed scene."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def test_another_depth_is_refused() -> None:
 @pytest.mark.parametrize("exponent", [1.0, 0.7, 1.0 / 2.2])
 @pytest.mark.parametrize("top", [255, 4095])
 def test_exposures_of_a_drawn_scene(exponent: float, top: int) -> None:
-    """Fields of many shades, five exposures, read noise of a thousandth: the curve is found to half a percent."""
+    """With fields of many shades, five exposures and read noise of 0.1 %, the curve is found to 0.5 %."""
     rng = np.random.default_rng(7)
     scene = np.kron(rng.uniform(0.01, 1.0, (16, 20)), np.ones((24, 24)))
     times = [0.1, 0.25, 0.5, 1.0, 2.0]

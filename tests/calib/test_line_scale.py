@@ -1,4 +1,4 @@
-"""A line scale against drawn truth: any direction, tone, width and response; and what is no scale."""
+"""Line scales of known geometry: any direction, tone, width and response; pictures without a scale are refused."""
 
 import cv2
 import numpy as np

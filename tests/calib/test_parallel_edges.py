@@ -1,4 +1,4 @@
-"""The width of rendered and photographed bars against the truth, the bound, and the symmetries of an image."""
+"""Width of rendered and photographed bars, compared with the truth and the Cramer-Rao bound, and under symmetries."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A camera's response from one wedge, or from the shape of edges; no code of the product draws the pictures."""
+"""Camera response from one wedge, or from the shape of edges, in pictures that are drawn by independent code."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def coded(light: NDArray[np.float64], exponent: float, noise: float, rng: np.ran
 
 
 def bar(blur_px: float, angle: float, dark: float = 0.05, light: float = 0.7) -> NDArray[np.float64]:
-    """Light of a dark bar, each pixel the mean of 16 points."""
+    """Light of a dark bar, with each pixel as the mean of 16 points."""
     height, width = 240, 320
     y, x = np.mgrid[0 : height * FINER, 0 : width * FINER].astype(np.float32)
     x, y = (x + 0.5) / FINER - 0.5 - width / 2, (y + 0.5) / FINER - 0.5 - height / 2

@@ -1,4 +1,4 @@
-"""Scale and edge bias from rendered references: truth, polarity, and honest intervals."""
+"""Scale and edge bias from rendered references: true values, polarity, and coverage of the intervals."""
 
 import numpy as np
 import pytest
@@ -80,7 +80,9 @@ def test_one_dark_bar_keeps_the_bias_as_an_uncertainty() -> None:
 
 
 def test_a_single_dark_pin_doubles_the_bias_of_a_light_gap() -> None:
-    """measuring.md, section 4: for a gap as large as the pin the uncertainty is twice the bias's; a slot cancels it."""
+    """measuring.md, section 4: for a gap as large as a reference pin, the uncertainty of the bias counts twice; with a
+    slot as reference it cancels.
+    """
     points = np.array([[[300.0, 240.0], [300.0 + 5 * TRUE_SCALE, 240.0]]])
     u_mm = {}
     for light in (False, True):
@@ -126,7 +128,7 @@ def test_random_and_shared_parts_stay_apart() -> None:
 
 
 def test_the_budget_is_that_of_the_table() -> None:
-    """measuring.md, section 4, the table for a gap of 1 mm; Monte Carlo figures there have two digits."""
+    """Table of measuring.md, section 4, for a gap of 1 mm; the Monte Carlo values in this table have two digits."""
     calibration = scale_from_sizes(
         simulated(TRUE_SCALE, 0.0, ((2.0, False), (5.0, False), (8.0, False))), FRAME, Limits()
     ).calibration

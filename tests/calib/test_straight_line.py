@@ -1,4 +1,4 @@
-"""Certified straight lines, and the laws of a line with errors in both variables."""
+"""Straight lines with certified results, and properties of a line with errors in both variables."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Decoding ahead: order, errors, and an end when nobody reads any more."""
+"""Decoding ahead: order, errors, and the end when the reader stops."""
 
 import threading
 from collections.abc import Iterator

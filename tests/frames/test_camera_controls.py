@@ -1,4 +1,4 @@
-"""What drivers let be set while a camera runs: OpenCV's backends, V4L2's limits, GenICam's features."""
+"""Settings that drivers allow to change while a camera runs: OpenCV's backends, V4L2's limits, GenICam's features."""
 
 from pathlib import Path
 from typing import Any

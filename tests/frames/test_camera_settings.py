@@ -1,4 +1,4 @@
-"""What cameras are asked for and said to do otherwise, with cameras that answer as OpenCV's backends do."""
+"""Requested and reported settings of cameras, tested with simulated cameras that behave like OpenCV's backends."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,7 +19,9 @@ WISH = Wish(25.0, (640, 480), CameraWish("YUYV", exposure_ms=8.0, gain=0.0, focu
 
 
 class UsbCamera:
-    """A camera behind V4L2: steps and limits of its own, -1 for what it has not, everything automatic at first."""
+    """A simulated V4L2 camera with steps and limits, -1 for properties that it lacks, and all automatic modes on at
+    first.
+    """
 
     def __init__(self, *, formats: tuple[float, ...] = (MJPG, YUYV), stubborn: bool = False, lacks: int = -1) -> None:
         self.formats, self.stubborn, self.lacks = formats, stubborn, lacks
@@ -52,7 +54,9 @@ class UsbCamera:
 
 
 class MediaFoundationCamera:
-    """A camera behind Media Foundation: an automatic that is written writes its value, one that is read says 0."""
+    """A simulated Media Foundation camera: setting an automatic mode also changes the value, and a mode is always read
+    as 0.
+    """
 
     def __init__(self) -> None:
         self.values: dict[int, float] = {EXPOSURE: -5.0, FOCUS: 40.0, cv2.CAP_PROP_TEMPERATURE: 5000.0}

@@ -1,4 +1,4 @@
-"""Damaged recordings: what is passed on as whole is what the undamaged recording shows at that time."""
+"""Damaged recordings: every frame passed on as undamaged shows the undamaged recording's picture of that time."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -20,7 +20,7 @@ FFV1 = {"level": "3", "slicecrc": "1"}
 
 
 def film() -> list[NDArray[np.uint8]]:
-    """A pattern that moves, over one that stands: each picture is unlike every other."""
+    """A moving pattern over a resting pattern, so that all pictures differ."""
     x, y = np.meshgrid(np.arange(SIZE_PX[0]), np.arange(SIZE_PX[1]))
     still = np.random.default_rng(4).integers(0, 40, x.shape)
     return [(100 + 60 * np.sin((x + 1.7 * k) / 6.0) * np.cos(y / 7.0) + still).astype(np.uint8) for k in range(COUNT)]
@@ -48,7 +48,7 @@ def read(path: Path) -> list[Frame | LostFrame]:
 
 
 def nothing_wrong(path: Path, change: Callable[[bytearray], object]) -> tuple[list[Frame | LostFrame], int]:
-    """Read the file with a fault in it; every whole frame must show what the file without it shows at its time."""
+    """Read the file with a fault; every undamaged frame must equal that of the intact file at the same time."""
     truth = {item.time_s: item.pixels for item in read(path) if isinstance(item, Frame)}
     assert len(truth) == COUNT
     content = bytearray(path.read_bytes())
@@ -265,7 +265,7 @@ def test_packets_lost_from_a_transport_stream_lose_frames_until_a_key_frame(tmp_
 
 
 def ticks_of(ticks: list[int]) -> list[int]:
-    """Ticks of the pictures that are believed."""
+    """Ticks of the pictures whose times are accepted."""
     blank = av.VideoFrame(16, 16, "gray")
     return [tick for tick, what in believable((tick, blank) for tick in ticks) if isinstance(what, av.VideoFrame)]
 

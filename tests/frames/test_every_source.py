@@ -1,4 +1,4 @@
-"""Every kind of source keeps the contract, on a recording that it opens."""
+"""Every kind of source fulfils the contract, tested with a recording that it can open."""
 
 from contextlib import suppress
 from pathlib import Path

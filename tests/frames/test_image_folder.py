@@ -1,4 +1,4 @@
-"""Folders and globs of images: order, depth, times, and images that are not whole."""
+"""Folders and globs of images: order, bit depth, times, and truncated images."""
 
 from itertools import product
 from pathlib import Path

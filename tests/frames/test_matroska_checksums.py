@@ -1,4 +1,4 @@
-"""Checksums of Matroska's clusters: a codec without any loses the cluster, and shows no wrong picture."""
+"""Checksums of Matroska clusters: for a codec without own checksums, the cluster is lost no wrong picture shown."""
 
 from fractions import Fraction
 from pathlib import Path

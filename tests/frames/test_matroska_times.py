@@ -1,4 +1,4 @@
-"""A cluster's time that is damaged: its frames have no time, and never a wrong one."""
+"""A cluster with a damaged time: its frames have no time, and never a wrong time."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ TIMESTAMP = b"\xe7"
 
 
 def leapt(changed: bytearray, cluster: int, by_ms: int) -> None:
-    """Move the time of a cluster, as one flipped bit does."""
+    """Change the time of a cluster by one flipped bit."""
     at = -1
     for _ in range(cluster + 1):
         at = changed.index(CLUSTER, at + 1)

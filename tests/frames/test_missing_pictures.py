@@ -1,4 +1,4 @@
-"""Pictures that never came: what is passed on as whole is what the whole recording shows at that time."""
+"""Missing pictures: every frame that is passed on as undamaged shows the complete recording's picture of that time."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -29,7 +29,7 @@ KINDS: dict[str, dict[str, str]] = {
 def coded(
     path: Path, coder: str = "libx264", ticks: Sequence[int] = range(COUNT), **options: str
 ) -> dict[float, NDArray[np.uint8]]:
-    """Write a pattern that moves; gives what an undamaged decoder shows, by time."""
+    """Write a moving pattern, and return the decoded pictures of the complete file by time."""
     x, y = np.meshgrid(np.arange(SIZE_PX[0]), np.arange(SIZE_PX[1]))
     still = np.random.default_rng(4).integers(0, 40, x.shape)
     with av.open(str(path), "w") as container:
@@ -45,7 +45,7 @@ def coded(
 
 
 def shown(path: Path) -> dict[float, NDArray[np.uint8]]:
-    """What FFmpeg alone makes of a file."""
+    """Pictures that FFmpeg alone decodes from a file."""
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         assert stream.time_base is not None
@@ -57,7 +57,7 @@ def shown(path: Path) -> dict[float, NDArray[np.uint8]]:
 
 
 def without(path: Path, gone: set[int]) -> Path:
-    """Leave packets out, whole, counted in the order of decoding."""
+    """Remove whole packets, counted in decoding order."""
     fewer = path.with_name(f"fewer{path.suffix}")
     with av.open(str(path)) as whole, av.open(str(fewer), "w") as container:
         stream = whole.streams.video[0]
@@ -71,7 +71,7 @@ def without(path: Path, gone: set[int]) -> Path:
 
 
 def wrong(path: Path, truth: dict[float, NDArray[np.uint8]]) -> list[float]:
-    """Times of frames that are passed on as whole and are not."""
+    """Times of damaged frames that are passed on as undamaged."""
     return [
         item.time_s
         for item in open_source(str(path))
@@ -82,7 +82,7 @@ def wrong(path: Path, truth: dict[float, NDArray[np.uint8]]) -> list[float]:
 
 
 def statuses(path: Path) -> str:
-    """One letter a frame: whole or damaged."""
+    """One letter for each frame: undamaged or damaged."""
     return "".join("." if isinstance(item, Frame) else "x" for item in open_source(str(path)))
 
 

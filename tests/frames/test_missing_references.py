@@ -1,4 +1,4 @@
-"""Whole packets missing where the codec counts nothing: what hangs on them is damaged, and no sound frame is."""
+"""Missing packets of a codec that does not number pictures: dependent frames are reported as damaged, no others."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -83,12 +83,12 @@ def test_a_picture_between_two_others_costs_no_other(tmp_path: Path) -> None:
 
 
 def row(ticks: "np.ndarray", key_every: int = 30) -> list[CodedTime]:
-    """Packets without numbers, as VP9 has them."""
+    """Packets without picture numbers, as in VP9."""
     return [CodedTime(int(tick), number % key_every == 0) for number, tick in enumerate(np.round(ticks))]
 
 
 def variable_rates() -> dict[str, "np.ndarray"]:
-    """Times of sound recordings in ticks of 1/90000 s, or of a millisecond."""
+    """Times of undamaged recordings in ticks of 1/90000 s, or of a millisecond."""
     rng, k = np.random.default_rng(11), np.arange(900)
     kept = k[rng.random(900) > 0.02]
     return {

@@ -1,4 +1,4 @@
-"""A damaged table of contents of an MP4 file: its frames have no time, and never a wrong one."""
+"""An MP4 file with a damaged table of contents: its frames have no time, and never a wrong time."""
 
 import struct
 from collections.abc import Callable
@@ -14,7 +14,7 @@ Change = Callable[[bytearray], object]
 
 
 def flipped(box: bytes, at: int, bit: int) -> Change:
-    """Flip a bit of a box, `at` bytes behind its name."""
+    """Flip a bit of a box, `at` bytes after its name."""
 
     def change(content: bytearray) -> None:
         content[content.rindex(box) + 4 + at] ^= 1 << bit

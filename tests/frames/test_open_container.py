@@ -1,4 +1,4 @@
-"""Names and metadata that FFmpeg's and Python's text rules would refuse."""
+"""Names and metadata that the text rules of FFmpeg and Python would refuse."""
 
 from pathlib import Path
 

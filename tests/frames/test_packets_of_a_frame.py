@@ -1,4 +1,4 @@
-"""Which of a camera's packets go with a frame: those up to its own, so that a recording ends where its table does."""
+"""Packets that belong to a frame: all packets up to the frame's own, so that a recording ends with its table."""
 
 import av
 

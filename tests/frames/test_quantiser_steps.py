@@ -1,4 +1,4 @@
-"""The quantiser that a stream states is read for every block, and stands where the picture does."""
+"""The quantiser steps of a stream are read for every block, at the block's position in the picture."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -115,7 +115,7 @@ def test_the_coarsest_block_near_a_place_counts_and_a_part_keeps_its_places() ->
 
 
 def test_a_block_that_is_copied_keeps_the_step_that_coded_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A block that is skipped states the step of its neighbour; a picture coded by itself begins anew."""
+    """A skipped block keeps the step of earlier pictures instead of its neighbour's; a key frame resets all steps."""
     stated = iter([[16.0, 4.0], [2.0, 8.0], [2.0, 2.0], [1.0, 1.0]])
     monkeypatch.setattr(
         quantiser_steps, "quantiser_steps", lambda _: Quantiser(np.array([next(stated)], dtype=np.float32))

@@ -1,4 +1,4 @@
-"""A phone writes into its videos how to turn them: they are measured as a player shows them."""
+"""Videos of phones state a rotation: the frames are measured as a player shows them."""
 
 import shutil
 import subprocess
@@ -18,7 +18,7 @@ HEIGHT, WIDTH = 48, 64
 
 
 def picture(number: int) -> NDArray[np.uint8]:
-    """No two quarters of it are alike."""
+    """A picture whose four quarters all differ."""
     out = np.full((HEIGHT, WIDTH), 40, dtype=np.uint8)
     out[: HEIGHT // 2, : WIDTH // 2] = 200
     out[: HEIGHT // 2, WIDTH // 2 :] = 120

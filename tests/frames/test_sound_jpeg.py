@@ -1,4 +1,4 @@
-"""Motion JPEG whose codes are damaged: what a decoder fills in is no picture."""
+"""Motion JPEG with damaged codes: pictures whose missing parts the decoder filled in are reported as damaged."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""VP8 without a checksum: where damage was noticed anywhere, no frame of the file is given as sound."""
+"""VP8 without a checksum: if damage was noticed anywhere, no frame of the file is passed on as undamaged."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Videos as phones and cameras write them: sound, several tracks, cover pictures, high dynamic range, uneven times."""
+"""Videos as written by phones and cameras: sound, several tracks, cover pictures, high dynamic range, uneven times."""
 
 from fractions import Fraction
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Video files: exact times, untouched luma, and honest holes where a file is broken."""
+"""Video files: exact times, unchanged luma, and lost frames where a file is damaged."""
 
 from collections.abc import Iterator
 from fractions import Fraction

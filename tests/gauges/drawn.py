@@ -1,4 +1,4 @@
-"""Pictures with known truth, drawn by code that shares nothing with the product.
+"""Pictures with known truth, drawn by code that is independent of the program.
 
 Shapes are signed distances, sampled eight times finer than the pixels, spread by a Gaussian and averaged over the
 pixels; textures are sums of Gaussian spots whose integrals over the pixels are in closed form.
@@ -18,7 +18,7 @@ Shape = Callable[[Floats, Floats], Floats]
 
 
 def half_plane(x_px: float, y_px: float, normal_rad: float) -> Shape:
-    """Everything beyond a line through a point, in the direction of its normal."""
+    """Half plane beyond a line through a point, in the direction of the line's normal."""
     return lambda x, y: (x - x_px) * np.cos(normal_rad) + (y - y_px) * np.sin(normal_rad)
 
 
@@ -46,14 +46,14 @@ def cross(x_px: float, y_px: float, angle_rad: float, width_px: float, arm_px: f
 
 
 def corner(x_px: float, y_px: float, angle_rad: float, opening_rad: float = np.pi / 2) -> Shape:
-    """A wedge with its tip at a point, opening about a direction."""
+    """A wedge with its tip at a point, open in a given direction."""
     one = half_plane(x_px, y_px, angle_rad + np.pi / 2 - opening_rad / 2)
     other = half_plane(x_px, y_px, angle_rad - np.pi / 2 + opening_rad / 2)
     return lambda x, y: np.minimum(one(x, y), other(x, y))
 
 
 def checker(x_px: float, y_px: float, angle_rad: float) -> Shape:
-    """Where four squares of a chessboard meet."""
+    """The corner at which four squares of a chessboard meet."""
 
     def inside(x: Floats, y: Floats) -> Floats:
         u = (x - x_px) * np.cos(angle_rad) + (y - y_px) * np.sin(angle_rad)
@@ -64,7 +64,7 @@ def checker(x_px: float, y_px: float, angle_rad: float) -> Shape:
 
 
 def drawn(shape: tuple[int, int], ground: float, things: list[tuple[Shape, float]], blur_px: float = 0.9) -> Floats:
-    """Light of things painted over each other on a ground."""
+    """Light of objects that are painted over each other on a background."""
     pad = int(np.ceil(5 * blur_px)) + 1
     fine_y, fine_x = ((np.arange((size + 2 * pad) * FINE) + 0.5) / FINE - 0.5 - pad for size in shape)
     x, y = np.meshgrid(fine_x, fine_y)
@@ -78,12 +78,12 @@ def drawn(shape: tuple[int, int], ground: float, things: list[tuple[Shape, float
 
 
 def seen(light: Floats, noise: float, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """The picture: noise, rounding, eight bits."""
+    """Picture with noise, rounded to eight bits."""
     return np.clip(np.rint(light + rng.normal(0.0, noise, light.shape)), 0, 255).astype(np.uint8)
 
 
 class Texture:
-    """Spots of a printed texture about a middle; drawn anywhere, turned, exactly."""
+    """Spots of a printed texture around a centre, which can be drawn exactly at any position and rotation."""
 
     def __init__(
         self, rng: np.random.Generator, radius_px: float, spacing_px: float = 4.0, size_px: float = 1.6
@@ -94,7 +94,7 @@ class Texture:
         self.size, self.depth = size_px * rng.uniform(0.8, 1.3, count), rng.uniform(-80, 80, count)
 
     def light(self, shape: tuple[int, int], x_px: float, y_px: float, turn_rad: float, ground: float = 128.0) -> Floats:
-        """Light where the texture's middle lies at a point and it is turned by an angle."""
+        """Light of the texture with its centre at a point, rotated by an angle."""
         light = np.full(shape, ground)
         cosine, sine = np.cos(turn_rad), np.sin(turn_rad)
         for x, y, size, depth in zip(self.x, self.y, self.size, self.depth, strict=True):

@@ -1,4 +1,4 @@
-"""Gauges of a written file, followed through pictures without a recording."""
+"""Gauges from a gauge file, tracked through pictures without a recording."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,7 +14,7 @@ from fingervision.vision.pipeline import Settings
 
 
 def gauges_of(folder: Path, *tables: str) -> tuple[Gauge, ...]:
-    """Write tables of a gauge file and read them; a name is given where there is none."""
+    """Write tables of a gauge file and read them; a missing name is added."""
     text = "schema = 1\n"
     for number, table in enumerate(tables):
         name = "" if "name =" in table else f'name = "g{number}"\n'

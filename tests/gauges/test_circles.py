@@ -1,4 +1,4 @@
-"""Circles: centre and diameter, as sure as they say; and no number of what is no circle."""
+"""Circles: errors of centre and diameter within the stated uncertainties, and no value for other shapes."""
 
 from pathlib import Path
 

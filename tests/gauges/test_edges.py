@@ -1,4 +1,4 @@
-"""Edges, pairs and lines: truth, stated uncertainty, and never another edge's number."""
+"""Edges, pairs and lines: true values, stated uncertainties, and never the value of another edge."""
 
 from pathlib import Path
 
@@ -111,7 +111,7 @@ def test_two_edges_within_reach_are_ambiguous_until_the_polarity_tells_them_apar
 
 
 def test_the_neighbour_is_never_taken(tmp_path: Path) -> None:
-    """A comb of bars that jumps by up to half more than was stated: the right edge's number, or none."""
+    """A comb of bars that jumps by up to 1.5 times the stated motion: the value of the right edge, or none."""
     rng = np.random.default_rng(10)
     period = 20.0
     start = drawn(SHAPE, 60, [(bar(55 + k * period, 55, 0.0, 10.0), 160) for k in range(-3, 4)])

@@ -1,4 +1,4 @@
-"""gauges.toml: what is read, and a sentence for everything that cannot be meant."""
+"""The file gauges.toml: valid content is read, and every invalid content gives an error sentence."""
 
 from pathlib import Path
 

@@ -1,4 +1,6 @@
-"""Marks: the middle of dots, crosses and chessboard corners, as sure as they say; nothing else is one."""
+"""Marks: errors of the centres of dots, crosses and chessboard corners within the stated uncertainties; other shapes
+are refused.
+"""
 
 from pathlib import Path
 
@@ -64,7 +66,7 @@ def test_another_like_it_within_reach_is_ambiguous(tmp_path: Path) -> None:
 
 
 def test_a_mark_that_is_covered_in_part_is_not_displaced(tmp_path: Path) -> None:
-    """What covers it has the ground's level: the rest looks like a mark too."""
+    """The covering object has the level of the background, so that the visible rest looks like a mark, too."""
     rng = np.random.default_rng(45)
     lights = [
         drawn(SHAPE, 60, [(disc(45, 45, 6.3), 160), (half_plane(edge, 45, np.pi), 60)]) for edge in (30, 30, 40, 42, 44)

@@ -1,4 +1,4 @@
-"""`measure --gauges`: gauges.csv beside gaps.csv, in millimetres, whatever the frames are."""
+"""`measure --gauges` writes gauges.csv next to gaps.csv, in millimetres, for frames of any kind."""
 
 import csv
 from pathlib import Path

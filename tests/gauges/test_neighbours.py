@@ -1,4 +1,6 @@
-"""Something like it beside it: no gauge jumps to it while its own thing is covered, and each finds its own again."""
+"""A similar object nearby: no gauge jumps to it while its own object is covered, and every gauge finds its own object
+again.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Patches: true shift and rotation, stated uncertainty, and no number where the patch is not."""
+"""Patches: true shift and rotation, stated uncertainty, and no value if the patch is not in view."""
 
 from pathlib import Path
 

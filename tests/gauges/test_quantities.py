@@ -1,4 +1,4 @@
-"""From pixels to millimetres: lens, plane and budget as `calib` has them."""
+"""Conversion from pixels to millimetres, with lens, plane and budget as in `calib`."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""One bench for every fault, drawn by a renderer that shares nothing with the product, and good ones."""
+"""One scene for every fault, and scenes without faults, drawn by an independent renderer."""
 
 import importlib
 import pkgutil

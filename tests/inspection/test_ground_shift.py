@@ -1,4 +1,4 @@
-"""Registration of the ground: drawn shifts are found, plain ground is not followed."""
+"""Registration of the background: drawn shifts are found, and a background without texture is not tracked."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""A real browser for the page: Debian's Chromium, driven by Playwright; what tests ask of a page in it."""
+"""A real browser for tests of the page: Debian's Chromium, controlled by Playwright, with the actions of the tests."""
 
 import os
 import re
@@ -40,7 +40,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
-    """Open pages; their requests and errors are noted, a screenshot is kept, and nothing may leave the machine."""
+    """Open pages, record their requests and errors, keep a screenshot, and refuse requests to other machines."""
     contexts, requests, errors = [], [], []
 
     def open_page(address: str, **context: Any) -> Any:
@@ -69,7 +69,9 @@ def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iter
 
 
 def shown(page: Any, words: str) -> None:
-    """Wait until an expression is true; asked from outside, because the page's policy lets no text be run in it."""
+    """Wait until an expression is true, evaluated from outside, because the page's security policy forbids running
+    text.
+    """
     end_s = time.monotonic() + PATIENCE_MS / 1e3
     while not page.evaluate(words):
         assert time.monotonic() < end_s, f"not true in time: {words}"
@@ -81,7 +83,7 @@ def says(page: Any, words: str) -> None:
 
 
 def drag(page: Any, box: tuple[int, int, int, int]) -> None:
-    """Drag over a part of the picture, in its own pixels."""
+    """Drag the mouse over a part of the picture, in the picture's pixels."""
     page.locator("#picture").scroll_into_view_if_needed()
     frame = page.locator("#picture").bounding_box()
     width, height = page.evaluate(

@@ -106,7 +106,7 @@ def free_port() -> int:
 
 
 def is_listened_at(port: int) -> bool:
-    """Whether a server waits at the port; it is not connected to, since ffmpeg serves its first client alone."""
+    """Whether a server listens on the port; no connection is made, because ffmpeg only serves its first client."""
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -118,7 +118,7 @@ def is_listened_at(port: int) -> bool:
 
 @pytest.fixture
 def live(tmp_path: Path) -> Iterator[Callable[..., Live]]:
-    """Start live views; all are ended afterwards."""
+    """Start live views, and end all of them after the test."""
     started: list[Live] = []
 
     def start(*arguments: str | Path, out: Path | None = None, name: str = "live") -> Live:
@@ -153,7 +153,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def single_pictures(pictures: Path) -> list[bytes]:
-    """Each JPEG of those that follow one another: all begin alike, and nothing within looks like that."""
+    """Divide a sequence of JPEG pictures at their start marker, which does not occur within a picture."""
     return [JPEG_BEGINS + rest for rest in pictures.read_bytes().split(JPEG_BEGINS)[1:]]
 
 
@@ -178,7 +178,7 @@ def rows() -> Callable[[Path], list[dict[str, str]]]:
 
 @pytest.fixture
 def measured(tmp_path: Path) -> Callable[..., str]:
-    """Measure a recording afterwards; gives its gaps.csv as text."""
+    """Measure a recording, and return its gaps.csv as text."""
 
     def measure(video: Path, *options: str | Path) -> str:
         out = tmp_path / f"measured_{video.parent.name}"

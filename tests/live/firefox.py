@@ -1,4 +1,4 @@
-"""Debian's Firefox for the page, spoken to as the standard has it: W3C WebDriver BiDi, over its own socket."""
+"""Debian's Firefox for tests of the page, controlled by the W3C standard WebDriver BiDi over its own socket."""
 
 import base64
 import itertools
@@ -34,7 +34,7 @@ ENTER = "\ue007"
 
 
 class Firefox:
-    """One window; what its console says of scripts is kept in `errors`.
+    """One window; script errors in its console are kept in `errors`.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Firefox:
         self._ask("browsingContext.navigate", context=self._window, url=address, wait="complete")
 
     def evaluate(self, words: str) -> Any:
-        """Value of an expression, as JSON has it."""
+        """Value of an expression, converted to JSON."""
         found = self._ask(
             "script.evaluate",
             expression=f"JSON.stringify({words})",
@@ -106,12 +106,12 @@ class Firefox:
             time.sleep(0.05)
 
     def press(self, keys: str) -> None:
-        """Type where the focus is."""
+        """Type into the focused element."""
         actions = [{"type": kind, "value": key} for key in keys for kind in ("keyDown", "keyUp")]
         self._act({"type": "key", "id": "keys", "actions": actions})
 
     def click(self, what: str) -> None:
-        """Press the middle of an element with the mouse."""
+        """Click the centre of an element with the mouse."""
         self.evaluate(f"document.querySelector({what!r}).scrollIntoView({{block: 'center'}}) || 0")
         box = self.box(what)
         self._pointer([(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)])
@@ -122,7 +122,7 @@ class Firefox:
         self.press(words + ENTER)
 
     def drag(self, box: tuple[int, int, int, int]) -> None:
-        """Drag over a part of the picture, in its own pixels."""
+        """Drag the mouse over a part of the picture, in the picture's pixels."""
         self.evaluate("document.querySelector('#picture').scrollIntoView({block: 'center'}) || 0")
         frame = self.box("#picture")
         width, height = self.evaluate(
@@ -137,11 +137,11 @@ class Firefox:
         )
 
     def box(self, what: str) -> dict[str, float]:
-        """Where an element stands in the window, in CSS pixels."""
+        """Rectangle of an element in the window, in CSS pixels."""
         return dict(self.evaluate(f"document.querySelector({what!r}).getBoundingClientRect()"))
 
     def screenshot(self, path: Path) -> None:
-        """Keep what is shown."""
+        """Save a screenshot of the window."""
         data = self._ask("browsingContext.captureScreenshot", context=self._window)["data"]
         path.write_bytes(base64.b64decode(data))
 
@@ -173,7 +173,7 @@ class Firefox:
 
 @pytest.fixture(params=["light", "dark"])
 def firefox(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Firefox]:
-    """A browser of its own for a test, once in each scheme; its console must stay silent."""
+    """A separate browser for each test and colour scheme, whose console must remain empty."""
     (profile := tmp_path / "profile").mkdir()
     found = Firefox(profile, dark=request.param == "dark")
     try:

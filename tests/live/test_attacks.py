@@ -1,4 +1,4 @@
-"""What a stranger, a foreign page, or a broken one may try: each test fails where its guard is missing."""
+"""Attacks by strangers, foreign pages or faulty pages: each test fails if the corresponding protection is missing."""
 
 import json
 import re
@@ -65,7 +65,7 @@ def socket_of(address: str, **options: Any) -> ClientConnection:
 
 
 def reply(socket: ClientConnection, request: Any) -> dict[str, Any]:
-    """What is answered; pictures that come meanwhile are acknowledged."""
+    """Return the answer to a request, and acknowledge pictures that arrive before the answer."""
     socket.send(request if isinstance(request, str | bytes) else json.dumps(request))
     while True:
         got = socket.recv(timeout=10.0)
@@ -75,7 +75,7 @@ def reply(socket: ClientConnection, request: Any) -> dict[str, Any]:
 
 
 def closing_code(socket: ClientConnection) -> int:
-    """Wait until the server closes a socket, and tell with which code."""
+    """Wait until the server closes a socket, and return the close code."""
     with suppress(ConnectionClosed):
         while True:
             socket.recv(timeout=10.0)

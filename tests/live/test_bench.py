@@ -1,4 +1,4 @@
-"""The bed from the page: the same limits as the command, stopped by anybody, moved by those alone who may."""
+"""Control of the test bed from the page: limits as in the command, stop by any user, motion only with permission."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ frames = "continuous"
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    """A simulated bed with its thread at work, and its frames taken."""
+    """A simulated test bed with its thread running, whose frames are read."""
     monkeypatch.chdir(tmp_path)
     found = Bench(open_bed("simulated", pace=PACE))
     frames: list[Received] = []
@@ -67,7 +67,7 @@ def until(true: Callable[[], Any]) -> None:
 
 
 def done(session: Session, bench: Bench, request: dict[str, Any]) -> str:
-    """Ask for a motion and wait for its end; gives the last sentence."""
+    """Request a motion, wait for its end, and return the last message."""
     before = len(session.messages)
     obey(session, request)
     until(lambda: not bench.doing and len(session.messages) > before)
@@ -195,7 +195,7 @@ def test_a_hidden_backlash_is_named_on_the_page_within_a_minute_of_motion(
 
 
 class Asked:
-    """Notes which tables are judged."""
+    """Records which tables are diagnosed."""
 
     def __init__(self) -> None:
         self.tables: list[list[GapRow]] = []

@@ -1,4 +1,4 @@
-"""Drops are counted where frames are missing, and not where a network holds them up."""
+"""Missing frames are counted, but frames that a network delays are not."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Exposure, gain, focus and frame rate while a camera runs: a camera of a plug-in that declares what it lets be set."""
+"""Exposure, gain, focus and frame rate while a camera runs, with a plug-in camera that declares its settings."""
 
 import json
 import time
@@ -42,7 +42,9 @@ def picture() -> NDArray[np.uint8]:
 
 
 class PluginCamera:
-    """A simulated camera whose light follows its exposure; steps of 0.5 ms, a gain that sticks, a focus that fails."""
+    """A simulated camera whose light depends on its exposure; steps of 0.5 ms, a gain that does not change, a focus
+    that fails.
+    """
 
     has_own_clock, template = True, None
 
@@ -95,7 +97,7 @@ class PluginCamera:
 
 
 class AllControls(PluginCamera):
-    """A simulated camera that lets all five settings be set."""
+    """A simulated camera on which all five settings can be changed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -251,7 +253,7 @@ def test_a_source_without_controls_has_none() -> None:
 
 
 class Faulty(PluginCamera):
-    """A driver whose list of settings fails, or holds what is none."""
+    """A driver whose list of settings raises an error, or contains something else than settings."""
 
     def __init__(self, found: object) -> None:
         super().__init__()

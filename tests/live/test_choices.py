@@ -1,4 +1,4 @@
-"""Tolerance by what is surely inside or outside, and sentences for what cannot be meant."""
+"""Tolerance: a gap is inside or outside only beyond its uncertainty; invalid settings give an error sentence."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""A stream that arrives damaged: what was lost live stays lost in the recording, row by row."""
+"""A damaged stream: every frame that was lost in the live view is lost in the recording, too."""
 
 from dataclasses import asdict
 from fractions import Fraction
@@ -37,7 +37,7 @@ def film() -> list[np.ndarray]:
 
 
 def coded(path: Path, film: list[np.ndarray], coder: str, container_format: str | None = None) -> list[int]:
-    """Write the film; gives the place of each packet in the file."""
+    """Write the video, and return the position of each packet in the file."""
     name, pixel_format, options = CODERS[coder]
     with av.open(str(path), "w", format=container_format) as container:
         stream = container.add_stream(name, rate=RATE_HZ, options=options)
@@ -56,7 +56,7 @@ def coded(path: Path, film: list[np.ndarray], coder: str, container_format: str 
 
 
 def recorded(stream: Path, out: Path, task: Task) -> Path:
-    """Record a stream as live does, one frame after the other."""
+    """Record a stream frame by frame, in the same way as the live view."""
     capture = Capture(NetworkStream(str(stream)), again=None)
     source = capture.source
     run = RunFolder(out, source.description, task, source.template)

@@ -1,4 +1,4 @@
-"""Warnings about the light: white, dark, changing; a light ground behind dark fingers is the usual set-up."""
+"""Warnings about the light: overexposed, dark, changing; no warning for a light background behind dark fingers."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The page in Firefox: the three ways in, on three screens and in both schemes, with a silent console."""
+"""The page in Firefox: live view, run folder and recording on three screens, in both colour schemes, no errors."""
 
 import csv
 import os
@@ -19,7 +19,7 @@ SHOWN_MM = 0.00005
 
 
 def on_every_screen(firefox: Firefox, address: str, name: str) -> None:
-    """Picture, value, status and chart fit the window, whose scheme is the user's."""
+    """Picture, value, status and chart fit the window, which has the user's colour scheme."""
     for width, height in SCREENS:
         firefox.open(address, (width, height))
         firefox.shown("Number(document.querySelector('#picture').dataset.shown) > 0")

@@ -1,4 +1,4 @@
-"""Gauges drawn on a recording: kept as they are meant, refused where they cannot be, read as `measure` reads them."""
+"""Gauges drawn on a recording: valid gauges are stored, invalid ones refused, and readings equal those of `measure`."""
 
 import csv
 import json
@@ -48,7 +48,7 @@ BAR = {
 
 @pytest.fixture(scope="module")
 def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An edge that moves, and a bar that stands."""
+    """A moving edge, and a bar at rest."""
     folder = tmp_path_factory.mktemp("edge") / "frames"
     folder.mkdir()
     rng = np.random.default_rng(5)
@@ -60,7 +60,7 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def opened_on(frames: Path, tmp_path: Path) -> Iterator[Callable[..., tuple[Playback, GaugesBeside]]]:
-    """Recordings with a board of gauges; all are ended afterwards."""
+    """Recordings with a gauge board, which are closed after the test."""
     views: list[Playback] = []
 
     def open_on(path: Path, px_per_mm: float | None = None) -> tuple[Playback, GaugesBeside]:
@@ -272,7 +272,7 @@ def test_readings_are_those_of_measure(opened_on: Opened, frames: Path, tmp_path
 
 
 def mouse(page: Any, way: list[tuple[float, float]]) -> None:
-    """Drag along points of the picture, in its own pixels."""
+    """Drag the mouse along points of the picture, in the picture's pixels."""
     box = page.locator("#picture").bounding_box()
     places = [
         (box["x"] + (x + 0.5) / SHAPE[1] * box["width"], box["y"] + (y + 0.5) / SHAPE[0] * box["height"])

@@ -1,4 +1,4 @@
-"""Which names, origins and tokens are let in, whatever address is bound."""
+"""Host names, origins and tokens that are admitted, for any bound address."""
 
 import asyncio
 import base64
@@ -25,7 +25,7 @@ def status(
     scheme: str = "http",
     header: bytes | None = None,
 ) -> int:
-    """Status with which a request is answered; 0 where a socket is closed before it opens."""
+    """Status code of the answer to a request; 0 if a socket is closed before it opens."""
     sent: list[Any] = []
 
     async def app(scope: Any, receive: Any, send: Any) -> None:

@@ -1,4 +1,4 @@
-"""The history gives back the newest rows as they were, in memory that does not grow."""
+"""The history returns the newest rows unchanged, in a fixed amount of memory."""
 
 from fingervision.domain.status import Status
 from fingervision.live.history import History

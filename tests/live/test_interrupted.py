@@ -1,4 +1,4 @@
-"""Sources that go away and come back: every time is said, nothing before it is lost, and measuring goes on."""
+"""Interrupted sources: every interruption is reported, no earlier data are lost, and the measurement continues."""
 
 import socket
 import time
@@ -49,7 +49,9 @@ def until(found: Callable[[], Any]) -> None:
 
 
 class CutCamera:
-    """Serves JPEG pictures over HTTP, as many a connection as it is told, and then hangs up amid a picture."""
+    """Server of JPEG pictures over HTTP that disconnects in the middle of a picture, after a given number per
+    connection.
+    """
 
     def __init__(self, pictures: int) -> None:
         self._parts = [self._part(k) for k in range(pictures)]
@@ -58,7 +60,7 @@ class CutCamera:
         Thread(target=self._serve, daemon=True).start()
 
     def _part(self, number: int) -> bytes:
-        """One picture; its gap is its number."""
+        """One picture, whose gap equals its number."""
         coded = cv2.imencode(".jpg", picture(40.0 + number), [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes()
         return b"--x\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n%b\r\n" % (len(coded), coded)
 
@@ -106,7 +108,7 @@ def test_a_stream_that_is_cut_twenty_times_comes_back_twenty_times_and_loses_not
 
 
 class Plug:
-    """A camera at the boundary of the driver: OpenCV's capture, which fails when it is pulled out."""
+    """A replacement of OpenCV's capture that fails as if the camera were unplugged."""
 
     plugged = Event()
     gain = 10.0
@@ -191,7 +193,7 @@ def test_a_camera_that_comes_back_with_another_size_is_not_measured(
 
 
 class JumpingClock:
-    """A camera whose own clock is set forward by an hour, and back by ten seconds, while it runs."""
+    """A camera whose own clock is set forward by an hour and back by ten seconds during operation."""
 
     has_own_clock = True
     template = None
@@ -210,7 +212,7 @@ class JumpingClock:
             yield Received(Frame(self._pixels, index, time_s, Coding.LOSSLESS), monotonic())
 
     def close(self) -> None:
-        """Nothing is open."""
+        """The source is not open."""
 
 
 def test_a_clock_that_jumps_is_said_and_moves_no_frame(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`fingervision live`: bad input is a sentence each, before anything runs."""
+"""`fingervision live`: every invalid input gives an error sentence before the live view starts."""
 
 import socket
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Gauges on a source that goes on: followed where they are, begun anew where they are drawn, silent without a scale."""
+"""Gauges on a live source: unchanged gauges continue, drawn gauges start anew; without a scale, no readings."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +29,7 @@ BAR = {"name": "bar", "kind": "pair", "x_px": 400, "y_px": 240, "direction_deg":
 
 @pytest.fixture(scope="module")
 def frames() -> list[Frame]:
-    """An edge that moves by 3 px a frame, and a bar that stands."""
+    """An edge that moves by 3 px per frame, and a bar at rest."""
     rng = np.random.default_rng(5)
     found = []
     for number in range(8):
@@ -41,7 +41,7 @@ def frames() -> list[Frame]:
 
 @pytest.fixture
 def session(tmp_path: Path) -> Iterator[Session]:
-    """A live view that has not begun."""
+    """A live view that has not started."""
     view = Session(opened("simulated", Wish()), Choices(scale=BareScale(10.0)), tmp_path)
     yield view
     view.capture.source.close()

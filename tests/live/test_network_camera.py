@@ -1,4 +1,4 @@
-"""A network camera on loopback: every frame measured, cut and restored."""
+"""A network camera on the loopback interface: every frame is measured; interruption and restoration."""
 
 import time
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Measuring waits for nobody, and what dies or is old is seen: paused readers, silent pages, a zero out of date."""
+"""The measurement never waits: paused readers, silent pages, and an outdated zero are detected."""
 
 import io
 import json
@@ -55,7 +55,7 @@ def head_of(session: Session) -> dict[str, Any]:
 
 
 class Unread(io.StringIO):
-    """A stream whose reader pauses until it is told to go on."""
+    """An output stream whose reader pauses until the test continues it."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -67,7 +67,7 @@ class Unread(io.StringIO):
 
 
 class Gone(io.StringIO):
-    """A stream that nobody reads any more."""
+    """An output stream without a reader."""
 
     def write(self, text: str) -> int:
         raise BrokenPipeError
@@ -146,7 +146,7 @@ def page(session: Session) -> Iterator[server.Page]:
 
 
 def closing_code(page: server.Page) -> int | None:
-    """Look at the page without a word, until the server closes the socket."""
+    """Open the page's socket without sending anything, until the server closes it."""
     address = page.address.replace("http://", "ws://").replace("/?", "/socket?")
     origin = page.address.partition("/?")[0]
     with connect(address, origin=origin) as socket:  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The page in a real browser: Debian's Chromium, driven by Playwright."""
+"""The page in a real browser: Debian's Chromium, controlled by Playwright."""
 
 import csv
 import io
@@ -30,7 +30,7 @@ SAID_WITHIN_S = 1.0
 
 
 def no_value_is_left(page: Any, status: str) -> None:
-    """Where nothing comes in there is no number, nothing is green, and the reason is in view."""
+    """Without frames, the page shows no value and no green status, but the reason."""
     shown(page, f"document.querySelector('#status').textContent === '{status}'")
     assert not re.search(r"\d", page.inner_text("#gap_mm"))
     assert page.get_attribute("#status", "class") == "badge bad"
@@ -105,7 +105,7 @@ def test_the_page_shows_records_and_saves(
 
 
 def under_cursor_s(page: Any, share: float) -> float:
-    """Time that the chart's legend gives with the cursor at a share of its width."""
+    """Time in the chart's legend with the cursor at a given share of the chart's width."""
     box = page.locator("#chart .u-over").bounding_box()
     page.mouse.move(box["x"] + share * box["width"], box["y"] + box["height"] / 2)
     page.wait_for_function("() => document.querySelector('#readout').dataset.time")

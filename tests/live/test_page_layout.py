@@ -1,4 +1,4 @@
-"""The page on every screen: what fits, what can be reached, and what a checker of accessibility says of it."""
+"""Layout of the page on every screen size: what fits, what can be reached, and results of an accessibility checker."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -38,7 +38,7 @@ CYCLE = 40
 
 
 def findings(page: Any) -> list[str]:
-    """What axe-core finds at level AA, and of its best practices."""
+    """Findings of axe-core at level AA and for its best practices."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed.")
     found = axe.Axe().run(page, options={"runOnly": {"type": "tag", "values": RULES}}).response["violations"]
     return [f"{each['id']}: {each['help']} {[node['html'][:150] for node in each['nodes']]}" for each in found]
@@ -46,7 +46,7 @@ def findings(page: Any) -> list[str]:
 
 @pytest.fixture
 def covered(tmp_path: Path) -> Path:
-    """Pictures of a gripper before which a hand passes: some frames have no fingers."""
+    """Pictures of a gripper that a hand hides for a while, so that some frames have no fingers."""
     folder = tmp_path / "covered"
     folder.mkdir()
     rng = np.random.default_rng(7)
@@ -73,7 +73,7 @@ def test_picture_value_chart_and_status_fit_every_screen(live: Callable[..., Any
 
 
 def check_every_panel(page: Any, way: str, looks: tuple[tuple[tuple[int, int], str], ...]) -> None:
-    """Open all panels, and let axe look at them in windows and schemes that change while the page is shown."""
+    """Open all panels, and check them with axe for changing window sizes and colour schemes."""
     page.evaluate("for (const each of document.querySelectorAll('#panels details')) each.open = true")
     for (width, height), scheme in looks:
         page.set_viewport_size({"width": width, "height": height})

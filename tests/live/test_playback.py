@@ -1,4 +1,4 @@
-"""A recording looked through: every frame is the one it says, and what is measured is what `measure` gives."""
+"""Playback of a recording: every frame shown has the stated number, and measured values equal those of `measure`."""
 
 import json
 import shutil
@@ -32,7 +32,7 @@ FRAMES, BITS, CELL_PX = 60, 6, 16
 
 
 def numbered(number: int) -> np.ndarray:
-    """A picture of a gripper that carries its number as black and white squares along its foot."""
+    """A picture of a gripper with its number as black and white squares along the lower border."""
     rng = np.random.default_rng(number)
     picture = render(two_fingers(60.0 + number, frame=(320, 240)), Camera(blur_px=0.9, noise_grey=1.0), rng)
     for bit in range(BITS):
@@ -55,7 +55,7 @@ CODINGS = {
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """One recording in several codings, and as images."""
+    """One recording, stored with several codecs and as images."""
     if shutil.which("ffmpeg") is None:
         pytest.skip("ffmpeg is not installed: it codes the recordings.")
     folder = tmp_path_factory.mktemp("recordings")
@@ -120,7 +120,7 @@ def test_what_ends_is_a_recording_and_what_goes_on_is_none(recordings: dict[str,
 
 @pytest.fixture
 def playback(recordings: dict[str, Path], tmp_path: Path) -> Playback:
-    """A recording without a scale: nothing runs beside it."""
+    """A recording without a scale, so that no measurement runs in the background."""
     return Playback(recorded(str(recordings["images"]), 25.0, Choices(), ()), tmp_path / "out")
 
 

@@ -1,4 +1,4 @@
-"""A run holds what live measured, to the last digit, however it ends."""
+"""A run contains all live measurements to the last digit, however the run ends."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""An RTSP camera on loopback, served by GStreamer: its own clock, its own packets, cut and restored."""
+"""An RTSP camera on the loopback interface, served by GStreamer: clock, packets, interruption and restoration."""
 
 import socket
 import subprocess
@@ -51,7 +51,7 @@ class RtspCamera:
 
 @pytest.fixture
 def rtsp_camera(pictures: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[RtspCamera]:
-    """One whose coder and share of lost packets a test may give as its parameter."""
+    """An RTSP camera whose codec and share of lost packets are parameters of the test."""
     try:
         subprocess.run([SYSTEM_PYTHON, "-c", HAS_GSTREAMER], capture_output=True, check=True)
     except (OSError, subprocess.CalledProcessError):

@@ -1,4 +1,4 @@
-"""The set-up from the page: findings, meters, height by dragging, polarity, settings."""
+"""The set-up panel of the page: findings, indicators, measuring height by dragging, polarity, settings."""
 
 import time
 from collections.abc import Iterator

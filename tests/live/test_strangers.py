@@ -1,4 +1,4 @@
-"""Who may not look: connections that hold places, passwords in addresses, numbers without end, the token elsewhere."""
+"""Access by strangers: idle connections, passwords in addresses, endless numbers, the token in other places."""
 
 import socket
 from collections.abc import Iterator

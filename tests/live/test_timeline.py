@@ -1,4 +1,4 @@
-"""The live view's time: true steps, never back, whatever the source's clock does."""
+"""Time of the live view: correct steps, never decreasing, whatever the source's clock does."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""The page over TLS, from a certificate to the pictures; pairs that cannot be used are refused with a sentence."""
+"""The page over TLS, from the certificate to the pictures; unusable pairs of certificate and key are refused."""
 
 import shutil
 import ssl
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(OPENSSL is None, reason="openssl is not installe
 
 
 def pair(folder: Path, name: str = "page", *more: str) -> tuple[Path, Path]:
-    """Make a certificate of this machine's loopback, signed by itself."""
+    """Make a self-signed certificate for the loopback interface."""
     certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
     command = [str(OPENSSL), "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-days", "2"]
     command += ["-subj", "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1"]
@@ -53,7 +53,7 @@ def page(tmp_path: Path) -> Iterator[tuple[Page, ssl.SSLContext]]:
 
 
 def handshake_status(target: str, headers: dict[str, str], trusting: ssl.SSLContext) -> int:
-    """HTTP status that answers a request to open a WebSocket."""
+    """HTTP status of the answer to a request for a WebSocket."""
     address = urlsplit(target)
     connection = HTTPSConnection(address.netloc, timeout=10.0, context=trusting)
     try:

@@ -1,4 +1,4 @@
-"""After the warm-up a frame makes nothing that is made once: none waits for a table or a library."""
+"""After the warm-up, no frame is delayed by a one-time computation of a table or the loading of a library."""
 
 import subprocess
 import sys

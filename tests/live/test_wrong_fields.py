@@ -1,4 +1,4 @@
-"""What is typed wrong, dropped, or asked by two at once: a sentence, nothing lost, and what is measured stays."""
+"""Wrong input, dropped files, and simultaneous requests: each gives a sentence, and no data or measurement is lost."""
 
 import json
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""A first Ctrl-C is noted, a second one is raised, and afterwards everything is as before."""
+"""The first Ctrl-C is recorded, the second is raised, and afterwards the signal handlers are restored."""
 
 import signal
 import threading

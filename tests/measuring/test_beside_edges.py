@@ -1,4 +1,4 @@
-"""What a summary says of shadows, walls, rough edges and fields: how often, and what to do."""
+"""Sentences of a summary about shadows, walls, rough edges and fields: number of frames, and remedy."""
 
 from dataclasses import replace
 

@@ -1,4 +1,6 @@
-"""Bodies followed through pictures: laid by the silhouette or by points, mirrored, covered, gone, of another scale."""
+"""Tracking of bodies: drawings placed by silhouette or by points, and mirrored, covered, absent or wrongly scaled
+bodies.
+"""
 
 from pathlib import Path
 
@@ -138,7 +140,7 @@ def test_points_of_another_scale_or_at_one_place_are_refused() -> None:
 
 @pytest.mark.slow
 def test_a_body_that_looks_alike_is_never_taken_for_one_that_is_hidden(plate: MechanismPlate) -> None:
-    """The shuttle is painted over by the ground, and a copy of it lies 1.5 mm beside it."""
+    """The shuttle is covered by background, and a copy of the shuttle is drawn 1.5 mm away."""
     wide, own = ((13.0, 23.0, 9.0, 31.3), (15.5, 23.5, 10.0, 31.0))
     patches = []
     for (x0, x1, y0, y1), level in ((wide, Scene().light.ground), (own, 50.0)):

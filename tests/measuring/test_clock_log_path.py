@@ -1,4 +1,4 @@
-"""What the clock's fit takes from a log: encoder steps, reversals between two lines, and the frames' own noise."""
+"""Path of the stage for the clock fit: encoder steps, reversals between two encoder lines, and noise of the frames."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ STEP_MM = 0.002
 
 
 def read_out(place_mm):
-    """Round places to the lines of an encoder."""
+    """Round positions to the lines of an encoder."""
     return np.round(place_mm / STEP_MM) * STEP_MM
 
 
@@ -92,7 +92,9 @@ def test_a_record_that_ends_within_an_encoders_line_is_read():
 
 
 def test_a_halt_between_two_lines_is_at_its_reading():
-    """The smoothing alone runs on within a halt, outwards by half a step; play and offset took it up."""
+    """Smoothing alone would continue the motion during a halt by up to half a step, which would falsify play and
+    offset.
+    """
     rng = np.random.default_rng(31)
     corners_s, corners_mm, now_s, at_mm = [0.0, 1.0], [0.05, 0.05], 1.0, 0.05
     for target_mm in rng.uniform(0.0, 0.6, 12):
@@ -110,6 +112,8 @@ def test_a_halt_between_two_lines_is_at_its_reading():
 
 
 def test_halts_at_equal_distances_are_not_taken_for_the_lines_of_an_encoder():
-    """Readings on the lines of an encoder were moved by up to 6 um, to a line for every share of a staircase's step."""
+    """Without this rule, readings on the encoder's lines would be moved by up to 6 um, for any step of a staircase
+    motion.
+    """
     read = drawn_recordings.draw(99001093).input_mm
     np.testing.assert_array_equal(on_lines(read, (slice(0, read.size),)), read)

@@ -28,7 +28,7 @@ class Drawn:
 
 
 def behind_play(path_mm, width_mm):
-    """Follow a path with a play, sample by sample."""
+    """Output of a play that follows a path, sample by sample."""
     out, state = np.empty_like(path_mm), path_mm[0]
     for i, place in enumerate(path_mm):
         state = min(max(state, place - width_mm / 2), place + width_mm / 2)
@@ -37,7 +37,7 @@ def behind_play(path_mm, width_mm):
 
 
 def drawn(offset_s, rate=0.0, play_mm=0.05, corners=STROKES, rate_hz=25.0, noise_mm=5e-4, seed=1):
-    """Log a motion and film it with a clock that is off."""
+    """Log a motion, and record it with a camera whose clock has an offset."""
     rng = np.random.default_rng(seed)
     at_s, at_mm = np.array(corners).T
     fine_s = np.arange(0.0, at_s[-1] + 1.0, 1e-3)
@@ -50,7 +50,7 @@ def drawn(offset_s, rate=0.0, play_mm=0.05, corners=STROKES, rate_hz=25.0, noise
 
 
 def found(one):
-    """Find the offset of a drawn recording."""
+    """Find the offset of a simulated recording."""
     return find_clock_offset(one.time_s, one.gap_mm, one.drive)
 
 
@@ -185,7 +185,9 @@ def test_the_uncertainty_is_read_from_the_summary_beside_a_table(tmp_path):
 
 @pytest.mark.slow
 def test_a_play_of_several_steps_of_a_staircase_gives_no_other_step():
-    """Seed 73000 of the benchmark: one step on, with a play of 4 um, 544 of 761 frames fit within their noise."""
+    """Seed 73000 of the benchmark: at a wrong offset by one step, with a play of 4 um, 544 of 761 frames fit within
+    noise.
+    """
     one = drawn_recordings.draw(73000)
     clock = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.log_s, one.input_mm))
     if isinstance(clock, ClockOffset):

@@ -1,4 +1,4 @@
-"""The drive at a frame's time: interpolated, never extrapolated, never across two runs."""
+"""Input of the drive at a frame's time: interpolated, but neither extrapolated nor interpolated between two runs."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Bodies that a flexure joins stay joined: what lies elsewhere was taken for them."""
+"""Flexures limit the distance of the bodies that they join: a body measured elsewhere was mistaken."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def joints() -> list[Joint]:
 
 
 def seen(joints: list[Joint], **moves: tuple[float, float, float] | None) -> dict[str, SeenPose]:
-    """Poses by rotations (rad) about a point, for every other body at rest."""
+    """Poses of bodies rotated (rad) about a point; all other bodies are at rest."""
     poses = {}
     for name in ("pillar", "shuttle", "finger"):
         move = moves.get(name, (0.0, 0.0, 0.0))
@@ -32,7 +32,7 @@ def seen(joints: list[Joint], **moves: tuple[float, float, float] | None) -> dic
 
 
 def about_hinge(joints: list[Joint], turn: float) -> dict[str, tuple[float, float, float]]:
-    """Finger turned about the first hinge, the shuttle lifted with it: what the mechanism can do."""
+    """A possible motion of the mechanism: the finger rotates about the first hinge and lifts the shuttle."""
     (pillar_hinge, shuttle_hinge), finger = (np.array(j.flexure.at_mm) for j in joints), joints[0].bodies[1]
     c, s = np.cos(turn), np.sin(turn)
 

@@ -1,4 +1,4 @@
-"""A whole measurement: truth in, truth out; files that say what happened."""
+"""A complete measurement: known gaps are measured correctly, and the files describe the measurement."""
 
 import csv
 import json
@@ -99,7 +99,7 @@ def test_the_drive_is_put_on_the_recordings_clock(tmp_path: Path) -> None:
 
 @dataclass(frozen=True)
 class Items:
-    """A recording that is a list."""
+    """A recording whose frames are a list."""
 
     items: list[Frame | LostFrame]
     width_px: int = 240

@@ -1,4 +1,4 @@
-"""One polarity for a whole recording: the first frames vote, and nothing is lost or out of order."""
+"""One polarity for a whole recording: the majority of the first frames decides, and all frames stay in order."""
 
 from collections import Counter
 from collections.abc import Iterator

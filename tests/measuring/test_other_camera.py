@@ -1,4 +1,4 @@
-"""A recorded run whose camera was set otherwise than the calibration's is measured, and said to be."""
+"""A run whose camera settings differ from those of the calibration is measured, with a note about the difference."""
 
 import json
 from pathlib import Path

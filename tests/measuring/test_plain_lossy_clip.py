@@ -1,4 +1,4 @@
-"""Two plain bars in an H.264 recording, drawn and coded here: nearly every frame has a gap, and it is true."""
+"""Two plain bars in an H.264 recording, drawn and coded by the test: nearly every frame has a true gap."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def edge(at: np.ndarray, place: float) -> np.ndarray:
 
 
 def clip(path: Path, seed: int) -> list[float]:
-    """Write the recording; the gap (pixels) of every frame."""
+    """Write the recording, and return the gap (pixels) of every frame."""
     rng = np.random.default_rng(seed)
     x, y = np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5
     gaps = [84.0 - 1.3 * min(k, 40) for k in range(FRAMES)]

@@ -1,4 +1,4 @@
-"""What all frames share of a pose's uncertainty: the drawing's place, scale and bias, lens and plane."""
+"""Uncertainty of a pose that all frames share: placement of the drawing, scale, edge bias, lens and plane."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A jump of a coded recording: real steps stay, what a damaged stream draws does not."""
+"""Jumps in a coded recording: real steps are accepted, jumps due to a damaged stream are not."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -32,7 +32,7 @@ def judged(frames: list[Frame]) -> list[GapMeasurement | NoGap | LostFrame]:
 
 
 def row(gaps_px: list[float], coding: Coding, change: Callable[[int, np.ndarray], None]) -> list[Frame]:
-    """A film of which every eighth picture hangs on none."""
+    """A video in which every eighth picture is a key frame."""
     frames = []
     for k, gap_px in enumerate(gaps_px):
         levels = picture(gap_px, k)

@@ -1,4 +1,4 @@
-"""A scale stated with its uncertainty: carried into the gap's uncertainty as a calibration's is."""
+"""A scale stated with its uncertainty, which contributes to the gap's uncertainty like that of a calibration."""
 
 import csv
 import json

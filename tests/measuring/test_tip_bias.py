@@ -1,4 +1,4 @@
-"""How much of an edge bias a round tip takes back: from circles that shrink."""
+"""Part of an edge bias that a round tip compensates, tested with circles of decreasing size."""
 
 from dataclasses import replace
 from math import sqrt
@@ -14,7 +14,7 @@ PX_PER_MM = 34.0
 
 
 def half_width(radius_px: float) -> float:
-    """Of a circle, so far below its top."""
+    """Position and slope of a circle at a given distance below its top."""
     return sqrt(2.0 * radius_px * BELOW_PX - BELOW_PX**2)
 
 
@@ -26,7 +26,7 @@ def between_circles(radius_px: float) -> GapMeasurement:
 
 @pytest.mark.parametrize("radius_px", [12.0, 17.0, 34.0, 48.0])
 def test_a_circle_that_shrinks_opens_the_gap_by_less_than_its_shrinking(radius_px: float) -> None:
-    """The tip goes down with the bloom, and the measuring height with it: the half width's derivative says how far."""
+    """Edge bias lowers the tip and the measuring height; the derivative of the half width gives the effect."""
     step = 1e-6
     opened = 2.0 * (half_width(radius_px) - half_width(radius_px - step)) / step  # per pixel of bloom on both sides
     b = -2.0  # one pixel of bloom an edge

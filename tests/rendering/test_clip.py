@@ -1,4 +1,4 @@
-"""Clips and JPEG: times to the tick, lossless where promised, and what compression leaves."""
+"""Clips and JPEG: exact times, lossless storage where promised, and errors of lossy compression."""
 
 from pathlib import Path
 
@@ -62,7 +62,7 @@ def test_ffv1_gives_back_every_pixel(tmp_path: Path, camera: Camera) -> None:
 def test_the_luma_of_a_lossy_clip_is_the_frame_but_for_the_loss(
     tmp_path: Path, codec: Codec, loss_grey: float, tint: tuple[float, float, float] | None
 ) -> None:
-    """Full range, and grey of equal colours is that grey: no level is scaled."""
+    """Full range: levels are not scaled, and equal colours give the same grey level."""
     frames = some_frames(Camera(tint=tint))
     write_clip(tmp_path / "clip.mp4", frames, codec)
     for frame, picture in zip(frames, read(tmp_path / "clip.mp4")[1], strict=True):

@@ -1,4 +1,4 @@
-"""Covered parts of pixels against closed forms and direct integration over the area."""
+"""Covered fractions of pixels, compared with closed forms and direct integration over the area."""
 
 from math import cos, hypot, pi, radians, sin, sqrt
 
@@ -65,7 +65,7 @@ def test_a_straight_edge_is_the_integrated_error_function(blur_px: float, angle_
 @given(at_px=st.floats(18.0, 22.0), angle_deg=st.floats(-60.0, 60.0), blur_px=st.sampled_from([0.3, 0.9, 3.0, 5.0]))
 @settings(max_examples=30, deadline=None)
 def test_the_half_level_lies_on_the_outline(at_px: float, angle_deg: float, blur_px: float) -> None:
-    """Newton's step from the pixel next to the outline, with the closed form for an upright edge."""
+    """Newton's step from the pixel next to the outline, with the closed form for a vertical edge."""
     angle = radians(angle_deg)
     # A pixel whose middle lies on the edge is covered by half, at any angle: draw the edge through one.
     through = (20.0, 20.0)
@@ -115,7 +115,7 @@ def test_a_disc_is_the_integral_over_its_chords(blur_px: float, radius_px: float
 
 
 def test_blur_moves_the_half_level_into_the_curve_by_sigma_squared_over_two_radii() -> None:
-    """The shift that every half-level reading of a round tip suffers (measuring.md, section 1)."""
+    """Shift of the half-level at a round tip (measuring.md, section 1)."""
     radius_px, blur_px = 17.0, 0.9
     # Any pixel whose middle lies at this distance from the disc's centre.
     shift_px = (blur_px**2 + 1 / 12) / (2 * radius_px)

@@ -1,4 +1,4 @@
-"""Outlines of deformed plates: chords true to the parabola, closed, holes the other way."""
+"""Outlines of deformed plates: chords agree with the parabola, loops are closed, holes have the opposite direction."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tilt and lens: what they do to points, and that outlines follow to 5e-6 px."""
+"""Tilt and lens: effect on points, and agreement of mapped outlines to 5e-6 px."""
 
 import numpy as np
 import pytest
@@ -86,7 +86,7 @@ def test_a_tilted_plane_keeps_lines_straight_and_shrinks_with_depth() -> None:
 
 
 def test_blooming_is_the_same_everywhere_in_the_picture_whatever_the_lens() -> None:
-    """It spreads on the sensor, behind the lens: in the picture the shape's area grows by perimeter times spread."""
+    """The edge bias acts on the sensor, behind the lens: the area in the picture grows by perimeter times bias."""
     seen = view(RadialLens(-0.1), Tilt(15.0, 15.0, 1500.0))
     mapped = seen.outline(polygon(((80.0, 60.0), (500.0, 30.0), (600.0, 430.0), (120.0, 400.0)), (20.0,) * 4))
     perimeter = sum(piece.length_px for piece in mapped.pieces)

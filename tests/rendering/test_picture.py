@@ -1,4 +1,4 @@
-"""Frames: noise, light, bits and colour, and how things lie over one another."""
+"""Frames: noise, light, bit depth, colour, and order of overlapping objects."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def test_light_spreads_over_both_edges_of_the_gap(light: Light, bloom_px: float)
 
 
 def test_blooming_behind_a_lens_is_still_in_picture_pixels() -> None:
-    """A tilted plane changes the scale from row to row; the spread must not follow it."""
+    """A tilted plane changes the scale from row to row, but must not change the edge bias."""
     scene = two_fingers(90.4, tip_at_px=60.0)
     camera = Camera(tilt=Tilt(about_x_deg=30.0, distance_px=1000.0), lens=RadialLens(-0.02))
     plain, bloomed = exact_grey(scene, camera), exact_grey(scene, replace(camera, bloom_px=0.5))
@@ -54,7 +54,7 @@ def test_blooming_behind_a_lens_is_still_in_picture_pixels() -> None:
 
 @pytest.mark.parametrize("bloom_px", [0.0, 0.4, 0.9, 5.0, 60.0])
 def test_light_that_spreads_over_all_of_a_dark_thing_swallows_it(bloom_px: float) -> None:
-    """A grain of 1.5 px, a pin of 1.6 px and a disc of 8 px on light ground vanish one after the other."""
+    """A grain of 1.5 px, a pin of 1.6 px and a disc of 8 px on a light background vanish one after the other."""
     rng = np.random.default_rng(2)
     for patches, half_width_px in [
         (dust(1, rng, size_px=(1.5, 1.5), levels=(20.0,)), 0.75),
@@ -69,7 +69,7 @@ def test_light_that_spreads_over_all_of_a_dark_thing_swallows_it(bloom_px: float
 @pytest.mark.parametrize("rim", [None, Rim(5.0, 250.0)])
 @pytest.mark.parametrize("bloom_px", [0.0, 0.5])
 def test_touching_fingers_are_dark_all_through(rim: Rim | None, bloom_px: float) -> None:
-    """No seam, no double shade: also where both rims and both roots lie on common lines."""
+    """Overlapping solids leave no seam and no doubled shade, even if both rims and both roots lie on common lines."""
     for gap_px in (4.0, 15.0, 16.0):
         grey = exact_grey(two_fingers(gap_px, radius_px=34.0, rim=rim), Camera(bloom_px=bloom_px))
         assert grey.min() > 40.0 - GREY
@@ -215,7 +215,7 @@ def test_the_four_directions_are_one_scene_turned(camera: Camera) -> None:
 
 
 def test_the_scene_of_the_whole_list_has_its_truth() -> None:
-    """Everything at once neither fails nor moves the truth."""
+    """A scene with all effects together is rendered without error, and its true gap is unchanged."""
     rng = np.random.default_rng(11)
     scene = two_fingers(
         120.0,

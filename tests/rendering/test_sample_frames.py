@@ -1,4 +1,4 @@
-"""The sample frames are what their notes say, and their scripts make them again."""
+"""The sample frames agree with their notes, and their scripts reproduce them."""
 
 import csv
 import subprocess
@@ -32,7 +32,7 @@ def column(path: Path, name: str) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["table1", "reference"])
 def test_a_script_makes_its_pictures_again(case: str, tmp_path: Path) -> None:
-    """Same grey levels and tables; the bytes of a PNG also depend on zlib's version."""
+    """Grey levels and tables are reproduced; the bytes of a PNG also depend on the version of zlib."""
     script = SAMPLES / f"make_{case}.py"
     run = [sys.executable, "-c", f"import runpy; runpy.run_path({str(script)!r}, run_name='__main__')", str(tmp_path)]
     subprocess.run(run, check=True, cwd=ROOT)
@@ -71,7 +71,7 @@ def test_the_clip_is_small_and_keeps_its_clock() -> None:
 
 
 def test_the_clip_follows_its_drive_behind_the_play() -> None:
-    """Written down apart from the script: a play is never more than half its width away, and reaches it."""
+    """Model of a play, independent of the script: its output is never farther than half its width away."""
     folder = SAMPLES / "opening"
     expected, drive, simulation = (folder / f"{name}.csv" for name in ("expected_gaps", "drive", "simulation"))
     input_mm = np.interp(column(expected, "time_s"), column(drive, "time_s"), column(drive, "input_mm"))

@@ -1,4 +1,4 @@
-"""Objects to calibrate with have their sizes, and others find them there."""
+"""Calibration objects have the stated sizes, and other programs measure these sizes."""
 
 import cv2
 import numpy as np

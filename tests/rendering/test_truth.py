@@ -1,4 +1,4 @@
-"""The true gap: closed forms, every direction, and agreement with what is drawn."""
+"""The true gap: closed forms, every direction, and agreement with the rendered picture."""
 
 from dataclasses import replace
 from math import hypot, radians, sqrt, tan
@@ -87,7 +87,9 @@ def test_a_measuring_point_on_the_joint_of_arc_and_side_is_found(direction: Dire
 @settings(deadline=None)
 @given(tilt_deg=st.floats(0.1, 10.0))
 def test_the_tip_of_a_tilted_sharp_finger_is_its_outermost_corner(tilt_deg: float) -> None:
-    """Measured along the image axis, not the finger's: its inner corner rises, and the side falls back from it."""
+    """The measuring height is measured along the picture's axis, not the finger's: on a tilted finger the inner corner
+    rises.
+    """
     left = true_gap(two_fingers(100.0, tilt_deg=(-tilt_deg, 0.0))).left
     outline = two_fingers(100.0, tilt_deg=(-tilt_deg, 0.0)).fingers[0].outline
     corner = min((piece.start for piece in outline.pieces), key=lambda point: point[1])
@@ -98,7 +100,7 @@ def test_the_tip_of_a_tilted_sharp_finger_is_its_outermost_corner(tilt_deg: floa
 @pytest.mark.parametrize("direction", Direction)
 @pytest.mark.parametrize("blur_px", [0.3, 0.9, 3.0, 5.0])
 def test_the_drawn_half_level_of_a_straight_edge_lies_at_the_truth(direction: Direction, blur_px: float) -> None:
-    """By the closed form of the pixel next to the edge, in the frame itself."""
+    """Edge in the rendered frame, by the closed form for the pixel next to the edge."""
     scene = two_fingers(100.37, below_tip_px=60.0, direction=direction, tip_at_px=200.0)
     true = true_gap(scene, below_tip_px=60.0)
     grey = exact_grey(scene, Camera(blur_px=blur_px))

@@ -1,4 +1,4 @@
-"""The bars of the issue in short: error, bias, and whether the stated uncertainty is true.
+"""Short tests of the accuracy limits: error, bias, and whether the stated uncertainty is true.
 
 A sample of n frames scatters about what the method does, so every limit is the bar widened by the 99.9 % quantile of
 that scatter: chi-square for an RMS, normal for a mean, binomial for a share. A method exactly at its bar passes with
@@ -33,7 +33,7 @@ POOLED = ("straight", "rounded", "blur_3", "mixed")
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors and stated uncertainties of the frames that gave a number, and how many there were."""
+    """Errors and stated uncertainties of the measured frames, and the number of these frames."""
 
     error: np.ndarray
     u: np.ndarray
@@ -62,7 +62,7 @@ def _draw(name: str, rng: np.random.Generator) -> tuple[dict, Camera]:
 
 @pytest.fixture(scope="module")
 def errors() -> dict[str, Errors]:
-    """Every class measured once."""
+    """Results of all classes of scenes, measured once for all tests."""
     found = {}
     for name in (*POOLED, "slanted"):
         rng = np.random.default_rng([94, len(name)])

@@ -1,4 +1,4 @@
-"""Black and white: the two classes, and how far they stand apart."""
+"""Thresholding: the two classes of grey levels, and their separation."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pictures of a camera with gamma, drawn by the third renderer: known, assumed, and of any depth."""
+"""Pictures of a camera with gamma, drawn by the third renderer: known or assumed response, several bit depths."""
 
 import numpy as np
 import pytest
@@ -57,7 +57,9 @@ def test_the_shift_is_odd_and_grows_with_blur() -> None:
 
 @pytest.mark.parametrize(("bits", "shift"), [(10, 0), (12, 0), (12, 4), (14, 0), (16, 0)])
 def test_depths_stored_in_sixteen_bits(bits: int, shift: int) -> None:
-    """The same picture at any depth is the same measurement, and its clipping is seen at the depth's own end."""
+    """A picture gives the same measurement at any bit depth, and clipping is detected at the highest level of that
+    depth.
+    """
     shot = plain(np.random.default_rng(4), Surface())
     eight = measured(shot.picture, Settings(BELOW_PX, Direction.UP))
     deep = (shot.picture.astype(np.uint16) << (bits - 8)) << shift

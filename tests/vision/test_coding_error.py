@@ -1,4 +1,4 @@
-"""What a codec may have done to an edge as a whole, at a flank that leans where it is measured."""
+"""Possible displacement of a whole edge by a codec, for a flank that is tilted at the measuring point."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ def u_gap_px(slope: float) -> float:
 
 @pytest.mark.parametrize("slope", [0.0, -0.5, 1.2])
 def test_flank_and_tip_are_displaced_along_their_normals(slope: float) -> None:
-    """Monte Carlo over a straight flank and a level tip, each moved along its own normal by itself."""
+    """Monte Carlo simulation of a straight flank and a level tip, displaced independently along their normals."""
     rng = np.random.default_rng(4)
     flank, tip = displaced_px(STEP, CONTRAST, slope) * rng.standard_normal((2, 20_000))
     # The flank is the line across = slope * down; the measuring height goes with the tip.

@@ -1,4 +1,4 @@
-"""Two uncertainties hold the errors in compressed recordings too, where an edge runs along the codec's blocks."""
+"""Errors in compressed recordings are below two uncertainties, even if an edge is parallel to the codec's blocks."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The table of linear filters against least squares done the long way, on edges integrated another way."""
+"""The table of linear filters against an ordinary least-squares fit, on edges integrated by another method."""
 
 from itertools import pairwise
 
@@ -73,7 +73,7 @@ def test_two_looks_at_the_table_find_the_least_squares_edge(seed: int, sigma: fl
 
 
 def test_the_gain_is_the_bound_that_unknown_levels_leave() -> None:
-    """The closed form of measuring.md section 2, one row, window long enough for its straight-line approximation."""
+    """The formula of measuring.md, section 2, for one row and a window long enough for its linear approximation."""
     filters = edge_filters(28)
     row, column = np.abs(filters.sigmas_px - 1.2).argmin(), np.abs(filters.offsets_px).argmin()
     sigma_e = np.hypot(filters.sigmas_px[row], np.sqrt(1 / 12))

@@ -1,4 +1,4 @@
-"""A rim or too much light moves an edge unseen: it is stated, refused, or not there."""
+"""A bright rim or clipping displaces an edge: the effect is stated in the uncertainty, refused, or absent."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ POSITIONS = 6
 
 
 def _measured(number: int, camera: Camera, **options: object) -> tuple[GapMeasurement | NoGap, float]:
-    """One of a few sub-pixel positions, and its true gap."""
+    """Picture with one of several sub-pixel positions, and its true gap."""
     places = {"gap_px": 141.3 + 0.37 * number, "tip_at_px": 120.4 + 0.13 * number, "radius_px": 30.0}
     scene = two_fingers(**{**places, **options})  # type: ignore[arg-type]
     true = truth(scene, camera, 10.2)
@@ -64,7 +64,7 @@ def test_clean_edges_show_neither(options: dict, blur_px: float) -> None:
 
 @pytest.mark.parametrize("exposure", [1.0, 1.5])
 def test_white_of_studio_range_is_cut_off(exposure: float) -> None:
-    """A limited-range video is cut off at level 235: too much light is refused as it is at full scale."""
+    """A video of limited range is clipped at level 235: overexposure is refused as it is at full scale."""
     light = Light(ground=200.0, exposure=exposure * 255.0 / 200.0)
     scene = two_fingers(gap_px=141.3, tip_at_px=120.4, radius_px=30.0, light=light)
     pixels = render(scene, Camera(blur_px=1.5, noise_grey=2.0), np.random.default_rng(96)) / 255.0

@@ -1,4 +1,4 @@
-"""The three-sided end: its derivatives, and its recovery from exact points."""
+"""The three-sided end of a finger: its derivatives, and its fit to exact points."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def _points(x: np.ndarray, y: np.ndarray, is_row: np.ndarray, u_px: float = 1.0)
 
 
 def _exact_points(p: np.ndarray) -> OutlinePoints:
-    """Points of the outline itself, on rays from the finger's middle, by bisection of the distance."""
+    """Points of the outline, on rays from the finger's middle, found by bisection of the distance."""
     turn = np.linspace(-0.2, np.pi + 0.2, 240)
     dx, dy = np.cos(turn), -np.sin(turn)
     is_row = np.abs(dx) > np.abs(dy)
@@ -49,7 +49,9 @@ def _exact_points(p: np.ndarray) -> OutlinePoints:
 
 @given(p=shapes)
 def test_the_jacobian_is_that_of_finite_differences(p: np.ndarray) -> None:
-    """On the outline itself: away from it Gauss-Newton leaves out what is proportional to the distance."""
+    """The derivatives are tested on the outline, because Gauss-Newton neglects terms proportional to the distance from
+    it.
+    """
     exact, h = _exact_points(p), 1e-6
     points = _points(exact.x, exact.y, exact.is_row)
     _, found = _compared(p, points)

@@ -1,4 +1,4 @@
-"""A finger's flanks are straight for a good part of their length; those of round things are not."""
+"""The flanks of a finger are straight over a sufficient length; the flanks of round objects are not."""
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ HEIGHT, WIDTH = 300, 240
 
 
 def _top(mask: Pixels) -> Top:
-    """The only top of a mask, seen with the tips up."""
+    """The only local maximum of a mask whose tips point up."""
     (top,) = find_tops(
         mask.astype(np.uint8), find_outlines(mask.astype(np.uint8)), Orientation(Direction.UP, *mask.shape)
     )
@@ -24,7 +24,7 @@ def _top(mask: Pixels) -> Top:
 
 
 def _bar(lean: float, width_px: float, top_px: float, round_px: float = 0.0) -> Pixels:
-    """A bar with a round end, leaning to the right by `lean` pixels a row."""
+    """A bar with a round end, tilted to the right by `lean` pixels per row."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     across = np.abs(x - 120.0 + lean * (y - 150.0)) - 0.5 * width_px + round_px
     above = top_px + round_px - y

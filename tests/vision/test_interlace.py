@@ -1,4 +1,4 @@
-"""Interlaced pictures against fields that were drawn apart, and pictures that are none."""
+"""Interlaced pictures, compared with separately drawn fields, and pictures that are not interlaced."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ def measured(shot: Shot, settings: Settings = KNOWN) -> GapMeasurement:
 
 
 def fields(rng: np.random.Generator, apart_px: float) -> Shot:
-    """The right finger moves by so much from the even rows' time to the odd rows'; the truth is half-way."""
+    """The right finger moves by a given distance from the even rows' time to the odd rows'; the truth is half-way."""
     left, right = gripper(rng)
     even, odd = (
         light_on_sensor((left, replace(right, across_px=right.across_px + by)), Surface(), 1.0, SIZE_PX, rng)

@@ -1,4 +1,4 @@
-"""Smooth outlines that are known exactly: circles and ellipses."""
+"""Measuring points of exactly known smooth outlines: circles and ellipses."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ QUARTIC_PX = 0.012
 
 
 def _circle(radius: float, x0: float, y0: float, blur: float = 0.0, u: float = 0.01) -> OutlinePoints:
-    """Half-level outline of a blurred disc, seen in rows where it is steep and in columns where it is flat."""
+    """Half-level outline of a blurred disc, located in rows where it is steep and in columns where it is flat."""
     seen = radius - 0.5 * blur**2 / radius
     flat = np.arange(np.ceil(x0 - 0.7 * seen), x0 + 0.7 * seen)
     steep = np.arange(np.ceil(y0 - 0.7 * seen), y0 + 0.7 * seen)

@@ -1,4 +1,4 @@
-"""Whatever the pixels are, a frame gives a number with its uncertainty or a reason."""
+"""For any pixel values, a frame gives a gap with its uncertainty, or the reason why there is none."""
 
 import numpy as np
 from hypothesis import given, settings

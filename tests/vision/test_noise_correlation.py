@@ -1,4 +1,6 @@
-"""How many neighbouring lines share their noise: against kernels whose factor is known, and what it is for."""
+"""Number of neighbouring lines that share noise: for filter kernels with a known factor, and its effect on
+uncertainties.
+"""
 
 import cv2
 import numpy as np
@@ -17,7 +19,7 @@ LEVELS, NOISE = 65536, 900.0
 
 
 def lines() -> ProfileLines:
-    """Two upright edges at columns 100 and 200, seen in rows 40 to 111."""
+    """Two vertical edges at columns 100 and 200, located in rows 40 to 111."""
     fixed = np.zeros((2, PLACES), dtype=np.intp)
     coarse, weight, outward = np.zeros_like(fixed), np.zeros((2, PLACES)), np.ones_like(fixed)
     fixed[:, :INNER] = np.arange(40, 40 + INNER)
@@ -28,7 +30,9 @@ def lines() -> ProfileLines:
 
 
 def edge_weight(reach: int) -> np.ndarray:
-    """How an edge of blur 1 px in the middle weighs the pixels of its line: its slope, without what two levels take."""
+    """Weights of a line's pixels for the position of an edge with a blur of 1 px: derivative, orthogonal to the two
+    levels.
+    """
     place = np.arange(-reach, reach + 1)
     slope = np.exp(-0.5 * place**2 / (1.0 + 1.0 / 12.0))
     return slope - slope.mean()
@@ -78,7 +82,7 @@ def test_noise_of_a_known_kernel(kernel: np.ndarray) -> None:
 
 
 def test_a_digital_zoom_is_as_sure_as_it_says() -> None:
-    """Twelve pictures enlarged by 1.5: without the correlation their uncertainty would be a third too small."""
+    """Twelve pictures enlarged by 1.5: without the correlation, their stated uncertainty would be a third too small."""
     rng = np.random.default_rng(20)
     ratios = []
     for _ in range(12):

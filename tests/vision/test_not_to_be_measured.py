@@ -1,4 +1,4 @@
-"""What looks like two fingers and is not: cut off by a strap, a second pair, a shadow on one side."""
+"""Scenes like two fingers that must be refused: tips hidden by a strap, a second pair, a shadow on one side."""
 
 import zlib
 

@@ -1,4 +1,4 @@
-"""Sides of a body that are blurred otherwise than the others: a shadow's, and not a lens's."""
+"""Sides of a body with another blur than the other sides: a shadow is detected, a lens's effect accepted."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ STRETCH = np.array([1.0, 1, 1, 1.08, 1.08, 1.08, 1.0, 1.08])
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_sides_that_a_lens_magnifies_differently_are_not_in_doubt(share: float) -> None:
-    """Blur of optics is the same in the picture, of defocus rather in the plane."""
+    """The blur of optics is equal on all sides in the picture, the blur of defocus is equal in the object plane."""
     blur = 1.2 / STRETCH**share
     assert doubtful_offsets(MIDDLES, NORMALS, blur, U_BLUR, STRETCH).shape == (8, 0)
 

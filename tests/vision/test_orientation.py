@@ -1,4 +1,4 @@
-"""Turning a picture into the fingers' axes and back is exact."""
+"""The transformation of a picture to the fingers' axes and back is exact."""
 
 import numpy as np
 import pytest

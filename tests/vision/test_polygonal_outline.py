@@ -1,4 +1,4 @@
-"""Fingers with cut corners: straight runs, the half-level of a corner, and the tip and edge read off the sides."""
+"""Fingers with chamfers: straight runs, half-level of a blurred corner, and tip and edge derived from the sides."""
 
 from itertools import pairwise
 from math import pi
@@ -21,7 +21,7 @@ DEPTH = 2e-3
 
 
 def _chamfered(rng: np.random.Generator, cut_px: float, deep_px: float) -> OutlinePoints:
-    """Points of a finger of 80 px with both corners cut, its inner flank at x = 0: rows on flanks, columns on top."""
+    """Points of a finger 80 px wide with two chamfers and its inner flank at x = 0: rows on flanks, columns on top."""
     corners = np.array(
         [(-80.0, 60.0), (-80.0, deep_px), (-80.0 + cut_px, 0.0), (-cut_px, 0.0), (0.0, deep_px), (0.0, 60.0)]
     )
@@ -45,7 +45,7 @@ def _chamfered(rng: np.random.Generator, cut_px: float, deep_px: float) -> Outli
 
 @pytest.mark.parametrize(("cut_px", "deep_px"), [(20.0, 20.0), (25.0, 6.0), (8.0, 24.0)])
 def test_tip_and_edge_of_cut_corners_are_found_within_their_uncertainty(cut_px: float, deep_px: float) -> None:
-    """Below the tip the edge is that of the cut, or of the flank where the cut has ended."""
+    """Below the tip, the edge is that of the chamfer, or below the chamfer's end that of the flank."""
     truth = -cut_px * (1.0 - BELOW_PX / deep_px) if deep_px > BELOW_PX else 0.0
     errors = []
     for seed in range(12):
@@ -57,7 +57,7 @@ def test_tip_and_edge_of_cut_corners_are_found_within_their_uncertainty(cut_px: 
 
 
 def test_a_round_end_is_no_polygon() -> None:
-    """A curve would need more sides than a finger has."""
+    """A curved outline is refused, because it would need more sides than a finger has."""
     turn = np.linspace(-0.95 * pi, -0.05 * pi, 140)
     x, y = -40.0 + 40.0 * np.cos(turn), 40.0 + 40.0 * np.sin(turn)
     side = np.where(np.abs(np.cos(turn)) < 0.7, TIP_SIDE, np.where(x > -40.0, INNER_SIDE, OUTER_SIDE)).astype(np.int64)
@@ -78,7 +78,7 @@ def test_runs_end_where_the_direction_changes() -> None:
 
 @pytest.mark.parametrize("turn", [0.4, 0.5 * pi, 2.0])
 def test_the_half_level_of_a_sharp_corner_is_that_of_the_bivariate_normal(turn: float) -> None:
-    """Half of the light comes from the wedge, by the normal distribution over both of its sides."""
+    """At the half-level, half of the light comes from the wedge, by the normal distribution over both of its sides."""
     depth = float(corner_half_level(np.zeros(1), np.zeros(1), turn, 1.0)[0]) * np.cos(0.5 * turn)
     wedge = multivariate_normal([0.0, 0.0], [[1.0, np.cos(turn)], [np.cos(turn), 1.0]])
     assert wedge.cdf(np.array([depth, depth])) == pytest.approx(0.5, abs=DEPTH)

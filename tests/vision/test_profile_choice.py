@@ -1,4 +1,4 @@
-"""Shadow, wall, glare and motion beside the edges, drawn by the third renderer: taken off, or stated."""
+"""Shadow, wall, glare and motion at the edges, drawn by the third renderer: corrected, or stated in the uncertainty."""
 
 from dataclasses import replace
 from functools import partial
@@ -56,7 +56,9 @@ def test_what_stands_beside_the_edge(name: str) -> None:
 
 
 def test_motion_across_is_no_blur_of_round_tips() -> None:
-    """A fillet corrected for the flanks' spread as if it were focus would be moved by this, twice what is allowed."""
+    """If motion blur of the flanks were taken for defocus, the correction of a fillet would be wrong by twice the
+    limit.
+    """
     way_px, radius_px = 8.0, 27.0
     left, right = Finger(90.3, 98.2, 100.0, radius_px), Finger(340.7, 99.1, 100.0, radius_px)
     light = light_on_sensor((left, right), Surface(motion_px=(way_px, way_px)), 1.0, SIZE_PX, np.random.default_rng(1))
@@ -68,7 +70,9 @@ def test_motion_across_is_no_blur_of_round_tips() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("breadth_px", [1.4, 0.0])
 def test_a_narrow_wall_is_stated_where_no_outer_flank_is_in_view(breadth_px: float) -> None:
-    """A long fillet hides the wall's shape: only the flanks' width, beside the tips', says that something is there."""
+    """A long fillet hides the profile of a wall: only the blur of the flanks, compared with the tips, indicates the
+    wall.
+    """
     left, right = Finger(25.3, 98.2, 300.0, 60.0, -0.8), Finger(424.7, 99.1, 300.0, 60.0, 0.8)
     truth_px, rng = true_gap(left, right, BELOW_PX), np.random.default_rng(3)
     light = light_on_sensor((left, right), Surface(wall_px=breadth_px), 1.0, SIZE_PX, rng)
@@ -78,7 +82,7 @@ def test_a_narrow_wall_is_stated_where_no_outer_flank_is_in_view(breadth_px: flo
 
 
 def h264_clip(path: Path, breadth_px: float, frames: int) -> list[float]:
-    """Write a lossy clip of opening fingers whose outer flanks are out of view; their true gaps."""
+    """Write a lossy clip of opening fingers whose outer flanks are out of view, and return the true gaps."""
     rng, truth_px = np.random.default_rng(20), []
     with av.open(str(path), "w") as clip:
         stream = clip.add_stream("libx264", rate=25, options={"crf": "20"})
@@ -102,7 +106,7 @@ def h264_clip(path: Path, breadth_px: float, frames: int) -> list[float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("breadth_px", [1.4, 4.0])
 def test_a_wall_in_a_lossy_clip_is_stated(breadth_px: float, tmp_path: Path) -> None:
-    """The codec's own widening of edges must not hide a wall, nor a line of the picture's border pass for a flank."""
+    """Blur by the codec must not hide a wall, and a line at the picture's border must not be taken for a flank."""
     truth_px = h264_clip(tmp_path / "wall.mp4", breadth_px, 6)
     for frame, gap_px in zip(VideoFile(str(tmp_path / "wall.mp4")), truth_px, strict=True):
         assert isinstance(frame, Frame)
@@ -113,7 +117,7 @@ def test_a_wall_in_a_lossy_clip_is_stated(breadth_px: float, tmp_path: Path) -> 
 
 
 def test_the_sample_has_no_wall_where_its_outer_flanks_leave_the_picture() -> None:
-    """Its codec widens flanks beside tips by up to 15 % of variance, as it may at its quantiser steps."""
+    """The codec increases the squared blur of flanks relative to tips by up to 15 %, as its quantiser steps permit."""
     frames = islice(VideoFile(str(SAMPLE)), 98, 134)
     found = [measure_frame(frame, Settings(BELOW_PX)) for frame in frames if isinstance(frame, Frame)]
     assert [each.beside for each in found if isinstance(each, GapMeasurement)] == [""] * 36
@@ -121,7 +125,7 @@ def test_the_sample_has_no_wall_where_its_outer_flanks_leave_the_picture() -> No
 
 @pytest.mark.parametrize("at_px", [0.0, 0.13, 0.3, 0.5])
 def test_a_sharp_still_rectangle_does_not_move(at_px: float) -> None:
-    """Drawn by the share that covers each pixel, without blur: at no sub-pixel place is anything said to move."""
+    """Sharp pictures, rendered by the covered share of each pixel: no motion is reported at any sub-pixel position."""
     picture = np.full((240, 320), 220.0)
     columns, rows = (np.arange(n)[:, None] + np.array([-0.5, 0.5]) for n in (320, 240))
     for left, right in ((40.2 + at_px, 110.0 + at_px), (190.0 - at_px, 262.3)):
@@ -141,7 +145,7 @@ def test_a_clean_edge_is_left_alone() -> None:
 
 @pytest.mark.parametrize(("kind", "breadth", "share"), [(WALL, 3.0, -0.4), (SHADOW, 6.0, -0.25), (GLARE, 2.5, 0.3)])
 def test_a_profile_gives_back_what_it_was_drawn_with(kind: int, breadth: float, share: float) -> None:
-    """Profiles summed up from a thousand thin slabs of light, each blurred by itself."""
+    """Profiles computed as a sum of a thousand thin strips of light, each blurred separately."""
     t, at, blur = np.arange(-16.0, 16.0, 0.5), -1.2, 1.1
     slabs = np.arange(-30.0, 30.0, 0.01) + 0.005
     away = slabs - at
@@ -167,7 +171,7 @@ def test_a_profile_gives_back_what_it_was_drawn_with(kind: int, breadth: float, 
 
 
 def test_a_wall_is_part_of_the_outline_where_that_is_asked() -> None:
-    """The wall is seen on the gap's side of either finger: the outline's gap is two breadths smaller."""
+    """The wall is visible on the inner side of both fingers: the gap of the outline is smaller by two wall widths."""
     rng = np.random.default_rng([15, 4])
     breadth_px, seen = 4.0, 0
     for _ in range(FRAMES):

@@ -1,4 +1,4 @@
-"""Points that a fit takes for dust: where they are too many for that, the edge is unsure."""
+"""Points that a fit rejects as dust: if they are too many for dust, the uncertainty of the edge increases."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ U_POINT, OFF_PX = 0.05, 1.5
     ("above", "below", "is_unsure"), [(0, 0, False), (1, 1, False), (2, 0, False), (3, 0, True), (2, 2, True)]
 )
 def test_most_points_or_half_on_both_sides_may_be_the_edge(above: int, below: int, is_unsure: bool) -> None:
-    """Four points above the height and four below; so many of them lie 1.5 px off, as a cut would have it."""
+    """Four points above and four below the measuring height; some of them deviate by 1.5 px, as at a chamfer."""
     y = np.array([6.5, 7.5, 8.5, 9.5, 10.5, 11.5, 12.5, 13.5])
     robust = np.ones(y.size)
     robust[:above] = robust[y.size - below :] = 0.0

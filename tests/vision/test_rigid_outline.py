@@ -1,4 +1,4 @@
-"""Rigid motions from edges: against exact pictures, with coverage, covered edges, and things that are not there."""
+"""Rigid motions from edges in exactly rendered pictures: errors, covered edges, and absent bodies."""
 
 import cv2
 import numpy as np
@@ -104,7 +104,7 @@ def test_edges_all_one_way_do_not_hold_a_body() -> None:
 
 
 def one_end_only() -> Chunks:
-    """Both long sides and one end: a single edge holds x."""
+    """Both long sides and one end are visible, so that a single edge determines x."""
     whole = chunks()
     kept = whole.normals[0] >= 0.0
     return Chunks(whole.middles[:, kept], whole.normals[:, kept], whole.half_length)

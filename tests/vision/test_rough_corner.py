@@ -1,4 +1,4 @@
-"""A rough corner, cut or round: the measuring point is that of the drawn shape, within its uncertainty."""
+"""A rough corner with chamfer or fillet: the measuring point agrees with the drawn shape within its uncertainty."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ ROUGH = 0.2
 
 
 def outline(is_cut: bool, rng: np.random.Generator) -> OutlinePoints:
-    """Upright bar from x = -90 to 0 with its top at y = 0, seen in rows and columns, with independent scatter."""
+    """Points in rows and columns, with independent scatter, of an upright bar from x = -90 to 0, its top at y = 0."""
     y, x = np.arange(0.5, 50.0), np.arange(-WIDTH + 0.5, 0.0)
 
     def inset(d: np.ndarray) -> np.ndarray:
@@ -36,7 +36,7 @@ def outline(is_cut: bool, rng: np.random.Generator) -> OutlinePoints:
 
 
 def fillet_fit(points: OutlinePoints) -> FingerEnd:
-    """The bar with fillets of the same area, and how far the points lie from it."""
+    """The bar with fillets of the same area, and the distances of the points from its outline."""
     cx = np.clip(points.x, -WIDTH + RADIUS, -RADIUS)
     cy = np.maximum(points.y, RADIUS)
     away = np.hypot(points.x - cx, points.y - cy) - RADIUS
@@ -59,7 +59,7 @@ def test_the_measuring_point_is_that_of_the_drawn_corner(is_cut: bool) -> None:
 
 
 def test_what_nothing_tells_is_in_the_uncertainty() -> None:
-    """Points that all share one error say nothing of the corner: half-way between both shapes, and as unsure."""
+    """If all points share one error, the corner is undetermined: the result is half-way between the two shapes."""
     points = [outline(True, np.random.default_rng(3))] * 2
     start = MeasuringPoint(0.0, -20.0, -2.0, 0.5, 1e-4 * np.eye(2))
     found = with_corner_doubt(points, [fillet_fit(p) for p in points], [start, start], BELOW, 1e4)

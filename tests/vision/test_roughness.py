@@ -1,4 +1,6 @@
-"""Rough edges: their deviation and length against waves that were drawn with known ones, and what it is for."""
+"""Rough edges: estimated deviation and correlation length for random waves with known values, and resulting
+uncertainties.
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -24,7 +26,7 @@ U_POINT, WIDTH, BLUR = 0.05, 90.0, 1.0
 
 
 def finger(rng: np.random.Generator, deviation: float, length: float) -> tuple[OutlinePoints, FingerEnd]:
-    """A square finger, every side with waves of its own: Gaussian correlation exp(-d^2 / 2 length^2)."""
+    """A finger with sharp corners and independent waves on every side, with the correlation exp(-d^2 / 2 length^2)."""
 
     def waves(count: int) -> np.ndarray:
         place = np.arange(count)
@@ -47,9 +49,8 @@ def found(rng: np.random.Generator, deviation: float, length: float) -> Roughnes
 
 @pytest.mark.parametrize("length", [1.5, 3.0, 4.0])
 def test_waves_give_back_what_they_were_drawn_with(length: float) -> None:
-    """Four flanks of 60 points hold 240 / (2.5 length) independent waves: the deviation is known to 1 / sqrt(2 n).
-
-    The product does not know that the correlation is a Gaussian's.
+    """Four flanks of 60 points have n = 240 / (2.5 length) independent waves, which determine the deviation to 1 /
+    sqrt(2 n). The program assumes another correlation function than the drawn Gaussian one.
     """
     deviation, waves = 0.25, 240.0 / (np.sqrt(2.0 * np.pi) * length)
     rng = np.random.default_rng(int(10 * length))
@@ -64,7 +65,9 @@ def test_waves_give_back_what_they_were_drawn_with(length: float) -> None:
 
 
 def rounded(rng: np.random.Generator, errors: Roughness, radius: float) -> tuple[OutlinePoints, OutlinePoints]:
-    """A finger with fillets, displaced along its normals by waves of this covariance: without and with their u."""
+    """A finger with fillets, displaced along its normals by waves of a given covariance, without and with their
+    uncertainty.
+    """
     rows, columns = np.arange(0.3 * radius, 64.0, 2.0), np.arange(-WIDTH + 0.3 * radius, -0.3 * radius + 1.0, 2.0)
 
     def inset(d: np.ndarray) -> np.ndarray:
@@ -88,7 +91,7 @@ def rounded(rng: np.random.Generator, errors: Roughness, radius: float) -> tuple
 
 
 def test_a_rough_fillet_is_as_sure_as_it_says() -> None:
-    """Errors of tip and edge on a slanted fillet by waves of a known covariance, in units of what is stated."""
+    """Errors of tip and edge on a slanted fillet with waves of known covariance, in stated uncertainties."""
     errors = Roughness(0.3**2 * np.exp(-0.5 * (np.arange(65.0) / 4.0) ** 2))
     rng, below, radius = np.random.default_rng(21), 6.0, 25.0
     truth = np.array((0.0, np.sqrt(radius**2 - (radius - below) ** 2) - radius))
@@ -105,7 +108,7 @@ def test_a_rough_fillet_is_as_sure_as_it_says() -> None:
 
 
 def test_a_row_sees_more_of_roughness_on_a_slant() -> None:
-    """On a fillet at 45 degrees a row moves by sqrt(2) of what the edge moves along its normal."""
+    """On a fillet at 45 degrees, a point moves along its row by sqrt(2) times the edge's normal displacement."""
     errors, radius = Roughness(0.3**2 * np.exp(-0.5 * (np.arange(65.0) / 4.0) ** 2)), 25.0
     points = rounded(np.random.default_rng(1), errors, radius)[1]
     at_45 = np.argmin(np.abs(points.y[points.side == 0] - (1.0 - np.sqrt(0.5)) * radius))
@@ -133,7 +136,9 @@ def test_longer_flanks_count_where_the_near_ones_are_too_short_to_tell() -> None
 
 
 def test_flanks_too_short_to_tell_are_not_taken_for_smooth() -> None:
-    """Sixteen points of a rough flank are explained by its parabola about as well: that is no evidence of none."""
+    """A parabola explains sixteen points of a rough flank about equally well, which does not prove that there is no
+    roughness.
+    """
     rng, untold = np.random.default_rng(8), 0
     for _ in range(10):
         (left, left_end), (right, right_end) = (finger(rng, 0.25, 4.0) for _ in range(2))
@@ -162,7 +167,7 @@ def measured_plain() -> GapMeasurement:
 @pytest.mark.slow
 @pytest.mark.parametrize(("rough_px", "rms_px"), [(0.0, 0.25), (0.3, 0.6)])
 def test_a_printed_finger_is_as_sure_as_it_says(rough_px: float, rms_px: float) -> None:
-    """Twelve pictures of the third renderer: errors in units of what is stated, and no more than a tenth refused."""
+    """Twelve pictures of the third renderer: errors in units of the stated uncertainty, and at most a tenth refused."""
     rng = np.random.default_rng([9, int(10 * rough_px)])
     draw = partial(texture, rough_px=rough_px)
     errors, ratios = [], []

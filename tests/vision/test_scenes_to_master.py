@@ -1,4 +1,4 @@
-"""Every scene gives its gap, within a tenth of a pixel or four of its own uncertainties."""
+"""Every scene gives its true gap within a tenth of a pixel, or within four stated uncertainties."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What all rows of an edge share is seen in their mean residual: nothing in sound pictures, much in others."""
+"""An error that all rows of an edge share appears in their mean residual, insignificant in ordinary pictures."""
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ SETTINGS = Settings(10.2, Direction.UP, other_response=None)
 
 
 def drawn(seed: int, shift_px: float = 0.0, noise: float = 2.0) -> NDArray[np.uint8]:
-    """Two upright bars by exact integrals over the pixel, which separate."""
+    """Two vertical bars, computed by exact (separable) integrals over the pixels."""
     rng = np.random.default_rng(seed)
     x, y, sigma = np.arange(320.0) - shift_px, np.arange(240.0)[:, None], 1.0
 
@@ -70,7 +70,7 @@ def test_pictures_saved_again_after_jpeg_are_less_sure() -> None:
 
 
 def test_an_odd_profile_is_no_displacement() -> None:
-    """Optics whose spread is no Gaussian but alike to both sides: a sum of two blurs."""
+    """Optics whose spread is not Gaussian but symmetric: a sum of two Gaussian blurs."""
     rng = np.random.default_rng(3)
     sharp = drawn(60, noise=0.0).astype(np.float64)
     wide = cv2.GaussianBlur(sharp, (0, 0), 2.0)

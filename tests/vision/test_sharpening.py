@@ -1,4 +1,4 @@
-"""Sharpening of stored levels: profiles that were drawn with a known mask, and a webcam's pictures."""
+"""Sharpening of stored levels: profiles computed with a known mask, and pictures like those of a webcam."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ POWER = 255.0 * (LEVELS / 255.0) ** 2.2
 
 
 def profile(at: float, blur: float, amount: float, rng: np.random.Generator, noise: float = 0.3) -> Profile:
-    """A step of light with a thousandth of a pixel's slabs, coded, sharpened with a radius of one pixel."""
+    """A step of light in strips of a thousandth of a pixel, encoded, and sharpened with a radius of one pixel."""
     fine = np.arange(-24.0, 24.0, 0.02)
     light = 0.06 + 0.59 * gaussian_filter1d((fine > at).astype(float), blur / 0.02)
     coded = 255.0 * light ** (1.0 / 2.2)

@@ -1,4 +1,4 @@
-"""Where there is no number there is a reason, and never a plausible wrong value."""
+"""A frame without a gap has a reason, and no frame has a plausible wrong value."""
 
 from collections.abc import Callable
 
@@ -87,7 +87,7 @@ def _disc_and_bar(rng: np.random.Generator) -> Pixels:
 
 
 def _ends_below(*shapes: tuple[str, float, float, float]) -> Callable[[np.random.Generator], Pixels]:
-    """Bars and discs (kind, middle, top, width) that come in from the lower border, each a little elsewhere."""
+    """Bars and discs (kind, middle, top, width) that extend from the lower border, at slightly different positions."""
 
     def draw(rng: np.random.Generator) -> Pixels:
         picture = np.full((4 * 480, 4 * 640), 210, dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""A stripe of ground narrower than its blur, drawn exactly."""
+"""A stripe of background that is narrower than its blur, rendered exactly."""
 
 import numpy as np
 import pytest

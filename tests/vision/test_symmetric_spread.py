@@ -1,4 +1,4 @@
-"""What optics spread alike to both sides is explained by them, whatever their shape; what lies on one side is not."""
+"""A symmetric spread of any shape is explained by optics; an asymmetric spread is not."""
 
 import numpy as np
 from scipy.special import ndtr
@@ -10,14 +10,16 @@ WEIGHT = np.full(T.size, 70.0 / 4.0)
 
 
 def _disc(radius_px: float) -> np.ndarray:
-    """Light of a step behind a disc of defocus, by its line spread function."""
+    """Light of a step blurred by a disc of defocus, computed from its line spread function."""
     fine = np.linspace(-20.0, 20.0, 8001)
     spread = np.sqrt(np.maximum(radius_px**2 - fine**2, 0.0))
     return 30.0 + 150.0 * np.interp(T, fine, np.cumsum(spread) / spread.sum())
 
 
 def test_a_disc_is_symmetric_and_a_line_of_light_is_not() -> None:
-    """Chance alone is left of the disc, a little to one side of where the profile was centred; far more of the line."""
+    """For a disc of defocus, slightly off the profile's centre, only noise remains; for a line of light, much more
+    remains.
+    """
     rng = np.random.default_rng(5)
     noise = rng.standard_normal(T.size) / np.sqrt(WEIGHT)
     disc = symmetric_squares(T + 0.07, _disc(2.0) + noise, WEIGHT, 1.1)

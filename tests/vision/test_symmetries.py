@@ -1,4 +1,4 @@
-"""A picture that is mirrored, shifted, turned, coloured, inverted or cut out gives the same gap."""
+"""A picture that is mirrored, shifted, rotated, coloured, inverted or cropped gives the same gap."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,6 @@
-"""A template is found where it lies, as zero-normalised correlation has it, and nothing is found where nothing is."""
+"""A template is found at its true position, with the correlation of the definition, and is not found where it is
+absent.
+"""
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from fingervision.vision.template_search import BEYOND_PX, Template
 
 
 def _correlation(part: np.ndarray, template: np.ndarray) -> np.ndarray:
-    """By its definition, place by place."""
+    """Zero-normalised correlation, computed by its definition at every position."""
     windows = np.lib.stride_tricks.sliding_window_view(part.astype(float), template.shape)
     centred = windows - windows.mean(axis=(2, 3), keepdims=True)
     own = template.astype(float) - template.mean()

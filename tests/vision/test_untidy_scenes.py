@@ -1,4 +1,6 @@
-"""What stands before the camera of a lab: right, refused or `gripping`, drawn by a renderer that shares no code."""
+"""Untidy laboratory scenes, drawn by an independent renderer: measured correctly, refused, or with the status
+`gripping`.
+"""
 
 import zlib
 
@@ -88,7 +90,9 @@ def test_clutter_is_right_or_refused(name: str) -> None:
 
 
 def test_a_cut_that_ends_at_the_measuring_height_is_no_fillet() -> None:
-    """A fillet fits but for the middle and the ends of the cut, which pass for dust (0.9 px off in the second)."""
+    """A fillet fits except at the middle and the ends of the chamfer, which look like dust (0.9 px off in the second
+    case).
+    """
     for seed in range(3):
         scene = Scene(np.random.default_rng([seed, 95]), is_cut=True, inner_corner_px=9.5, outer_corner_px=9.5)
         scene.paint()
@@ -138,7 +142,7 @@ def test_two_bars_that_lie_in_view_are_fingers_only_where_they_lie_side_by_side(
 
 
 def test_the_spaces_of_a_letter_are_no_fingers() -> None:
-    """A letter E among discs of its size: its dark spaces look like bars, its arm between them like the gap."""
+    """A letter E among discs of similar size: its dark spaces look like bars, and the arm between them like the gap."""
     canvas, rng = Canvas(640, 480, 60.0), np.random.default_rng(6)
     for x_px in range(80, 640, 130):
         for y_px in range(80, 480, 150):

@@ -1,4 +1,4 @@
-"""The way from one finger to the other is free but for dust, whichever way it runs."""
+"""The path between the two fingers contains only background and dust, in both directions."""
 
 import numpy as np
 import pytest
