@@ -24,12 +24,12 @@ def inputs_mm(drive: Path, columns: Path | None, gripper: Gripper) -> NDArray[np
     if 0.0 < largest < _METRES_BELOW_OF_HEIGHT * gripper.body.height_mm:
         raise UsageError(
             f"The inputs of {drive} must be millimetres, but the largest is {largest:g} for a gripper of "
-            f"{gripper.body.height_mm:g} mm: are they metres? Multiply the column by 1000."
+            f"{gripper.body.height_mm:g} mm: are they metres? Multiply the column input_mm by 1000."
         )
     if largest > gripper.body.height_mm:
         raise UsageError(
             f"The inputs of {drive} must be millimetres, but the largest is {largest:g} for a gripper of "
-            f"{gripper.body.height_mm:g} mm: are they micrometres? Divide the column by 1000."
+            f"{gripper.body.height_mm:g} mm: are they micrometres? Divide the column input_mm by 1000."
         )
     if inputs.size < 2:
         raise UsageError(f"The drive {drive} must hold at least two different inputs, but holds {inputs.size}.")

@@ -248,7 +248,7 @@ def check_material(material: Material, origin: str) -> None:
         raise DataError(
             f"material.yield_mpa over material.youngs_modulus_mpa in {origin} must lie between {_LEAST_YIELD_STRAIN:g} "
             f"and {_MOST_YIELD_STRAIN:g}, but is {material.yield_mpa:g} / {material.youngs_modulus_mpa:g} = "
-            f"{strain:.3g}; is the modulus in {guess}? Both must be in MPa."
+            f"{strain:.3g}; is the modulus in {guess}? Modulus and yield stress must be in MPa."
         )
 
 

@@ -112,7 +112,7 @@ def measured_rows(
     if count > MOST_RUNS:
         raise DataError(
             f"{path} must have at most {MOST_RUNS} runs, but has {count} in {kept.size} rows: does the run column "
-            "number the rows? Leave it out, or compare fewer runs at once."
+            "number the rows? Leave the run column out, or compare fewer runs at once."
         )
     time = column.get("time_s")
     if time is not None and run_cells is None and np.any(np.diff(time) < 0.0):

@@ -164,7 +164,7 @@ def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
             raise
         raise DataError(
             f"{path} is not a model: it must be a simulation table, a gripper.toml, mechanism.toml or model.toml, an "
-            f"FMU, or a Python file with simulate(time_s, input_mm). As a table it cannot be read: {error}"
+            f"FMU, or a Python file with simulate(time_s, input_mm). The file cannot be read as a table either: {error}"
         ) from error
 
 

@@ -113,7 +113,8 @@ def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect
         if 2 * len(names) == dialect.wide and not any(is_value(name, ".") for name in names):
             raise DataError(
                 f"{path} has {len(names)} names and {dialect.wide} cells a row between commas: decimal commas and "
-                "commas between cells cannot be distinguished. Export it with semicolons or tabs."
+                "commas between cells cannot be distinguished. Export the table with semicolons or tabs between the "
+                "cells."
             )
 
 

@@ -203,7 +203,7 @@ def measure_gap(
 
 
 def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> list[MeasuringPoint]:
-    """Measuring points of both fingers from straight sides with corners; empty if either lacks such a shape.
+    """Measuring points of both fingers from straight sides with corners; empty if a finger has another shape.
 
     Both fingers are measured by the same method, so that their systematic errors are equal.
     """

@@ -49,7 +49,8 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         why = f"signal {-done.returncode}" if done.returncode < 0 else (said[-1][:SHOWN] if said else "no answer")
         raise DataError(
-            f"{path} is damaged: the program that reads it crashed on it ({why}). Save the table again, or as CSV."
+            f"{path} is damaged: the library that reads files of this format crashed ({why}). Save the table again, "
+            f"or as CSV."
         )
     kind, *answer = pickle.loads(done.stdout)
     if kind == "question":

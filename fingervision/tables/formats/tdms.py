@@ -51,7 +51,7 @@ def read(path: Path, given: Entry) -> RawTable:
         listed = ", ".join(f"{column.name} {len(column)}" for column in columns) or "none"
         raise DataError(
             f"The channels of group '{name}' of {path} must have the same number of values, but have: {listed}. Save "
-            "the channels of each rate in a group of their own."
+            f"the channels of each sampling rate in a separate group."
         )
     notes = (f"Not read, because they are not channels of numbers: {', '.join(passed)}.",) if passed else ()
     if warned:
