@@ -4,7 +4,7 @@ The model applies equations (5) to (15) of Hricko & Havlik (2015), in the plane,
 driven one: the compliance at the drive is C = sum T C_i T', where T transforms the compliance C_i of flexure i to the
 drive. The stiffness is the inverse of the compliance in the directions that the drive and its guides constrain. Several
 drives act as loads at several bodies of a tree of bodies. A drawing with a closed loop of bodies is refused, because
-the sum exists only for chains and trees.
+compliances can be summed only along chains and trees.
 """
 
 from dataclasses import replace

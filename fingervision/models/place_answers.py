@@ -1,7 +1,7 @@
 """Response of a mechanism with a local change: stiffness or position of a hinge, or slip in a pivot.
 
 Bodies keep their condensed stiffness; a displaced flexure is connected to them by a rigid arm, and a flexure of changed
-thickness keeps its ends. The response to each local change then requires the solution of one small system of equations,
+thickness keeps its ends. The response to each local change requires the solution of one small system of equations,
 which takes a thousandth of the time of a new mesh.
 """
 

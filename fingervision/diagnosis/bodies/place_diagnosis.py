@@ -34,7 +34,7 @@ Explain = Callable[[MeasuredTable, CorrectedModel], "Diagnosis"]
 
 
 def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[MeasuredTable, CorrectedModel]:
-    """Subtract the effects of a corrected model that have a place from a table; unchanged if there are none.
+    """Subtract from a table those effects of a corrected model that belong to a hinge, link or pivot.
 
     Raises
     ------

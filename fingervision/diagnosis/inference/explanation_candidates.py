@@ -208,8 +208,8 @@ def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explan
 
     Explanations with a smaller change are dropped, because they only follow the rounding errors of an encoder. For
     example, a delay within one step of an encoder gained 225 in chi-square, and hid an offset and a play that changed
-    the prediction by twenty times as much. If even the best explanation only follows rounding errors of an encoder,
-    explanations with other effects may do so as well: only extensions of the smaller explanation are then kept.
+    the prediction by twenty times as much. If the best of the larger explanations only follows rounding errors of an
+    encoder, others may do so as well. In this case, only explanations that contain all effects of `smaller` are kept.
     """
     beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
     if beyond[:1] == larger[:1]:

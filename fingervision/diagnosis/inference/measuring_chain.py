@@ -114,7 +114,8 @@ class MeasuringChain:
         history = self.history if self.path is None else self.path.history
         input_mm, drives = history.input_mm, self._stages[0]
         if history.commanded:
-            # A delay may act before or after what does not change with time: delayed jumps fall between the points.
+            # A delay commutes with effects that do not depend on time. Delays are applied last, because the jumps of a
+            # delayed command lie between the points of the path.
             drives = tuple(sorted(drives, key=lambda effect: effect.delay_s is not None))
         for effect in drives:
             if effect.name in acting:

@@ -199,7 +199,8 @@ def settled(
 ) -> tuple[Explanation, tuple[Point, ...]]:
     """Give an explanation its posterior standard deviations, and parameters at a bound also the posterior mean.
 
-    A best fit at a bound is a corner of the region that the data allow; the posterior mean predicts better.
+    If the best fit lies at a bound, the posterior mean predicts better, because the data also allow values away from
+    the bound.
 
     Returns
     -------
