@@ -136,7 +136,7 @@ def test_other_frames_and_other_settings_are_refused() -> None:
     with pytest.raises(ValueError, match="made on frames of 640x480 pixels, but these are 1280x960"):
         calibration().check_frame_size(1280, 960)
     calibration().check_camera({"exposure_us": "200", "gain": "3"})
-    with pytest.raises(ValueError, match="exposure_us = 200, but it is 500 now"):
+    with pytest.raises(ValueError, match="exposure_us = 200, but now exposure_us is 500"):
         calibration().check_camera({"exposure_us": "500"})
 
 
