@@ -99,7 +99,8 @@ def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
     from_one_to_next = float(np.sqrt(0.5 * np.mean(np.diff(values) ** 2)))
     if spread > MOVING * from_one_to_next:
         raise CalibrationError(
-            f"The readings of {name} must repeat one gap, but they move from {values.min():.4f} to {values.max():.4f} "
+            f"The readings of {name} must be repeated readings of one gap, but range from {values.min():.4f} to "
+            f"{values.max():.4f} "
             f"mm (standard deviation {1e3 * spread:.3g} um, from reading to reading {1e3 * from_one_to_next:.3g} um): "
             "record a gap that does not move, or, if the stage moved in steps, add --by-input."
         )

@@ -107,7 +107,7 @@ class EdgeFollower:
                 GaugeStatus.AMBIGUOUS, f"{len(alike)} edges lie within reach_px, at {places} px along the direction"
             )
         if abs(alike[0].position_px) > reach + 1.0:
-            return NotFound(GaugeStatus.NO_EDGE, "it lies farther away than it may have moved")
+            return NotFound(GaugeStatus.NO_EDGE, "the edge found is farther away than reach_px")
         if self.known is None:
             wide = profile(
                 picture.grey, picture.light, anchor, self.axes.direction_rad, self.slope, self.length_px,

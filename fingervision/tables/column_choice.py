@@ -97,7 +97,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
                 continue
             listed = " or ".join(f"'{raw.columns[k].name}'" for k in candidates)
             about.questions.append(
-                Question(f"the {role} may be {listed}", f"columns.{role}={suggest(role, candidates)}")
+                Question(f"the column of the {role} may be {listed}", f"columns.{role}={suggest(role, candidates)}")
             )
         elif role in NEEDED[kind] and not (role == "gap" and sides):
             free = [k for k in range(len(raw.columns)) if k not in set(chosen.values())]

@@ -290,4 +290,4 @@ def test_a_figure_of_zero_is_written_too() -> None:
     target, direction, cycle = cycles(np.linspace(0.0, 4.0, 5))
     visits = RepeatedTargets(target, direction, cycle, ())
     report = positioning_report(visits, 0.0 * target, 0.0 * target, {"backlash": -0.01 * direction})
-    assert "without backlash it would be" in positioning_words(report)[0]
+    assert "without backlash the value would be" in positioning_words(report)[0]

@@ -124,7 +124,7 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
         else:
             # The effect hides a part of the quantity, or other effects hide a part of the effect: state the quantity
             # without the effect, which is always true.
-            causes.append(f"without {effect} it would be {_mm(value - share)} mm")
+            causes.append(f"without {effect} the value would be {_mm(value - share)} mm")
     words += f"; {', '.join(causes)}" if causes else ""
     rest = None if report.after is None else report.after.figures[symbol].value_mm
     return words + (f"; {_mm(rest)} mm remain after correction." if rest is not None else ".")

@@ -124,7 +124,7 @@ def _picture(png: bytes, words: str) -> str:
 
 def _how_much(report: DiagnosisReport) -> str:
     d = report.disagreement
-    unseen = ["runs that the fit did not see", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)]
+    unseen = ["runs left out of the fit", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)]
     rows = [
         [_counted(d), *(number(rms_mm) for rms_mm in d.counted_mm)],
         ["all rows", number(d.before_rms_mm), number(d.after_rms_mm)],
