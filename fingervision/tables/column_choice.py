@@ -8,7 +8,7 @@ import numpy as np
 from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
-from fingervision.tables.column_suggestions import likeliest
+from fingervision.tables.column_suggestions import increases, likeliest
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import Question
 from fingervision.tables.raw_table import RawColumn, RawTable
@@ -90,6 +90,8 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             candidates = exact
         if role == "time":
             candidates = _one_clock(raw, names, candidates, roles.get("date", []), about)
+            if not candidates and kind != "simulation" and not roles.get("run"):
+                candidates = _clock_by_unit(raw, names, set(chosen.values()), decimal, about)
         if len(candidates) == 1:
             chosen[role] = candidates[0]
         elif len(candidates) > 1:
@@ -150,6 +152,24 @@ def _one_clock(
     if len(times) > 1 and _alike([raw.columns[k] for k in times]):
         return times[:1]  # a clock beside each channel
     return times or both
+
+
+def _clock_by_unit(
+    raw: RawTable, names: Sequence[ColumnName], taken: set[int], decimal: str, about: Findings
+) -> list[int]:
+    """Take the only column with a unit of time and an unknown name for the time, if it increases steadily."""
+    found = [
+        k
+        for k, (column, name) in enumerate(zip(raw.columns, names, strict=True))
+        if k not in taken and name.role is None and (unit := spelled(column.unit) or name.unit)
+        and factor(unit, "time") is not None and increases(column, decimal)
+    ]  # fmt: skip
+    if len(found) == 1:
+        about.notes.append(
+            f"'{raw.columns[found[0]].name}' is taken for the time: it has a unit of time, and increases."
+        )
+        return found
+    return []
 
 
 def _alike(columns: Sequence[RawColumn]) -> bool:

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 from functools import lru_cache
+from html import unescape
 
 from fingervision.tables.units import factor, known_unit, spelled
 from fingervision.tables.words import role_of, source_of
@@ -57,7 +58,7 @@ def column_name(text: str) -> ColumnName:
     >>> column_name("Force in N").base, column_name("gap"), column_name("opening, mm").unit
     ('Force', ColumnName(text='gap', base='gap', unit=''), 'mm')
     """
-    text = text.strip().strip('"').strip()
+    text = unescape(text.strip().strip('"').strip())
     match = BRACKETS.match(text)
     if match is None and role_of(text) is not None:
         return ColumnName(text, text, "")

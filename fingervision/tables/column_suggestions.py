@@ -72,13 +72,13 @@ def _points(column: RawColumn, name: ColumnName, role: str, decimal: str) -> int
         points += BY_UNIT if factor(unit, DIMENSION.get(role, "length")) is not None else -2 * BY_UNIT
     points += BY_READING * (role == "input" and bool(READINGS & set(tokens(name.base))))
     points -= BY_READING * (role == "input" and "target" in found)
-    is_clock = _increases(column, decimal)
+    is_clock = increases(column, decimal)
     if role == "time":
         return points + (BY_CLOCK if is_clock else -2 * BY_CLOCK)
     return points - (BY_READING if is_clock else 0)
 
 
-def _increases(column: RawColumn, decimal: str) -> bool:
+def increases(column: RawColumn, decimal: str) -> bool:
     """Whether a column's first values increase by equal steps, or are dates."""
     content = column.content
     if isinstance(content, Numbers):

@@ -20,6 +20,12 @@ LABEL_NAMES = frozenset({"long name", "long names"})
 LABEL_UNITS = frozenset({"unit", "units", "einheit", "einheiten"})
 LABEL_REMARKS = frozenset({"comment", "comments", "kommentar", "kommentare", "f(x)", "f(x)=", "sampling interval"})
 """Labels in the first column of a worksheet's header rows (ASCII export of OriginLab), above an empty column."""
+COMMENTED = re.compile(
+    r"^\s*(#+|%+|//+|!+)\s*((columns?|fields?|spalten|colonnes|columnas|colonne)\s*[:=]\s*)?", re.IGNORECASE
+)
+"""What may stand before the names in a comment: `# columns: time, position`."""
+TYPES = re.compile(r"(DT_)?(DOUBLE|FLOAT|REAL|SINGLE|U?INT|INTEGER|STRING|NUMERIC|NUMBER)_?\d*", re.IGNORECASE)
+"""Types of numbers, which some programs write in a row below the units."""
 ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
 """Pattern of a line that names a single column (data recorders of Physik Instrumente write `# NAME0 = ...`)."""
 
@@ -94,6 +100,8 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
             units, units_at = labelled, at
             continue
         names = names_in(lines[at], dialect)
+        if names is not None and not found and all(TYPES.fullmatch(cell) for cell in names):
+            continue
         if names is None:
             if found or units:
                 break
@@ -138,9 +146,8 @@ def _all_units(cells: Sequence[str]) -> bool:
 
 def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
     """Interpret a line as the names of all columns; None if the number of names differs from that of columns."""
-    text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).strip()
-    if dialect.separator is not None:
-        text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).rstrip("\r\n")
+    text = COMMENTED.sub("", line)
+    text = text.strip() if dialect.separator is None else text.rstrip("\r\n")
     wide = dialect.wide
     for cells in _splits(text, dialect):
         if len(cells) == wide + 1 and cells[-1].strip().lower() in LAST_REMARK:

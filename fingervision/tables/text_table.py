@@ -22,6 +22,7 @@ from fingervision.tables.dialect import (
 )
 from fingervision.tables.exchanged_rows import exchanged
 from fingervision.tables.header_pairs import Header
+from fingervision.tables.key_value_rows import rows_of_pairs
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
@@ -58,6 +59,10 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     OpenQuestionError
         A mark in the numbers may be a decimal sign or a thousands separator.
     """
+    if not given.words and (pairs := rows_of_pairs(lines)) is not None:
+        whole = table_of_lines(path, pairs, replace(given, words={"separator": "tab", "decimal": "."}), encoding)
+        # The names were put before the first line.
+        return replace(whole, lines=[number - 1 for number in whole.lines], settings={"encoding": encoding})
     dialect = find_dialect(lines, given.words.get("separator", ""), given.words.get("decimal", ""))
     if dialect is None:
         raise DataError(

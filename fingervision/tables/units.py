@@ -23,7 +23,7 @@ WRITTEN = {
     "m": "m meter metre meters metres mètre mètres metro metros metri м",
     "cm": "cm",
     "mm": "mm millimeter millimetre millimeters millimetres millimètre millimètres milímetro milímetros millimetri "
-    "мм 毫米 ミリメートル",
+    "мм 毫米 公釐 ミリメートル",
     "um": "um µm micron microns mikron micrometer micrometre micrometers micrometres mikrometer micromètre micromètres "
     "micrómetros micrometri мкм 微米",
     "nm": "nm nanometer nanometre nanometers нм 纳米",

@@ -7,20 +7,23 @@ from functools import lru_cache
 ROLES = {
     "time": "time t zeit zeitachse temps tempo tiempo uhrzeit timestamp timestamps zeitstempel horodatage elapsed "
     "clock tijd tijdstip hora heure ora orario zeitpunkt instant prufzeit messzeit messdauer tid czas время cas "
-    "時間 時刻 経過時間 时间 時間軸 시간",
+    "zaman aika ido timp час 時間 時刻 経過時間 时间 時間軸 시간",
     "date": "date datum fecha data datetime",
     "input": "input inputs eingang eingabe entree entrees entrada ingresso uin xin x position positions pos stage "
     "displacement displacements disp displ encoder drive travel stroke weg stellweg wege hub verschiebung verfahrweg "
     "antrieb vorschub lage istposition istweg deplacement deplacements course actionneur codeur posicion "
     "desplazamiento desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator "
     "positie posities verplaatsing slag aandrijving posicao posicoes deslocamento deslocamentos traversenweg crosshead "
-    "forskydning forskjutning polozenie przemieszczenie posuv poloha положение перемещение позиция 変位 位置 変位量 "
+    "konum sijainti asema siirtyma pozicio elmozdulas pozitie положення forskydning forskjutning polozenie "
+    "przemieszczenie posuv poloha "
+    "положение перемещение позиция 変位 位置 変位量 "
     "ストローク 位移 行程 변위 위치",
     "gap": "gap gaps opening openings abstand abstande oeffnung offnung offnungsweite oeffnungsweite spalt spaltweite "
     "greiferoffnung greiferoeffnung greifweite fingerabstand backenabstand aperture clearance separation ouverture "
     "ecartement espacement apertura abertura hueco separacion separazione fessura luce "
     "spleet spleetbreedte vingerafstand afstand abertura aberturas separacao entrefer avstand szczelina odstep "
-    "rozwarcie mezera зазор раскрытие 隙間 すき間 間隙 間隔 ギャップ 開口 间隙 间距 開度 开口 간격 틈새",
+    "rozwarcie mezera aciklik aralik rako hezag deschidere "
+    "зазор раскрытие 隙間 すき間 間隙 間隔 ギャップ 開口 间隙 间距 開度 开口 간격 틈새",
     "left": "left links linke linker linkes gauche izquierda izquierdo sinistra sinistro esquerda esquerdo",
     "right": "right rechts rechte rechter rechtes droite droit derecha derecho destra destro direita direito",
     "force": "force forces kraft krafte kraefte stellkraft f load effort fuerza fuerzas forza forze carga "
@@ -41,7 +44,7 @@ BESIDE = (
     "dedos dita dito entre tra fra machine between jaw jaws backen messung data daten donnees datos dati x y z 0 1 "
     "2 3 4 prescribed imposed applied vorgegebene vorgegebener vorgegebenes aufgebrachte imposee impose impuesto "
     "impuesta imposto imposta imposti feedback vib vibrometer fiber fibre width weite breite largeur ancho larghezza "
-    "sensor sonde probe act akt 測定 計測 測定値 测量 측정"
+    "sensor sonde probe capacitive confocal inductive optical act akt 測定 計測 測定値 测量 측정"
 )
 FILLERS = frozenset(unicodedata.normalize("NFKD", BESIDE).split())
 """Filler words, which do not change the role of the other words in a name."""
@@ -82,7 +85,7 @@ def _plain(name: str) -> str:
     return letters.translate(WITHOUT_STROKE)
 
 
-WITHOUT_STROKE = str.maketrans("łøđ", "lod")
+WITHOUT_STROKE = str.maketrans("łøđı", "lodi")
 BY_TOKEN = {_plain(word): role for role, words in ROLES.items() for word in words.split()}
 NUMBERED = re.compile(r"([^\W\d_]+)\d+")
 """A word that ends with a number: `ch0`, `position1`, `ai1`."""

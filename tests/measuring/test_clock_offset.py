@@ -216,6 +216,14 @@ def test_what_leaves_two_answers_open_is_refused(number, words):
     assert words in found.words
 
 
+def test_a_staircase_of_equal_steps_that_never_turns_leaves_the_step_open():
+    """One step on, all halts fit as well; the bends between the rows of the log decided for a wrong step, 1.4 s off."""
+    one = drawn_recordings.draw(99101000, noise_mm=3e-4, duration_s=14.0)
+    found = find_clock_offset(one.time_s, one.gap_mm, DriveHistory(one.log_s, one.input_mm))
+    assert isinstance(found, NoClockOffset)
+    assert min(abs(offset_s - one.kind.offset_s) for offset_s in found.candidates_s) < 0.01
+
+
 @pytest.mark.slow
 def test_a_creep_that_looks_like_slow_turns_is_said_and_carried():
     one = drawn_recordings.draw(232005, creep=0.02)

@@ -11,7 +11,7 @@ from fingervision.measuring.clock.correlation import Candidate
 from fingervision.measuring.clock.joint_fit import Fit
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import WHITE, Alignment, Motion, Noise
-from fingervision.measuring.clock.noise_of_motion import noise_of
+from fingervision.measuring.clock.noise_of_motion import LARGEST_ROOT, noise_of
 from fingervision.measuring.clock.play_posterior import most_likely
 from fingervision.measuring.clock.refusals import FEWEST_FRAMES, LEAST_SHARE, explained
 
@@ -25,6 +25,13 @@ SHARED = 0.5
 """Least share of the motion of either record that must lie in the overlap."""
 ONE_PEAK = 0.25
 """Distance in frames within which two offsets are the same peak."""
+BENT = 0.1
+"""Change of speed at a row, over the largest of the log, from which on the path beside the row is bent."""
+SURE_FRAMES = 0.4
+"""Least share of the frames that lie elsewhere: with fewer, the bends themselves are the motion, as of a sine."""
+MOST_SHARED = 2.0 / 3.0
+"""Share of the best offset's frames that another one must cover to be judged without the bends: a few halts alone fit
+elsewhere by chance, as scale and zero of the gap are free."""
 QUICK_PLAYS = (0.0, 0.02, 0.08, 0.3)
 """Initial values of the play for the fit of every candidate, relative to the largest possible play."""
 
@@ -105,11 +112,34 @@ def unrefuted(
         if rival.scale <= 0.0 or apart_s < ONE_PEAK * frame_s or not _shares_motion(motion, rival.at):
             continue
         worse = (rival.squares - ours.squares) / ours.variance_mm2
-        if worse < UNREFUTED + by_chance:
+        is_long = own.time_s.size >= MOST_SHARED * motion.time_s.size
+        if worse < UNREFUTED + by_chance or (is_long and _refuted_at_bends_only(own, ours, rival)):
             found.append(rival.at.offset_s)
         elif (share := explained(own, rival)) > LEAST_SHARE:
             rejected.append((worse, RunnerUp(rival.at.offset_s, share, explained(own, ours))))
     return found, min(rejected, key=lambda entry: entry[0])[1] if rejected else None
+
+
+def _refuted_at_bends_only(motion: Motion, best: Fit, rival: Fit) -> bool:
+    """Whether another offset fits as well, except where the log's path bends between two rows.
+
+    In a staircase of equal steps, all halts fit one step on as well. What is left to decide are the starts and ends of
+    the moves, where the path between rows is least known, and of several offsets the luckiest one would be taken.
+    """
+    rows = motion.path.rows
+    bend = np.pad(np.abs(np.diff(np.diff(rows.input_mm) / np.diff(rows.time_s))), 1, mode="edge")
+    is_bent = np.maximum(bend[:-1], bend[1:]) > BENT * float(bend.max())
+    sure = np.ones(motion.time_s.size, dtype=np.bool_)
+    for fit in (best, rival):
+        interval = np.searchsorted(rows.time_s, motion.log_time_s(fit.at), side="right") - 1
+        sure &= ~is_bent[np.clip(interval, 0, is_bent.size - 1)]
+    if np.count_nonzero(sure) < max(FEWEST_FRAMES, SURE_FRAMES * sure.size):
+        return False
+    ours, theirs = best.residual_mm[sure], rival.residual_mm[sure]
+    # The frames' noise is correlated: of its mean over a halt, the variance is larger by this.
+    slow = 1.0 / max(1.0 - float(motion.noise.terms.sum()), 1.0 - LARGEST_ROOT) ** 2
+    variance_mm2 = float(ours @ ours) / ours.size * slow
+    return float(theirs @ theirs - ours @ ours) < UNREFUTED * variance_mm2
 
 
 def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:

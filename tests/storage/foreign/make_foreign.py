@@ -197,8 +197,20 @@ def habits() -> list[Case]:
     lvm.text += "***End_of_Header***\t\t\nX_Value\tPosition\tX_Value\tGap\tComment\n" + "".join(
         f"{t}\t{x}\t{t}\t{g}\t\n" for t, x, g in pairs
     )
+    pairs_log = plain(
+        "key_value_rows", "", "\t", unit, asks="units", states=("units.time=s", "units.input=mm", "units.gap=mm")
+    )
+    pairs_log.text = "ready\n" + "".join(
+        "t={} pos={} gap={}\n".format(*row.split("\t")) for row in pairs_log.text.splitlines()
+    )
+    unnamed_time = plain(
+        "time_by_its_unit", "Čislo cas [s];Poloha [mm];Mezera [mm]".replace("Čislo cas", "Okamzik"), ";", unit, mark=","
+    )
     return [
         logger, scope, turned, days, waves, lvm,
+        pairs_log, unnamed_time,
+        plain("types_row", "Time;Position;Gap\ns;mm;mm\nDT_DOUBLE;DT_DOUBLE;DT_DOUBLE", ";", unit, mark=","),
+        plain("columns_in_comment", "# columns: time [s], position [mm], gap [mm]", ",", unit),
         plain("chinese", "时间 [s],位置 [mm],间隙 [mm]", ",", unit, encoding="gb18030"),
         plain("japanese", "時間[s],変位[㎜],ギャップ[㎜]", ",", unit, encoding="cp932"),
         plain("korean", "시간(s),변위(mm),간격(mm)", ",", unit, encoding="utf-8-sig"),
