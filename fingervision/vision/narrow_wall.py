@@ -38,7 +38,7 @@ def with_narrow_wall(
         wide.append(best_fit(STEP, own, weight, blur))
         widths.append(best_fit(STEP, other, weight, blur).blur)
         u_own, u_other = (u_squared_width(p, weight, blur, by_codec) for p in (own, other))
-        u_more.append(float(np.hypot(u_own, u_other)))
+        u_more.append(hypot(u_own, u_other))
     more = [step.blur**2 - width**2 for step, width in zip(wide, widths, strict=True)]
     if any(each < max(WIDER * width**2, SURE * u) for each, width, u in zip(more, widths, u_more, strict=True)):
         return None
