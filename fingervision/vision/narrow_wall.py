@@ -1,6 +1,6 @@
 """Correction for side walls, which widen the inner flanks of both fingers but not the outer flanks."""
 
-import numpy as np
+from math import hypot
 
 from fingervision.vision.blur_uncertainty import Displacement
 from fingervision.vision.edge_moves import are_of_size, beyond_wall, moved_by_wall, moved_edges, with_blur
