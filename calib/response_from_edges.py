@@ -1,10 +1,10 @@
 """Camera response from the shape of straight edges, because blur spreads a step of light symmetrically.
 
-The optics and the pixels blur the light, and nearly every blur is symmetric. In light, an edge spread function is then
-antisymmetric about the edge. In the stored levels the edge spread function is not antisymmetric; the exponent that
-makes it antisymmetric again is that of the camera. A slanted edge samples its profile at many positions within a pixel
-(ISO 12233). Sharpening or smoothing after the transfer curve, or a bevel along the edge, also changes the profile: the
-residuals of the fit then exceed the noise.
+The optics and the pixels blur the light, and nearly every blur is symmetric. If the blur is symmetric, an edge spread
+function in light is antisymmetric about the edge. In the stored levels the edge spread function is not antisymmetric;
+the exponent that makes it antisymmetric again is that of the camera. A slanted edge samples its profile at many
+positions within a pixel (ISO 12233). Sharpening or smoothing after the transfer curve, or a bevel along the edge, also
+changes the profile: the residuals of the fit then exceed the noise.
 """
 
 from collections.abc import Sequence

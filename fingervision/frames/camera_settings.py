@@ -6,7 +6,7 @@ cap_avfoundation_mac.mm of OpenCV 4 and 5):
 * V4L2 returns -1 for a property that a camera lacks. The exposure in V4L2 counts units of 0.1 ms
   (V4L2_CID_EXPOSURE_ABSOLUTE); its automatic exposure is a menu in which 1 is manual and 3 is the usual automatic mode.
   If the environment asks for normalised values, the V4L2 menu returns 0.25 and 0.75 and every other property a fraction
-  of an unknown range; mode 0 switches that off.
+  of an unknown range; mode 0 switches the normalisation off.
 * Media Foundation's exposure is the logarithm to base 2 of seconds. In Media Foundation, setting an automatic mode also
 changes the value of the property (the focus would run to 0), and reading the mode back gives no information. In Media
 Foundation,

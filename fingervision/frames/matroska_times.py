@@ -128,7 +128,7 @@ def _clusters(content: mmap.mmap, track: int) -> list[_Cluster]:
 
 
 def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
-    """Times stated by the index, by the position of the cluster."""
+    """Times stated in the file's index, for each position of a cluster."""
     stated: dict[int, set[int]] = {}
     segment, at = content.find(SEGMENT), content.rfind(CUES)
     whole = element(content, segment) if segment >= 0 else None

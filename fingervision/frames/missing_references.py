@@ -8,8 +8,9 @@ that are read before decoding:
 * AV1 numbers the pictures in the order in which they are shown. If a number is omitted, a picture is missing;
   consecutive numbers prove that none is missing, whatever the times are.
 * MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing P picture is visible in
-the toggling bit. If the bit is correct although a time is missing, an odd number of pictures was never coded. * In
-MPEG-4 part 2 a B picture lies between two other pictures in time. A B picture that is presented after all pictures
+  the toggling bit. If the toggling bit is correct although a time is missing, an odd number of pictures was never
+  coded.
+* In MPEG-4 part 2 a B picture lies between two other pictures in time. A B picture that is presented after all pictures
   received so far depends on a missing picture.
 * Times. In a file with equidistant times (coded at a constant rate), a gap in the times of a whole number of steps
   means that pictures are missing. If times are irregular, or gaps are frequent, the camera or the encoder skipped
@@ -132,8 +133,8 @@ def _by_number(packets: list[CodedTime]) -> dict[int, str]:
 def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
     """Find packets after a missing picture by MPEG-4's rounding bit.
 
-    The bit is used only if the P pictures of this stream toggle it. The first P picture after an I picture is checked
-    only if the bit has the same value in nearly all first P pictures.
+    MPEG-4's rounding bit is used only if the P pictures of this stream toggle it. The first P picture after an I
+    picture is checked only if the rounding bit has the same value in nearly all first P pictures.
     """
     needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
     pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]

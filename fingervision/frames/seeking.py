@@ -21,7 +21,7 @@ class Seeking(Protocol):
     """A recording whose single frames can be accessed directly."""
 
     def frame(self, index: int, time_s: float) -> Frame | None:
-        """Return the frame with exactly that time; None if there is none, or it cannot be decoded alone."""
+        """Return the frame with exactly the given time; None if it does not exist or cannot be decoded alone."""
         ...
 
 
@@ -54,7 +54,7 @@ class VideoSeeking:
         self._tick: int | None = None
 
     def frame(self, index: int, time_s: float) -> Frame | None:
-        """Return the frame with exactly that time; None if there is none, or it cannot be decoded alone."""
+        """Return the frame with exactly the given time; None if it does not exist or cannot be decoded alone."""
         try:
             return self._found(index, time_s)
         except (av.FFmpegError, OSError, ValueError):

@@ -91,7 +91,7 @@ class SimulatedGripper:
             yield received.item
 
     def received(self) -> Iterator[Received]:
-        """Yield the frames in real time, until closed."""
+        """Yield the frames in real time, until the camera is closed."""
         rng = np.random.default_rng(SEED)
         drawn: dict[int, Pixels] = {}
         started_s = monotonic()

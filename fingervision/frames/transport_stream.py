@@ -1,4 +1,4 @@
-"""Detect losses in an MPEG transport stream that it does not mark: incomplete pictures, gaps in a regular series."""
+"""Detect losses that an MPEG transport stream does not mark: incomplete pictures, gaps in a regular series."""
 
 import av
 

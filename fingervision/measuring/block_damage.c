@@ -1,5 +1,5 @@
-/* Change from one picture to another, as the mean over the height of each row of blocks: two pictures of one size; means of
-   whole levels, which a float holds exactly. */
+/* Change from one picture to another, as the mean over the height of each row of blocks. Arguments: two pictures of one
+   size; result, means of whole levels, which a float represents exactly. */
 LOOP(block_damage_mean_change, "pps", "") {
     const Arg *now = &in[0], *then = &in[1];
     int64_t columns = in[2].shape[1];

@@ -1,9 +1,9 @@
 """Detect blocks with wrong content in a decoded picture, caused by damage of the stream that the decoder missed.
 
-JPEG and H.264 code the picture in squares of 8 or 16 pixels. Damage puts wrong content into whole squares. The picture
-then has steps of the grey level along the borders of squares, ending at their corners, where the previous picture has
-none. Motion of objects does not follow the grid of the codec's squares, and optics never change an edge within a single
-pixel.
+JPEG and H.264 code the picture in squares of 8 or 16 pixels. Damage puts wrong content into whole squares. A picture
+with damaged squares has steps of the grey level along the borders of squares, ending at their corners, where the
+previous picture has none. Motion of objects does not follow the grid of the codec's squares, and optics never change an
+edge within a single pixel.
 
 Method: steps across the borders of blocks are compared with steps inside them, as in measures of blocking artefacts (Z.
 Wang, H. R. Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP

@@ -50,7 +50,7 @@ def draw_gap(
 def gap_figure(
     series: GapSeries, drive: DriveHistory | None = None, clock: ClockOffset | float | None = None
 ) -> Figure:
-    """Plot the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
+    """Plot the gap with the band of its expanded uncertainty, and in a second plot only the uncertainty.
 
     Frames without a measured gap are marked along the lower edge. With a drive and its clock offset, the input is drawn
     over the gap on the recording's clock, and the offset is stated above the plot.

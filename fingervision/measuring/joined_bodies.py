@@ -1,8 +1,8 @@
 """Detect bodies that were mistaken for something else, because flexures could not join them where they were measured.
 
-A flexure bends but is hardly stretched. In pure bending its chord lies along the bisector of the directions in which
-it leaves the two bodies, and is shorter than the flexure by the square of the bending angle over 24; a shear force adds
-a displacement across it (Howell, 2001, Compliant Mechanisms, chapter 5, ISBN 978-0-471-38478-6).
+A flexure bends but is hardly stretched. In pure bending the chord of a flexure lies along the bisector of the
+directions in which it leaves the two bodies, and is shorter than the flexure by the square of the bending angle over
+24; a shear force adds a displacement across it (Howell, 2001, Compliant Mechanisms, chapter 5, ISBN 978-0-471-38478-6).
 """
 
 from collections.abc import Mapping, Sequence

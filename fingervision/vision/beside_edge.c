@@ -1,6 +1,7 @@
 /* after profile_models */
-/* Take the addition off the light along every line: slope, position, contrast (k, n), kind, sizes, breadths, blurs (k);
-   levels (k, n, pixels). It lies as the edge does and has its share of the contrast. */
+/* Subtract the structure beside the edge (shadow or glare) from the light along every line: slope, position, contrast (k,
+   n), kind, sizes, breadths, blurs (k); levels (k, n, pixels). The structure is displaced with the edge and is proportional
+   to the contrast. */
 LOOP(beside_edge_without, "FFFiFFFf", "") {
     int64_t lines = in[7].shape[1], pixels = in[7].shape[2];
     for (int64_t at = 0; at < in[7].shape[0] * lines; at++) {

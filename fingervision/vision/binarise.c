@@ -1,5 +1,5 @@
-/* The same for a large picture of 256 levels, two neighbours at a time: half of the additions, in a table of pairs that is
-   summed up only once. */
+/* Histogram of a large picture with 256 levels: pairs of neighbouring pixels are counted, which halves the additions, and
+   the table of pairs is summed only once. */
 static void count_pairs(const Arg *grey, int64_t *total) {
     int64_t rows = grey->shape[0], columns = grey->shape[1];
     uint32_t *count = (uint32_t *)room(2 * 65536, sizeof(uint32_t)), *other = count + 65536;
@@ -25,7 +25,8 @@ static void count_pairs(const Arg *grey, int64_t *total) {
     free(count);
 }
 
-/* Pixels with each grey level. Neighbours are alike: several counts in turn do not wait for each other. */
+/* Number of pixels with each grey level. Neighbouring pixels have similar levels: with several separate counters, an
+   increment need not wait for the previous one. */
 LOOP(binarise_histogram, "pj", "") {
     const Arg *grey = &in[0];
     int64_t rows = grey->shape[0], columns = grey->shape[1], levels = in[1].n, *total = INTS(1);
@@ -57,7 +58,8 @@ LOOP(binarise_histogram, "pj", "") {
             total[smaller_int(pixel(grey, row, column), levels - 1)]++;
 }
 
-/* Otsu's threshold, the difference of the two classes' means, and that in units of their spread. */
+/* Otsu's threshold, the difference of the two classes' means, and this difference in units of the standard deviation within
+   the classes. */
 LOOP(binarise_split, "I", "idd") {
     const int64_t *histogram = INTS(0), size = in[0].n;
     double pixels = 0.0, total = 0.0, largest = 0.0, below = 0.0, sum_below = 0.0;
@@ -98,7 +100,8 @@ LOOP(binarise_split, "I", "idd") {
     out[2].d = contrast / larger(sqrt(0.5 * (variances[0] + variances[1])), 1e-3);
 }
 
-/* The picture over its own light, which becomes half of the scale: picture, light (as large); the flat picture. */
+/* Picture divided by its illumination, where equality becomes half of the scale: picture, illumination (of the same size);
+   result. */
 LOOP(binarise_flatten, "pSb", "") {
     const float *light = (const float *)in[1].data;
     int64_t rows = in[0].shape[0], columns = in[0].shape[1];

@@ -1,5 +1,6 @@
 /* after median */
-/* Line v = c + m t by slopes from one half of the rows to the other (Theil, Sen), and the share of rows on it. */
+/* Line v = c + m t, from slopes between points of the two halves of the rows (Theil and Sen), and the share of rows on the
+   line. */
 LOOP(channels_line, "FF", "ddd") {
     const double *t = FLOATS(0), *v = FLOATS(1);
     int64_t n = in[0].n, half = n / 2, on = 0;
@@ -15,7 +16,7 @@ LOOP(channels_line, "FF", "ddd") {
     free(order);
 }
 
-/* Length of what is set in a row from a pixel on; a pixel to either side is forgiven. */
+/* Length of a run of set pixels in a row from a given pixel on; the run may begin one pixel to either side. */
 static int64_t run_length(const uint8_t *line, int64_t size, int64_t i, int64_t step) {
     int64_t length = 0;
     if (i >= 0 && i < size && !line[i]) i += step;
@@ -23,8 +24,8 @@ static int64_t run_length(const uint8_t *line, int64_t size, int64_t i, int64_t 
     return length;
 }
 
-/* Median breadth of what bounds a channel on its left and on its right, in seven rows: picture, the two lines, first and
-   last row; 0 where no row has any. */
+/* Median width of the objects to the left and to the right of a channel, in seven rows: picture, the two lines, first and
+   last row; 0 if no row has an object. */
 LOOP(channels_beside, "Bddddii", "dd") {
     enum { ROWS_SEEN = 9 };
     int64_t columns = in[0].shape[1];
@@ -41,7 +42,7 @@ LOOP(channels_beside, "Bddddii", "dd") {
     out[1].d = median_in_place(right, count);
 }
 
-/* The runs of a chain from its end on: runs, the run that each goes on from, the end; chain. */
+/* Runs of a chain, from its end to its start: runs, index of the preceding run for each run, index of the end; chain. */
 LOOP(channels_chain, "IIij", "") {
     int64_t i = in[2].i;
     for (int64_t k = 0; k < in[3].shape[0]; k++) {
@@ -50,7 +51,7 @@ LOOP(channels_chain, "IIij", "") {
     }
 }
 
-/* Where ground ends, from a pixel of it on: eight pixels at a time. */
+/* End of a run of background from a given pixel on; eight pixels are tested at a time. */
 static int64_t past_ground(const uint8_t *line, int64_t x, int64_t columns) {
     uint64_t eight;
     for (; x + 8 <= columns; x += 8) {
@@ -61,8 +62,8 @@ static int64_t past_ground(const uint8_t *line, int64_t x, int64_t columns) {
     return x;
 }
 
-/* All bounded runs of ground (row, last pixel before, first pixel after), the run below that each goes on from, its place
-   in its chain, and which go on; how many there are. */
+/* All runs of background between two objects (row, last pixel of the left object, first pixel of the right object), with the
+   connected run below, the position in the chain, and whether a run is continued; returns the number of runs. */
 LOOP(channels_runs, "Bjjjb", "i") {
     const uint8_t *mask = FLAGS(0);
     int64_t rows = in[0].shape[0], columns = in[0].shape[1], most = in[2].n, count = 0, below_first = 0, below_past = 0;
@@ -73,7 +74,7 @@ LOOP(channels_runs, "Bjjjb", "i") {
         int64_t first = count, x = past_ground(line, 0, columns);
         int64_t start = x;
         while (x < columns) {
-            /* A run of something that is set, from `start`. */
+            /* A run of set pixels, beginning at `start`. */
             const uint8_t *off = (const uint8_t *)memchr(line + x, 0, (size_t)(columns - x));
             x = off ? off - line : columns;
             int64_t bounded = x - start, a = x - 1;

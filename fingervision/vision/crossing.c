@@ -1,4 +1,4 @@
-/* Where the first or the last part of an outline, which goes over a top, crosses a height: across and along. */
+/* Point (across, along) at which the first or the last part of an outline, followed over a top, crosses a height. */
 static void side_at(const int32_t *outline, int64_t n, int is_last, double height, double *across, double *along) {
     int64_t i = is_last ? n - 1 : 0, step = is_last ? -1 : 1;
     while (i + step >= 0 && i + step < n && outline[2 * i + 1] > height) i += step;
@@ -6,8 +6,9 @@ static void side_at(const int32_t *outline, int64_t n, int is_last, double heigh
     *along = outline[2 * i + 1];
 }
 
-/* Rows beyond a tip in which the finger goes on with its own breadth: mask seen with the tips up, outline from one side
-   over the top to the other, the tip's row, heights below it between which the sides are lines, how far beyond is looked. */
+/* Number of rows beyond a tip in which the finger continues with its own width. Arguments: mask with the tips up; outline
+   from one side over the top to the other; row of the tip; heights below the tip between which lines are fitted to the
+   sides; searched distance beyond the tip. */
 LOOP(crossing_rows_beyond, "pOiddi", "i") {
     const int32_t *outline = POINTS(1);
     int64_t n = in[1].shape[0], top = in[2].i, columns = in[0].shape[1], rows = 0;

@@ -1,7 +1,7 @@
 """Detection of an object, such as a cable, that crosses the fingers and hides their ends in the binary picture.
 
-The apparent tip is then the edge of the crossing object. Beyond a true tip there is background or some other object; a
-piece of the same width that continues along the same two lines is the finger itself.
+If an object crosses the fingers, their apparent tips are the edge of this object. Beyond a true tip there is background
+or some other object; a piece of the same width that continues along the same two lines is the finger itself.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Step 2, denoising: used only to find the fingers.
 
-The measurement itself uses the grey image without denoising, because its noise is white.
+The measurement itself uses the grey image without denoising, because the noise of that image is white.
 """
 
 import cv2

@@ -27,8 +27,8 @@ LOOP(edge_filters_look, "FFFIFFFFFFffffjj", "") {
         int64_t row = filter_row(sigma, in[6].shape[0]), column = filter_column(start[i]), at = (row * offsets + column) * pixels;
         const double *by_contrast = FLOATS(6) + at, *by_shift = FLOATS(7) + at, *by_blur = FLOATS(8) + at;
         const double *level = FLOATS(0) + i * pixels;
-        int64_t seen = weight[i] > 0.0 ? pixels : 0; /* a place that no line fills stays where it is */
-        /* Two sums in turn for each filter do not wait for each other. */
+        int64_t seen = weight[i] > 0.0 ? pixels : 0; /* an entry without a line is not changed */
+        /* With two alternating sums for each filter, an addition need not wait for the previous one. */
         double height[2] = {0.0, 0.0}, shift[2] = {0.0, 0.0}, widening[2] = {0.0, 0.0};
         int64_t j = 0;
         for (; j + 1 < seen; j += 2)
@@ -59,9 +59,9 @@ LOOP(edge_filters_look, "FFFIFFFFFFffffjj", "") {
     free(change);
 }
 
-/* What a look leaves of each line: levels, position, contrast, row, column, steps, offsets, gains by row and column; mean
-   square residual and the position's gain. The last part of an eighth of a pixel is not in the table's edge: its share is
-   taken off to first order. */
+/* Residual of each line after a look-up: levels, position, contrast, row, column, steps, offsets, gains by row and column;
+   mean square residual, and the position's gain. The table's edge is correct to an eighth of a pixel; the effect of the
+   remaining offset is subtracted to first order. */
 LOOP(edge_filters_mean_square, "FFFIIFFFff", "") {
     int64_t lines = in[0].shape[0], pixels = in[0].shape[1], offsets = in[5].shape[1];
     for (int64_t i = 0; i < lines; i++) {

@@ -1,10 +1,10 @@
 """Maximum-likelihood position of a blurred edge by linear filters, one for every blur and sub-pixel offset.
 
 If the position of an edge is known approximately, the best corrections of its position, contrast and blur under white
-noise are linear functions of the grey levels. Their coefficients are the rows of the pseudo-inverse of the edge model
-(Kay, Estimation Theory, 1993, section 8.9). The filters depend only on the blur, the offset and the length of the
-window, so that they are computed once; a Gauss-Newton step for a whole outline is then a table look-up and a scalar
-product.
+noise are linear functions of the grey levels. The coefficients of the linear functions are the rows of the
+pseudo-inverse of the edge model (Kay, Estimation Theory, 1993, section 8.9). The filters depend only on the blur, the
+offset and the length of the window, so that they are computed once; a Gauss-Newton step for a whole outline is then a
+table look-up and a scalar product.
 """
 
 from dataclasses import dataclass

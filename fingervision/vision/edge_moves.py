@@ -1,4 +1,4 @@
-"""Edges moved to where a model of the profile has the finger's own edge, or left in place and less sure."""
+"""Move edges to the finger's own edge according to a model of the profile, or increase their uncertainty."""
 
 from dataclasses import replace
 
@@ -13,7 +13,8 @@ from fingervision.vision.profile_models import ProfileFit
 
 Floats = NDArray[np.float64]
 
-# What stands beside an edge makes this share of the contrast: less is texture, more is no finger's edge.
+# Limits of the share of the contrast due to a structure beside an edge: a smaller share is texture, a larger share
+# means that the edge is not that of a finger.
 SHARES = (0.05, 0.85)
 
 
@@ -23,7 +24,7 @@ def are_of_size(fits: list[ProfileFit], sign: float) -> bool:
 
 
 def moved_by_wall(edges: EdgePoints) -> Floats:
-    """Movement along every line per pixel of movement of the inner edge across the picture, due to a side wall."""
+    """Displacement along every line of pixels if a side wall displaces the inner edge horizontally by one pixel."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
@@ -44,7 +45,7 @@ def moved_edges(
 
 
 def with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Set the blur of the inner flanks to the given one, because a wall beside an edge is not blur."""
+    """Set the blur of the inner flanks to a given value, because a wall beside an edge is not blur."""
     blur_px = edges.blur_px.copy()
     blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
     blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])

@@ -1,8 +1,8 @@
 /* after linear_solve */
 /* after normal_distribution */
 /* after median */
-/* Find a mark in one flank: levels (rows, pixels), position, sigma, contrast, mean_square, noise, end of the scale; how far
-   the edge may have been moved, and how much lies beyond the end of the scale. */
+/* Find a deviation from a blurred step (a mark) in one flank: levels (rows, pixels), position, sigma, contrast, mean_square,
+   noise, end of the scale; possible displacement of the edge, and amount beyond the end of the scale. */
 LOOP(edge_profile_edge_mark, "FFFFFdd", "dd") {
     static const double RIMS[] = RIM_PX, BEYONDS[] = BEYOND;
     const double *position = FLOATS(1), *sigma = FLOATS(2), *contrast = FLOATS(3), *mean_square = FLOATS(4);
@@ -47,7 +47,7 @@ LOOP(edge_profile_edge_mark, "FFFFFdd", "dd") {
     height /= (double)used;
     for (int a = 0; a < MARKS; a++)
         for (int b = 0; b < a; b++) gram[b][a] = gram[a][b];
-    /* What the fit takes up of each mark, as level, contrast, position and blur. */
+    /* Part of each mark that the fit absorbs as level, contrast, position and blur. */
     double fitted[FITTED * FITTED], taken_up[FITTED * (MARKS - FITTED)];
     enum { OTHERS = MARKS - FITTED };
     for (int a = 0; a < FITTED; a++)
@@ -55,8 +55,8 @@ LOOP(edge_profile_edge_mark, "FFFFFdd", "dd") {
             if (b < FITTED) fitted[a * FITTED + b] = gram[a][b];
             else taken_up[a * OTHERS + b - FITTED] = gram[a][b];
         }
-    if (!solve(fitted, FITTED, taken_up, OTHERS)) return; /* rows all alike have nothing that could be told apart */
-    /* Where the scale ends within the window, that is what is seen; elsewhere nothing can be cut off. */
+    if (!solve(fitted, FITTED, taken_up, OTHERS)) return; /* equal rows contain no information for the test */
+    /* If a level of the window reaches the end of the scale, the mark may be clipping; otherwise clipping is impossible. */
     int is_cut = 2 * at_end > used;
     double best = SIGNIFICANT * square(noise / height), shift = 0.0, beyond = 0.0;
     for (int k = is_cut ? RIM_PX_COUNT : 0; k < (is_cut ? OTHERS : RIM_PX_COUNT); k++) {
@@ -68,7 +68,7 @@ LOOP(edge_profile_edge_mark, "FFFFFdd", "dd") {
         }
         own = larger(own, LEAST_OWN * gram[at][at]);
         double size = left / own, u_size = noise / (height * sqrt(own)), moves = -taken_up[POSITION * OTHERS + k] * blur;
-        if (is_cut) { /* as large as it may be, and as sure */
+        if (is_cut) { /* largest possible size, with its uncertainty */
             shift = smaller(shift, moves * larger(size + u_size, 0.0));
             beyond = larger(beyond, BEYONDS[k - RIM_PX_COUNT] * (size - SURE_SIGMAS * u_size));
         } else if (left * size > best && fabs(size) > LEAST_SHARE) {

@@ -1,8 +1,8 @@
 /* after median */
-/* Mean level of every strip of a zone: picture, light of every level (none: the level itself), rows and columns of the
-   zone's pixels from its middle, the strip before each and its share of the next, pixels of each strip; column and row of
-   the middle, whether all of the zone lies in the picture; mean level, and pixels in the picture. Gives the median variance
-   within the strips. */
+/* Mean level of every strip of a zone. Arguments: picture; light of every level (none: the level itself); rows and columns
+   of the zone's pixels relative to its centre; for each pixel the preceding strip, and the share of the next strip; number
+   of pixels of each strip; column and row of the centre; whether the whole zone lies in the picture; results, mean level and
+   number of pixels in the picture. Returns the median variance within the strips. */
 LOOP(edge_search_profile, "pFIIIFFiiiff", "d") {
     const int64_t *rows = INTS(2), *columns = INTS(3), *strip = INTS(4);
     const double *light = FLOATS(1), *share = FLOATS(5);
@@ -28,15 +28,15 @@ LOOP(edge_search_profile, "pFIIIFFiiiff", "d") {
     for (int64_t j = 0; j < size; j++) {
         double total = mean[j];
         mean[j] = total / larger(count[j], 1.0);
-        /* Strips that an edge lies in spread more, however the edge leans: the middle strip tells what the others do. */
+        /* The levels scatter more in strips that contain a slanted edge; the median strip has the usual scatter. */
         if (count[j] > 1.0) squares[full++] = larger(squares[j] - total * mean[j], 0.0) / (count[j] - 1.0);
     }
     out[0].d = middle_in_place(squares, full);
     free(squares);
 }
 
-/* Lobes of a derivative of one sign: smoothed and as it is, times the sign; where they lie from the first strip, and how
-   much they rise; how many. */
+/* Lobes of a derivative of one sign. Arguments: smoothed and original derivative, multiplied by the sign; results, positions
+   from the first strip, and rises. Returns the number of lobes. */
 static int64_t lobes(const double *smooth, const double *slope, int64_t n, double sign, double floor, double *place, double *rise) {
     int64_t *peaks = ints(n), count = 0, found = 0;
     for (int64_t i = 1; i < n - 1; i++) {
@@ -74,8 +74,8 @@ static int64_t lobes(const double *smooth, const double *slope, int64_t n, doubl
     return found;
 }
 
-/* Steps of a profile: levels, shares of the strips that are seen, least derivative; where they lie from the first strip,
-   and their contrasts. Gives how many rise; and how many there are. */
+/* Steps of a profile. Arguments: levels, visible shares of the strips, least derivative; results, positions from the first
+   strip, and contrasts. Returns the number of rising steps, and the number of all steps. */
 LOOP(edge_search_steps, "FFdff", "ii") {
     const double *level = FLOATS(0), *weight = FLOATS(1);
     int64_t n = in[0].n - 1;

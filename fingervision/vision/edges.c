@@ -1,6 +1,6 @@
 /* after profile_lines */
 /* after median */
-/* Usual level at the inner end of an inner flank's lines; 0 where there is none: levels (n, pixels), weight. */
+/* Median level at the inner end of the lines across an inner flank; 0 if there are no lines: levels (n, pixels), weight. */
 LOOP(edges_inside, "FF", "d") {
     double seen[INNER];
     int64_t count = 0;
@@ -9,9 +9,9 @@ LOOP(edges_inside, "FF", "d") {
     out[0].d = middle_in_place(seen, count);
 }
 
-/* Whether the flank itself, within 0.7 sigma and a pixel's breadth of the edge, touches the end of the scale: levels,
-   position, sigma, end of the scale. Where the ground is far beyond the scale, what is left of a flank looks steep:
-   sigma alone would look too near. */
+/* Whether the flank within 0.7 sigma plus one pixel of the edge reaches the end of the scale: levels, position, sigma, end
+   of the scale. If the background is far beyond the scale, the unclipped part of the flank looks steep, so that sigma alone
+   would give too short a distance. */
 LOOP(edges_clipped, "FFFdb", "") {
     int64_t lines = in[0].shape[0], pixels = in[0].shape[1];
     for (int64_t i = 0; i < lines; i++) {

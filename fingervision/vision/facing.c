@@ -1,6 +1,7 @@
 /* after profile_lines */
-/* Whether the left finger's inner lines all lie so many pixels or more to the left of the right one's, or one finger has
-   none: last pixel and weight of every line (2, PLACES), the distance. Lines fill their places from the first on. */
+/* Whether all inner lines of the left finger lie at least a given number of pixels to the left of those of the right finger,
+   or one finger has no lines: last pixel and weight of every line (2, PLACES), the distance. Lines occupy the first entries
+   of their arrays. */
 LOOP(facing_are_apart, "IFi", "b") {
     int64_t places = in[0].shape[1], ends[2] = {0, 0};
     for (int k = 0; k < 2; k++) {

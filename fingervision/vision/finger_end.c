@@ -1,6 +1,6 @@
 /* after median */
 /* after finger_shape */
-/* Inverse of a symmetric positive matrix from its lower half (Gauss and Jordan), brought to one scale first. */
+/* Inverse of a symmetric positive matrix from its lower half (Gauss and Jordan), after scaling to a unit diagonal. */
 static void inverse(const double *lower, double *a) {
     enum { n = PARAMETERS };
     double scale[n];
@@ -22,7 +22,8 @@ static void inverse(const double *lower, double *a) {
         for (int j = 0; j < n; j++) a[i * n + j] *= scale[i] * scale[j];
 }
 
-/* x, y, u, is_row, blur, start, origin, u_prior; parameters, covariance, residual and weight; the misfit comes back. */
+/* Fit of a finger's end. Arguments: x, y, u, is_row, blur, start, origin, u_prior; results, parameters, covariance, residual
+   and weight. Returns the misfit. */
 LOOP(finger_end_fit, "FFFBFFFFffff", "d") {
     enum { m = PARAMETERS };
     static const double LOOKED[][2] = LOOKS;
@@ -37,7 +38,7 @@ LOOP(finger_end_fit, "FFFBFFFFffff", "d") {
     for (int64_t i = 0; i < n; i++) is_outer[i] = x[i] <= 0.5 * (inner.centre_x + outer.centre_x);
     compared(p, origin, x, FLOATS(1), FLOATS(2), FLAGS(3), is_outer, FLOATS(4), n, distance, jacobian, counts);
     for (int look = 0; look < LOOKS_COUNT; look++) {
-        /* While the weights settle, the outline follows its parameters in a straight line. */
+        /* During the iteration of the weights, the outline is linearised in its parameters. */
         for (int a = 0; a < m; a++) move[a] = 0.0;
         for (int step = 0; step < 2; step++) {
             double patience = LOOKED[look][step];
@@ -61,7 +62,7 @@ LOOP(finger_end_fit, "FFFBFFFFffff", "d") {
                 robust[i] = square(1.0 - square(residual[i] / cut));
                 const double *by = jacobian + i * m;
                 for (int a = 0; a < m; a++) {
-                    if (by[a] == 0.0) continue; /* most points see two parameters alone */
+                    if (by[a] == 0.0) continue; /* most points depend on two parameters only */
                     double weighted = robust[i] * by[a];
                     right[a] += weighted * distance[i];
                     for (int b = 0; b <= a; b++) normal[a * m + b] += weighted * by[b];

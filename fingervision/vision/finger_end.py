@@ -115,7 +115,7 @@ def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_
 
 
 def _has_settled(end: FingerEnd) -> bool:
-    """Whether the points that counted in the last step still lie where they count after it.
+    """Whether the points used in the last step of the fit are still near the fitted shape after this step.
 
     The fit's last weights are those computed before the last step. After a step to another shape, the points that
     counted before are far from the new shape.

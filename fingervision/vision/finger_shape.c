@@ -19,14 +19,15 @@ static Corner corner(const double *p, const double *origin, int is_outer) {
     return c;
 }
 
-/* Where a point lies on a corner: alpha and beta are its coordinates, from the centre of the fillet, in the basis of the
-   flank's and the top's normal; to_flank and to_top are what a shift of those sides moves its distance by. */
+/* Position of a point relative to a corner: alpha and beta are its coordinates, from the centre of the fillet, in the basis
+   of the normals of flank and top; to_flank and to_top are the derivatives of the point's distance by a displacement of
+   flank and top. */
 typedef struct {
     double distance, alpha, beta, to_flank, to_top;
     int is_on_fillet;
 } Spot;
 
-/* Signed normal distance of a point from the outline, and which side it belongs to. */
+/* Signed normal distance of a point from the outline, and the side to which the point belongs. */
 static Spot spot(const Corner *c, double x, double y) {
     double ux = x - c->centre_x, uy = y - c->centre_y;
     double alpha = (ux * c->top_y - uy * c->top_x) / c->determinant;
@@ -39,16 +40,15 @@ static Spot spot(const Corner *c, double x, double y) {
     return (Spot){c->top_x * x + c->top_y * y - c->top_k, alpha, beta, 0.0, 1.0, 0};
 }
 
-/* How far the half-level lies inside the outline at a point, (ux, uy) from the fillet's centre.
-
-   The shift is sigma^2 kappa / 2 on a fillet and fades out beyond its ends: the mean of the heat kernels from 0 to
-   sigma^2 / 2 acts like one of variance sigma^2 / 2. */
+/* Distance of the half-level inside the outline at a point (ux, uy) from the fillet's centre. The shift is sigma^2 kappa / 2
+   on a fillet and decreases to zero beyond the fillet's ends: the mean of the heat kernels from 0 to sigma^2 / 2 acts like a
+   single kernel of variance sigma^2 / 2. */
 static double half_level(const Corner *c, const Spot *at, double ux, double uy, double blur) {
     double share = 1.0;
     for (int side = 0; side < 2; side++) {
         double nx = side ? c->top_x : c->flank_x, ny = side ? c->top_y : c->flank_y;
         double past_end = side ? at->alpha : at->beta, along = fabs(ux * ny - uy * nx);
-        /* Deep inside a fillet all of its curvature is felt: an angle is never below its sine. */
+        /* Far inside a fillet, the full curvature acts; an angle is never smaller than its sine. */
         double sine = past_end > 0.0 && ux * nx + uy * ny > 0.0 ? along / sqrt(ux * ux + uy * uy) : 0.0;
         if (c->radius * sine > WHOLLY_FELT_SIGMAS * blur) continue;
         double inside = (past_end > 0.0 ? c->radius * atan2(along, ux * nx + uy * ny) : -along) / (blur * sqrt(0.5));
@@ -58,16 +58,16 @@ static double half_level(const Corner *c, const Spot *at, double ux, double uy, 
     return 0.5 * blur * blur / larger(c->radius, blur) * share;
 }
 
-/* Cosine between a line of pixels and the outline's normal where it meets the line. A point that is found along a line moves
-   along the normal by so much only. */
+/* Cosine between a line of pixels and the outline's normal at their intersection. A displacement of a point along the line,
+   times this cosine, is its displacement along the normal. */
 static double slant(const Corner *c, const Spot *at, int is_row) {
     double flank = is_row ? c->flank_x : c->flank_y, top = is_row ? c->top_x : c->top_y;
     return larger(fabs(at->to_flank * flank + at->to_top * top), LEAST_SLANT);
 }
 
-/* Compare the points of a half-level outline with a shape: distances, their change with every parameter, and whether a
-   point counts. A fillet's centre follows the two sides that it touches: the distance of a point on it changes as if both
-   sides, seen from the centre, moved along their normals. */
+/* Compare the points of a half-level outline with a shape: distances, derivatives of the distances by every parameter, and
+   whether a point is used. The centre of a fillet moves with the two sides that it touches: the distance of a point on the
+   fillet changes as if both sides, seen from the centre, moved along their normals. */
 static void compared(const double *p, const double *origin, const double *x, const double *y, const double *u,
                      const uint8_t *is_row, const uint8_t *is_outer, const double *blur, int64_t n, double *distance,
                      double *jacobian, uint8_t *counts) {
@@ -85,7 +85,7 @@ static void compared(const double *p, const double *origin, const double *x, con
         double by_flank = -at.to_flank * c->flank_x * scale, by_top = -at.to_top * c->top_y * scale;
         double qx = x[i], qy = y[i], turning = 0.0;
         if (at.is_on_fillet) {
-            /* A side that turns takes the centre of its fillet along, which lies a radius inside it. */
+            /* A rotation of a side moves the centre of its fillet, which lies one radius inside the side. */
             qx = c->centre_x;
             qy = c->centre_y;
             turning = c->radius;
@@ -98,7 +98,7 @@ static void compared(const double *p, const double *origin, const double *x, con
     }
 }
 
-/* Where the inner side of the outline crosses a height, and its change there per pixel towards the root. */
+/* Position at which the inner side of the outline crosses a height, and its change per pixel towards the root. */
 static void inner_edge(const double *p, const double *origin, double y, double *edge, double *slope) {
     Corner c = corner(p, origin, 0);
     if (y >= c.centre_y + c.radius * c.flank_y) {
@@ -132,8 +132,8 @@ LOOP(finger_shape_on_flanks, "FFFFb", "") {
     }
 }
 
-/* The corner to which each point belongs, and the slant of its line of pixels to the outline: the cosine between them, by
-   which an error along the line is larger than one along the normal. */
+/* Corner to which each point belongs, and cosine between its line of pixels and the outline's normal; an error along the
+   line is larger than the error along the normal by the inverse of this cosine. */
 LOOP(finger_shape_seen, "FFFFBbf", "") {
     const double *p = FLOATS(0), *origin = FLOATS(1), *x = FLOATS(2), *y = FLOATS(3);
     Corner corners[2] = {corner(p, origin, 0), corner(p, origin, 1)};
@@ -147,7 +147,7 @@ LOOP(finger_shape_seen, "FFFFBbf", "") {
     }
 }
 
-/* Where the inner and then the outer fillet is outermost along the axis: x, y, x, y. */
+/* Outermost points, along the axis, of the inner and of the outer fillet: x, y, x, y. */
 LOOP(finger_shape_corner_tops, "FF", "dddd") {
     for (int side = 0; side < 2; side++) {
         Corner c = corner(FLOATS(0), FLOATS(1), side);

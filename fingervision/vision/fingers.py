@@ -180,7 +180,7 @@ def _has_company(own: Outline, outlines: Outlines) -> bool:
 
 
 def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether a third object could be a finger as well as either of the two."""
+    """Whether a third object resembles a finger as much as the two selected objects do."""
     two = (fingers.left, fingers.right)
     lower = min((finger.top for finger in two), key=lambda finger: finger.prominence_px)
     if (

@@ -1,7 +1,7 @@
 /* after profile_lines */
 /* after finger_shape */
 /* after median */
-/* Least-squares line v = c + m t; level where the points do not spread. */
+/* Least-squares line v = c + m t; slope 0 if all t are equal. */
 static void line(const double *t, const double *v, int64_t n, double *c, double *m) {
     double mean_t = 0.0, mean_v = 0.0, spread = 0.0, shared = 0.0;
     *c = *m = 0.0;
@@ -28,7 +28,7 @@ static void ends_of(const double *values, int64_t n, double *least, double *most
     }
 }
 
-/* The tip's middle, and a line through its middle part; through all points where few belong to the tip. */
+/* Middle of the tip, and a line through its middle part; through all points if few belong to the tip. */
 static double top_line(const double *x, const double *y, const int64_t *side, int64_t n, double *c, double *m) {
     double *px = floats(n), *py = floats(n), least, most;
     int64_t count = 0, tips = 0;
@@ -52,8 +52,9 @@ static double top_line(const double *x, const double *y, const int64_t *side, in
     return x0;
 }
 
-/* Line through the half of a flank that is farther from the tip, which dust does not turn; whether there is one.
-   Slopes from a quarter of the flank to the next, point by point, and their median (Theil and Sen, with fewer pairs). */
+/* Line through the half of a flank that is farther from the tip, robust against dust; returns whether there is a line. The
+   slope is the median of the slopes between points of one quarter of the flank and of the next (Theil and Sen, with fewer
+   pairs). */
 static int lower_flank(const double *x, const double *y, const int64_t *side, int64_t n, int64_t wanted, double *c, double *m) {
     double *px = floats(n), *py = floats(n), *slopes = floats(n), least, most;
     int64_t count = 0, low = 0;
@@ -86,12 +87,11 @@ static int lower_flank(const double *x, const double *y, const int64_t *side, in
     return count >= FEWEST_POINTS;
 }
 
-/* Fillet radius from the points that lie inside both sides of a corner, towards `sense` from x0.
-
-   A fillet of radius r in a right angle passes through every point whose distances a and b from the two sides satisfy
-   (r - a)^2 + (r - b)^2 = r^2; the median over the points does not mind dust. Blur moves the half-level further in: on
-   the bisector by sigma^2 / 2r on a large fillet, by 0.77 sigma in a sharp corner (where the product of two error
-   functions is one half); in between, the two are joined smoothly. */
+/* Fillet radius from the points inside both sides of a corner, towards `sense` from x0. A fillet of radius r in a right
+   angle passes through every point whose distances a and b from the two sides satisfy (r - a)^2 + (r - b)^2 = r^2; the
+   median over the points is robust against dust. Blur moves the half-level inwards on the bisector: by sigma^2 / 2r on a
+   large fillet, by 0.77 sigma at a sharp corner (where the product of two error functions is one half); between these limits
+   a smooth transition is used. */
 static double fillet_radius(const double *x, const double *below_top, int64_t n, double sense, double x0, double below_tip,
                             double flank_c, double flank_m, double top_c, double top_m, double blur) {
     double *through = floats(n), least = 0.0;
@@ -105,7 +105,7 @@ static double fillet_radius(const double *x, const double *below_top, int64_t n,
             count++;
         }
     }
-    /* Points outside the fillet's own reach belong to the other corner. */
+    /* Points beyond the end of the fillet belong to the other corner. */
     for (int64_t i = 0; i < count; i++)
         if (through[i] < 3.0 * least + 3.0) through[near++] = through[i];
     double radius = middle_in_place(through, near), retreat = radius * CORNER_RETREAT;
@@ -118,7 +118,8 @@ static double fillet_radius(const double *x, const double *below_top, int64_t n,
     return radius;
 }
 
-/* x, height below the top, side, blur, height of measuring; start, origin and prior of the fit of a finger's end. */
+/* Starting values for the fit of a finger's end. Arguments: x, height below the top, side, blur, measuring height; results,
+   start, origin and prior. */
 LOOP(first_guess_guess, "FFIddfff", "") {
     const double *x = FLOATS(0), *below_top = FLOATS(1), blur = in[3].d, below_tip = in[4].d;
     const int64_t *side = INTS(2), n = in[0].n;
@@ -135,16 +136,17 @@ LOOP(first_guess_guess, "FFIddfff", "") {
     int is_outer_seen = lower_flank(x, y, side, n, OUTER_SIDE, &outer_c, &outer_m);
     ends_of(x, n, &least, &most);
     if (!is_inner_seen) inner_c = most;
-    if (!is_outer_seen) { /* cut off by the border: nothing speaks of the far corner */
+    if (!is_outer_seen) { /* the border cuts the finger, so that the far corner is not visible */
         outer_c = least - BEYOND_BORDER_PX;
         u_prior[OUTER_C] = 1.0;
         u_prior[OUTER_M] = 0.05;
         u_prior[OUTER_R] = 1.0;
-        /* What is in view may be the inner fillet alone, which leaves the top's slope open: it is square to the flank. */
+        /* If only the inner fillet is in view, the slope of the top is unknown: the top is assumed to be perpendicular to
+           the flank. */
         top_m = -inner_m;
         u_prior[TOP_M] = SQUARE_PRIOR;
     } else if (fabs(inner_m - outer_m) > MOST_TAPER) {
-        /* Nothing of the inner flank is in view below the round corner: it runs parallel to the outer one. */
+        /* The inner flank below the round corner is not in view: it is assumed to be parallel to the outer flank. */
         inner_c = most + 1.0;
         inner_m = outer_m;
         u_prior[INNER_M] = TAPER_PRIOR;

@@ -1,5 +1,6 @@
 /* after median */
-/* Where the outline, followed from its top, has gone down to `limit`, or was lowest before it turned back up. */
+/* Index at which the outline, followed down from its top, reaches `limit`, or index of its lowest point before it rises
+   again. */
 static int64_t follow_down(const int32_t *outline, int64_t n, int64_t top, int64_t step, double limit) {
     int64_t end = top, i = top;
     while (i >= 0 && i < n && outline[2 * end + 1] < limit && outline[2 * end + 1] - outline[2 * i + 1] <= TURNED_PX) {
@@ -9,14 +10,15 @@ static int64_t follow_down(const int32_t *outline, int64_t n, int64_t top, int64
     return end;
 }
 
-/* Outline, place of the top, step, limit; the place where it ends, and how far it went down. */
+/* Follow an outline down. Arguments: outline, index of the top, step, limit; results, index of the end, and height of the
+   descent. */
 LOOP(flanks_follow_down, "Oiid", "ii") {
     const int32_t *outline = POINTS(0);
     out[0].i = follow_down(outline, in[0].shape[0], in[1].i, in[2].i, in[3].d);
     out[1].i = outline[2 * out[0].i + 1] - outline[2 * in[1].i + 1];
 }
 
-/* Where the outline, followed down from its top to `end`, last crosses every row, from the top's own on. */
+/* Last crossing of every row by the outline, followed down from its top to `end`. */
 LOOP(flanks_across_by_row, "Oiiif", "") {
     const int32_t *outline = POINTS(0);
     int64_t top = in[1].i, step = in[2].i, past = in[3].i + step;
@@ -27,14 +29,14 @@ LOOP(flanks_across_by_row, "Oiiif", "") {
     }
 }
 
-/* Middle of every `stride`-th of some values. */
+/* Median of every `stride`-th value. */
 static double middle_of_some(const double *values, int64_t n, int64_t stride, double *order) {
     int64_t count = 0;
     for (int64_t i = 0; i < n; i += stride) order[count++] = values[i];
     return middle_in_place(order, count);
 }
 
-/* Whether any stretch of so many rows is straight: across by row, rows, steepest slope. */
+/* Whether a stretch of the given number of rows is straight: position across by row, number of rows, steepest slope. */
 LOOP(flanks_has_straight_stretch, "Fid", "b") {
     const double *across = FLOATS(0);
     int64_t length = in[1].i, third = length / 3, stride = larger_int(third / ROWS_IN_A_THIRD, 1);

@@ -1,6 +1,7 @@
 /* after median */
-/* Lines of both fingers within some of their places: weight, contrast, whether clipped (2, PLACES), first place and the one
-   behind the last; lines of the left and of the right finger, their usual contrast, and how many are clipped. */
+/* Lines of both fingers in a part of their entries. Arguments: weight, contrast, whether clipped (2, PLACES), first entry,
+   and entry after the last; results, lines of the left and of the right finger, their median contrast, and number of clipped
+   lines. */
 LOOP(gap_lines_within, "FFBii", "iidi") {
     int64_t places = in[0].shape[1], count = 0, clipped = 0, before;
     double *contrast = floats(2 * places);

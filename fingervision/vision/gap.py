@@ -190,7 +190,7 @@ def measure_gap(
     elif outcome is TOO_ROUGH and max(abs(m.slope) for m in measured) > FLATTEST:
         outcome = NoGap(
             Status.NO_FINGERS,
-            "The measuring height crosses the top of a finger instead of its inner side: rotate the camera until the "
+            "The measuring height crosses the top of a finger instead of its inner side: turn the camera until the "
             "tips are level, or measure farther below the tips (--below-tip-mm).",
         )
     if has_part and outcome is TOO_ROUGH:
@@ -203,7 +203,7 @@ def measure_gap(
 
 
 def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> list[MeasuringPoint]:
-    """Measuring points of both fingers from straight sides with corners; empty if either lacks such a shape.
+    """Measuring points of both fingers from straight sides with corners; empty if a finger has another shape.
 
     Both fingers are measured by the same method, so that their systematic errors are equal.
     """
@@ -276,7 +276,7 @@ def _no_fingers(
         return NoGap(
             Status.NO_FINGERS,
             f"The fingers are rotated by {degrees(atan(abs(turn))):.0f} degrees in the picture, but at most 25 "
-            "degrees are permitted: rotate the camera.",
+            "degrees are permitted: turn the camera.",
         )
     if all(are_fingers):
         return None

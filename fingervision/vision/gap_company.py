@@ -27,7 +27,7 @@ LETTERS = NoGap(
 
 
 def has_company(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether the object between two fingers is one of several of its size.
+    """Whether the object between two fingers is one of several objects of similar size.
 
     Parameters
     ----------

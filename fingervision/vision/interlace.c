@@ -1,6 +1,6 @@
 /* after profile_lines */
 /* after median */
-/* How much farther right the even rows see one finger's flanks than the odd rows do; 0 where they agree. */
+/* Displacement to the right of a finger's flanks in the even rows relative to the odd rows; 0 if they agree. */
 LOOP(interlace_apart, "IFF", "d") {
     const int64_t *fixed = INTS(0);
     const double *position = FLOATS(1), *weight = FLOATS(2);
@@ -26,7 +26,8 @@ LOOP(interlace_apart, "IFF", "d") {
             used++;
         }
     double mean = total / (double)larger_int(used, 1);
-    /* One row against the mean of two has 3/2 of its variance; the difference of two halves of n rows 4/n of it. */
+    /* A row minus the mean of two rows has 3/2 of a row's variance; the difference of the means of two halves of n rows has
+       4/n of a row's variance. */
     double u_mean = SHARED * spread * sqrt(4.0 / 1.5 / (double)larger_int(used, 1));
     if (fabs(mean) > larger(SURE * u_mean, LEAST_PX)) out[0].d = mean;
 }

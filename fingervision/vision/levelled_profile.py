@@ -1,7 +1,8 @@
 """Mean profiles without the slopes of the light on both sides of the edge, for comparing the widths of edges.
 
-Uneven light makes one flank of a finger look broader and the other one sharper: light that grows away from an edge adds
-to the step, light that falls takes from it. A straight line on either side, fitted beyond the blur, is subtracted.
+Uneven light makes one flank of a finger appear wider and the other flank sharper: light that increases with the
+distance from an edge widens the step, light that decreases sharpens it. The slope of a straight line, fitted on each
+side beyond the blur, is subtracted.
 """
 
 from dataclasses import replace
@@ -10,7 +11,8 @@ import numpy as np
 
 from fingervision.vision.mean_profile import BIN_PX, MeanProfile
 
-# The edge itself ends so many blurs beside its middle; a slope is fitted to at least so many bins beyond.
+# Distance from the middle of the edge (in blurs) beyond which the edge has no effect, and least number of bins beyond
+# this distance to which a slope is fitted.
 BEYOND_BLURS, FEWEST_BINS = 2.5, 6
 
 
@@ -37,7 +39,7 @@ def levelled(profile: MeanProfile, blur_px: float) -> MeanProfile:
 def u_squared_width(profile: MeanProfile, weight: float, blur_px: float, displaced_px: float) -> float:
     """Standard uncertainty of the squared width (px^2) of a profile's edge, from noise and codec.
 
-    The formula is that of `blur_uncertainty`.
+    The module `blur_uncertainty` derives the formula.
 
     Parameters
     ----------
@@ -48,7 +50,7 @@ def u_squared_width(profile: MeanProfile, weight: float, blur_px: float, displac
     blur_px : float
         Blur of the flank, pixel width included.
     displaced_px : float
-        Standard uncertainty of the edge's position by a codec (pixels).
+        Standard uncertainty of the edge's position due to a codec (pixels).
     """
     lines = float(profile.count.mean()) / BIN_PX
     by_noise = np.sqrt(4.0 * np.sqrt(np.pi) * blur_px / (lines * weight)) / float(np.ptp(profile.light))

@@ -1,5 +1,5 @@
 /* after median */
-/* Breadth and lean of a thing from its inner and outer side by row, and whether the picture's border cuts it off. */
+/* Width and tilt of an object, from its inner and outer side by row, and whether the picture's border cuts the object. */
 LOOP(likeness_build, "FFi", "ddb") {
     const double *inner = FLOATS(0), *outer = FLOATS(1);
     int64_t high = smaller_int(in[0].n, in[1].n), cut = 0;

@@ -1,7 +1,6 @@
-/* Light from inside to outside, `reach` pixels to either side of the coarse edge.
-
-   Beyond the picture's border the last pixel is repeated: what is cut off there is a finger's inside or the ground.
-   Picture, light of every level, is_row (n), fixed, coarse, outward (k, n), every how manieth line; values (k, n, pixels). */
+/* Light from inside to outside, `reach` pixels to either side of the coarse edge. Beyond the picture's border the last pixel
+   is repeated, because the missing part is the inside of a finger or background. Arguments: picture, light of every level,
+   is_row (n), fixed, coarse, outward (k, n), step between the lines; result, values (k, n, pixels). */
 LOOP(line_levels_gather, "pFBIIIif", "") {
     const Arg *upright = &in[0];
     const double *light = FLOATS(1);
@@ -20,7 +19,8 @@ LOOP(line_levels_gather, "pFBIIIif", "") {
         }
 }
 
-/* Largest step from pixel to pixel near the middle, as a share of what lies between the ends: levels (k, n, pixels). */
+/* Largest difference between neighbouring pixels near the centre, as a share of the difference between the ends: levels (k,
+   n, pixels). */
 LOOP(line_levels_steepest_shares, "Ff", "") {
     int64_t pixels = in[0].shape[2], centre = pixels / 2;
     for (int64_t i = 0; i < in[1].n; i++) {
@@ -36,7 +36,7 @@ LOOP(line_levels_steepest_shares, "Ff", "") {
     }
 }
 
-/* Where an edge between the window's two end levels would have the same mean level as the window. */
+/* Position of an edge between the window's two end levels for which the window has the observed mean level. */
 LOOP(line_levels_first_position, "Ff", "") {
     int64_t pixels = in[0].shape[2];
     for (int64_t i = 0; i < in[1].n; i++) {

@@ -1,5 +1,5 @@
-/* Solve a x = b in place by Gaussian elimination with partial pivoting: a (n, n), b (n, m), which becomes x; 0 where a is
-   singular or not finite. For systems of a few unknowns in the middle of a loop; all others are NumPy's. */
+/* Solve a x = b in place by Gaussian elimination with partial pivoting: a (n, n), b (n, m), which is replaced by x; returns
+   0 if a is singular or not finite. Used for systems of a few unknowns inside a loop; larger systems are solved by NumPy. */
 static int solve(double *a, int n, double *b, int m) {
     for (int k = 0; k < n; k++) {
         int pivot = k;

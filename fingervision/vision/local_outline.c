@@ -9,8 +9,9 @@ static double power_sum(const double *c, double s) {
     return total;
 }
 
-/* Polynomial of normal distance over tangent distance near a place, by weighted least squares with Tukey's biweight: x, y,
-   u, is_row, centre, normal, reach; coefficients; whether there is one, variance at the centre, spread. */
+/* Polynomial of the normal over the tangential distance near a position, by weighted least squares with Tukey's biweight: x,
+   y, u, is_row, centre, normal, reach; coefficients, variance at the centre, spread. Returns whether there is a polynomial.
+   */
 LOOP(local_outline_polynomial, "FFFBdddddf", "bdd") {
     int64_t n = 0;
     double nx = in[6].d, ny = in[7].d, reach = in[8].d, *c = FLOATS(9), inverse[TERMS * TERMS], right[TERMS];
@@ -25,14 +26,14 @@ LOOP(local_outline_polynomial, "FFFBdddddf", "bdd") {
         s[n] = t;
         away[n] = d;
         taper[n] = rest * rest * rest;
-        /* An outline seen in a row moves along the normal by the normal's component only. */
+        /* A displacement along a row, times the normal's component along the row, is the displacement along the normal. */
         u[n] = FLOATS(2)[i] * larger(fabs(FLAGS(3)[i] ? nx : ny), 0.3);
         weight[n] = taper[n] / square(u[n]);
         n++;
     }
     if (n < FEWEST_POINTS) goto done;
     for (int iteration = 0; iteration < 4; iteration++) {
-        /* The normal matrix of a polynomial holds nothing but the sums of the powers up to twice its degree. */
+        /* All elements of a polynomial's normal matrix are sums of powers up to twice the degree. */
         double matrix[TERMS * TERMS], sums[2 * TERMS - 1] = {0.0};
         for (int a = 0; a < TERMS; a++) right[a] = 0.0;
         for (int64_t i = 0; i < n; i++) {
@@ -47,7 +48,7 @@ LOOP(local_outline_polynomial, "FFFBdddddf", "bdd") {
                 matrix[a * TERMS + b] = sums[a + b];
                 inverse[a * TERMS + b] = a == b;
             }
-        if (!solve(matrix, TERMS, inverse, TERMS)) goto done; /* too few places to tell the powers apart */
+        if (!solve(matrix, TERMS, inverse, TERMS)) goto done; /* too few positions to determine the coefficients */
         for (int a = 0; a < TERMS; a++) {
             c[a] = 0.0;
             for (int b = 0; b < TERMS; b++) c[a] += inverse[a * TERMS + b] * right[b];
@@ -70,7 +71,7 @@ LOOP(local_outline_polynomial, "FFFBdddddf", "bdd") {
     }
     double effective = square(total) / squares;
     if (!(effective > DEGREE + 2)) goto done;
-    /* As many points as the polynomial has coefficients tell nothing of the spread. */
+    /* If there are only as many points as coefficients, the spread is unknown. */
     out[2].d = sqrt(left / own) * sqrt(effective / (effective - DEGREE - 1.0));
     out[1].d = variance;
     out[0].i = 1;

@@ -1,7 +1,7 @@
 /* after median */
 /* after first_guess */
-/* Line through the edges of a flank's rows without those that are dust: rows, edges; which of them are kept (all at first).
-   Gives their number, intercept, slope, and the spread of those that the last line went through. */
+/* Line through the edges of a flank's rows, without rows with dust: rows, edges; which rows are kept (initially all).
+   Returns their number, intercept, slope, and the spread of the rows to which the last line was fitted. */
 LOOP(mean_profile_robust_line, "IFb", "iddd") {
     int64_t n = in[0].n, kept = n;
     double *t = floats(3 * n), *v = t + n, *away = v + n, intercept = 0.0, slope = 0.0, spread = 0.0;
@@ -28,9 +28,9 @@ LOOP(mean_profile_robust_line, "IFb", "iddd") {
     free(t);
 }
 
-/* Sums over the pixels beside a flank, in bins of distance from its edge: picture, light of every level, rows, edge and
-   slope of each row, direction outwards, reach outwards; number of pixels, their distances and their light in each bin.
-   A bin's pixels are taken row by row, as they stand. */
+/* Sums over the pixels beside a flank, in bins of the distance from its edge. Arguments: picture, light of every level,
+   rows, edge and slope of each row, outward direction, outward reach; results, for each bin the number of pixels, and the
+   sums of their distances and of their light. Pixels are read row by row, in the order of the memory. */
 LOOP(mean_profile_bins, "pFIFFiifff", "") {
     const Arg *picture = &in[0];
     const double *light = FLOATS(1), *edge = FLOATS(3), *slope = FLOATS(4);

@@ -1,12 +1,13 @@
 /* after finger_shape */
-/* The top made square to its flanks where the points do not speak against it: parameters and covariance, and the same. */
+/* Finger end with its top made perpendicular to its flanks unless the points contradict this: parameters and covariance,
+   before and after. */
 LOOP(measuring_point_squared, "FFdff", "") {
     enum { m = PARAMETERS };
     const double *p = FLOATS(0), *covariance = FLOATS(1), misfit = in[2].d;
     double toward[m];
     memcpy(FLOATS(3), p, m * sizeof(double));
     memcpy(FLOATS(4), covariance, m * m * sizeof(double));
-    /* Slope of the top plus the mean slope of the flanks is zero where they are square. */
+    /* The slope of the top plus the mean slope of the flanks is zero if they are perpendicular. */
     double off_square = p[TOP_M] + 0.5 * (p[INNER_M] + p[OUTER_M]);
     for (int a = 0; a < m; a++)
         toward[a] = covariance[a * m + TOP_M] + 0.5 * (covariance[a * m + INNER_M] + covariance[a * m + OUTER_M]);
@@ -26,7 +27,7 @@ static double product(const double *a, const double *matrix, const double *b) {
     return total;
 }
 
-/* Heights at which the inner and the outer fillet are outermost along the axis. */
+/* Heights of the outermost points (along the axis) of the inner and of the outer fillet. */
 static void tops_of(const double *p, const double *origin, double *inner, double *outer) {
     Corner first = corner(p, origin, 0), second = corner(p, origin, 1);
     *inner = first.centre_y - first.radius;
@@ -44,9 +45,9 @@ static void tip_and_edge(const double *p, const double *origin, double inner_sha
     inner_edge(moved, origin, *tip + below_tip, edge, slope);
 }
 
-/* Parameters, covariance, misfit, origin, height of measuring, blur; covariance of tip and edge; tip, apex, edge, slope.
-
-   The covariance is wider by what blur hides of small corners: their radius, in both fingers alike. */
+/* Measuring point of a finger end. Arguments: parameters, covariance, misfit, origin, measuring height, blur; results,
+   covariance of tip and edge; tip, apex, edge, slope. The covariance is increased because blur hides the radius of small
+   corners, equally in both fingers. */
 LOOP(measuring_point_read_off, "FFdFddf", "dddd") {
     enum { m = PARAMETERS };
     const double *p = FLOATS(0), *covariance = FLOATS(1), misfit = in[2].d, *origin = FLOATS(3), below_tip = in[4].d;
@@ -78,7 +79,7 @@ LOOP(measuring_point_read_off, "FFdFddf", "dddd") {
     double inner_share = is_level ? 0.5 : lean > 0.0 ? 1.0 : 0.0;
     tip_and_edge(p, origin, inner_share, below_tip, 0, 0.0, &out[0].d, &out[2].d, &out[3].d);
     for (int a = 0; a < m; a++) {
-        /* A radius is not below zero, and may be so much larger that the measuring point comes to lie on the fillet. */
+        /* A radius cannot be negative, but may be so much larger that the measuring point lies on the fillet. */
         int is_radius = a == INNER_R || a == OUTER_R;
         double more = is_radius ? smaller(sqrt(wider[a * m + a]), LARGEST_STEP_PX) : STEP, less = is_radius ? 0.0 : STEP;
         double up_tip, up_edge, down_tip, down_edge, slope;

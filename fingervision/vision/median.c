@@ -1,4 +1,4 @@
-/* The middle of a few values (Hoare's selection); what it looks at comes out of order. */
+/* Upper median of a few values (Hoare's selection), which reorders the values. */
 static double middle_in_place(double *a, int64_t n) {
     int64_t low = 0, high = n - 1, wanted = n / 2;
     while (low < high) {
@@ -30,7 +30,7 @@ static double middle(const double *values, int64_t n) {
 
 LOOP(median_middle, "F", "d") { out[0].d = middle(FLOATS(0), in[0].n); }
 
-/* The mean of the two in the middle, of an even number. */
+/* Mean of the two central values, for an even number of values. */
 static double median_in_place(double *a, int64_t n) {
     double upper = middle_in_place(a, n), lower = upper;
     if (n == 0 || n % 2) return upper;

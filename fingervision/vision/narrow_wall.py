@@ -1,6 +1,6 @@
-"""Side walls that broaden the inner flanks of both fingers and leave the outer ones as they are."""
+"""Correction for side walls, which widen the inner flanks of both fingers but not the outer flanks."""
 
-from math import hypot
+import numpy as np
 
 from fingervision.vision.blur_uncertainty import Displacement
 from fingervision.vision.edge_moves import are_of_size, beyond_wall, moved_by_wall, moved_edges, with_blur
@@ -11,10 +11,10 @@ from fingervision.vision.mean_profile import MeanProfile
 from fingervision.vision.profile_models import STEP, WALL
 from fingervision.vision.wall_width import SURE, WIDER
 
-# A wall improves what a step leaves by so much in chi-square.
+# Least reduction of chi-square by a wall, compared with a step.
 SIGNIFICANT = 30.0
-# A wall is not quite of one tone: this share of a correction is its standard uncertainty; and where only the width of
-# the flanks tells of it, this one: what is no wall is within two of these.
+# Relative standard uncertainties of a correction for a wall: the first because a wall's tone is not exactly uniform;
+# the second if only the width of the flanks indicates the wall, so that two standard uncertainties include no wall.
 U_WALL, U_HIDDEN_WALL = 0.1, 0.5
 
 
@@ -26,10 +26,10 @@ def with_narrow_wall(
     is_outline: bool,
     displaced_px: Displacement,
 ) -> EdgePoints | None:
-    """Edges corrected for side walls that broaden the inner flanks; None if the outer flanks are as broad.
+    """Edges corrected for side walls that widen the inner flanks; None if the outer flanks are equally wide.
 
-    Motion and focus broaden the outer flanks as well. A wall narrower than the blur shows in nothing but the width: it
-    is corrected then too, with half of the correction as its standard uncertainty.
+    Motion and defocus widen the outer flanks as well. Only the width of the flanks indicates a wall narrower than the
+    blur; the correction for such a wall has half of its value as standard uncertainty.
     """
     inside, widths, wide, u_more = [], [], [], []
     for (profile, weight, blur), beyond, by_codec in zip(inner, outer, displaced_px(edges), strict=True):
@@ -37,8 +37,8 @@ def with_narrow_wall(
         inside.append((own, weight, blur))
         wide.append(best_fit(STEP, own, weight, blur))
         widths.append(best_fit(STEP, other, weight, blur).blur)
-        parts = [u_squared_width(p, weight, blur, by_codec) for p in (own, other)]
-        u_more.append(hypot(*parts))
+        u_own, u_other = (u_squared_width(p, weight, blur, by_codec) for p in (own, other))
+        u_more.append(float(np.hypot(u_own, u_other)))
     more = [step.blur**2 - width**2 for step, width in zip(wide, widths, strict=True)]
     if any(each < max(WIDER * width**2, SURE * u) for each, width, u in zip(more, widths, u_more, strict=True)):
         return None

@@ -1,6 +1,6 @@
 /* after profile_lines */
-/* First row and column of every square beside both inner flanks, and the side that it is on: fixed, coarse, weight (2, n),
-   reach, rows and columns of the picture; squares (4 MOST_ALONG, 3), and how many there are. */
+/* First row and column of every square beside both inner flanks, and its side: fixed, coarse, weight (2, n), reach, rows and
+   columns of the picture; squares (4 MOST_ALONG, 3). Returns the number of squares. */
 LOOP(noise_correlation_squares, "IIFiiij", "i") {
     int64_t places = in[0].shape[1], reach = in[3].i, rows = in[4].i, columns = in[5].i, left = -columns, right = 2 * columns;
     int64_t count = 0;
@@ -27,12 +27,12 @@ LOOP(noise_correlation_squares, "IIFiiij", "i") {
         for (int along = 0; along < MOST_ALONG; along++) {
             int64_t first = top + along * SIDE_PX;
             if (high[along] < 0 || first + SIDE_PX > rows) continue;
-            /* The left finger's ground lies at larger columns, the right one's at smaller ones. */
+            /* The background lies at larger columns for the left finger, and at smaller columns for the right finger. */
             for (int end = 0; end < 2; end++) {
                 int64_t start = end ? low[along] - reach - BEYOND_PX - SIDE_PX + 1 : high[along] + reach + BEYOND_PX;
                 int64_t side = (end == 0) == (k == 0) ? GROUND : FINGER;
                 if (side == GROUND && (k == 0 ? start + SIDE_PX > right - reach : start < left + reach))
-                    continue; /* the other finger's edge lies in it */
+                    continue; /* the square contains the other finger's edge */
                 if (start < 0 || start > columns - SIDE_PX) continue;
                 INTS(6)[3 * count] = first;
                 INTS(6)[3 * count + 1] = start;
@@ -44,9 +44,9 @@ LOOP(noise_correlation_squares, "IIFiiij", "i") {
     out[0].i = count;
 }
 
-/* Sum of the squares' autocovariances, each without its plane of light: picture, light, squares (n, 3), the side that is
-   wanted, the farthest lag; covariance (7, 7), how many pixels there are. The first index is the lag along a row plus LAGS,
-   the second that from row to row; lags beyond the farthest are left at zero. */
+/* Sum of the squares' autocovariances, each after subtraction of a plane of light. Arguments: picture, light, squares (n,
+   3), the chosen side, the largest lag; result, covariance (7, 7). Returns the number of pixels. The first index is the lag
+   along a row plus LAGS, the second index is the lag in rows; entries beyond the largest lag stay zero. */
 LOOP(noise_correlation_autocovariance, "pFIiif", "d") {
     enum { WIDE = 2 * LAGS + 1, PIXELS = SIDE_PX * SIDE_PX };
     int64_t n = 0, used = 0, farthest = in[4].i;
@@ -77,7 +77,8 @@ LOOP(noise_correlation_autocovariance, "pFIiif", "d") {
         least = n ? smaller(least, total) : total;
         n++;
     }
-    /* Several squares side by side: each has sums of its own, which do not wait for each other. */
+    /* Several squares are computed in parallel, each with its own sums, so that an addition need not wait for the previous
+       one. */
     enum { AT_ONCE = 4 };
     double *beside = floats(AT_ONCE * PIXELS);
     for (int64_t k = 0; k < n;) {
@@ -99,7 +100,7 @@ LOOP(noise_correlation_autocovariance, "pFIiif", "d") {
                         const double *there = here + (down * SIDE_PX + right) * AT_ONCE;
                         for (int part = 0; part < AT_ONCE; part++) total[part] += here[part] * there[part];
                     }
-                /* Fewer pairs at larger lags: each as if there were one for every pixel. */
+                /* Larger lags have fewer pairs of pixels: each sum is scaled to one pair per pixel. */
                 int64_t pairs = (SIDE_PX - down) * (SIDE_PX - llabs(right));
                 for (int64_t part = 0; part < count; part++)
                     covariance[(LAGS + right) * WIDE + LAGS + down] += total[part] * PIXELS / (double)pairs;
@@ -114,7 +115,8 @@ LOOP(noise_correlation_autocovariance, "pFIiif", "d") {
     free(power);
 }
 
-/* Variance of a mean of lines over that of lines with noise of their own, each summed along itself by `weight`. */
+/* Variance of a mean over lines divided by its value for lines with independent noise; each line is a sum weighted by
+   `weight`. */
 LOOP(noise_correlation_shared, "FF", "d") {
     enum { WIDE = 2 * LAGS + 1 };
     int64_t n = in[1].n;

@@ -1,7 +1,6 @@
-/* The normal distribution's density and integral at many places.
-
-   Both are tabulated at every 1/64 sigma when the library is loaded, and carried from the nearest entry by a Taylor series
-   of seven terms, whose remainder is below 1e-18: a sixth of the time of erf and exp, and the same to the last digits. */
+/* Density and integral of the normal distribution at many positions. Both are tabulated at steps of 1/64 sigma when the
+   library is loaded, and continued from the nearest entry by a Taylor series of seven terms with a remainder below 1e-18:
+   this takes a sixth of the time of erf and exp, with the same digits. */
 
 enum { STEPS_IN_SIGMA = 64, TABLE_SIGMAS = 9, TABLE_SIZE = 2 * STEPS_IN_SIGMA * TABLE_SIGMAS + 1 };
 static double DENSITY[TABLE_SIZE], INTEGRAL[TABLE_SIZE];
@@ -14,16 +13,17 @@ PREPARE(normal_table) {
     }
 }
 
-/* Integral and density at a distance h from the table's entry at a, where they are `whole` and `own`. */
+/* Integral and density at a distance h from the table's entry at a, where the integral is `whole` and the density is `own`.
+   */
 static inline void series(double a, double h, double own, double whole, double *integral, double *density) {
-    /* Derivatives of the density over the density: Hermite's polynomials, each from the two before it. */
+    /* Derivatives of the density divided by the density: Hermite polynomials, each computed from the two before. */
     double d1 = -a, d2 = -a * d1 - 1.0, d3 = -a * d2 - 2.0 * d1, d4 = -a * d3 - 3.0 * d2, d5 = -a * d4 - 4.0 * d3;
     double d6 = -a * d5 - 5.0 * d4;
     *density = own * (1.0 + h * (d1 + h / 2.0 * (d2 + h / 3.0 * (d3 + h / 4.0 * (d4 + h / 5.0 * (d5 + h / 6.0 * d6))))));
     *integral = whole + own * h * (1.0 + h / 2.0 * (d1 + h / 3.0 * (d2 + h / 4.0 * (d3 + h / 5.0 * (d4 + h / 6.0 * d5)))));
 }
 
-/* Integral up to z, and density there. Beyond nine sigma both are what they are to 1e-18: zero, or one. */
+/* Integral up to z, and density at z. Beyond nine sigma, both equal their limits (zero or one) to 1e-18. */
 static inline double normal(double z, double *density) {
     if (!(fabs(z) < TABLE_SIGMAS - 0.5)) {
         *density = 0.0;
@@ -35,8 +35,8 @@ static inline double normal(double z, double *density) {
     return integral;
 }
 
-/* The same at many places at once, which may be those where the results go: the same digits, but the series of several
-   places are summed side by side. */
+/* Integral and density at many positions at once; results may overwrite the positions. The digits are those of single
+   evaluations, but the series of several positions are summed in parallel. */
 SIDE_BY_SIDE static void normal_at_all(const double *z, int64_t n, double *integral, double *density) {
     enum { AT_ONCE = 64 };
     double a[AT_ONCE], h[AT_ONCE], own[AT_ONCE], whole[AT_ONCE], sum[AT_ONCE], slope[AT_ONCE];

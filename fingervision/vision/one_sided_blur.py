@@ -9,8 +9,9 @@ explain, its edges may be displaced by sqrt(|D| q / (1 - q)): by sqrt(|D|) if th
 sqrt(|D|).
 
 A lens with distortion, or a camera that looks at the plane at an angle, magnifies the sides differently. The blur of
-the optics is equal on all sides in the picture, the blur of an object out of focus rather in the plane. Blurs equal in
-the picture, equal in the plane, or in between are therefore accepted as equal.
+the optics is equal on all sides in the picture; the blur of an object out of focus is more nearly equal in the object
+plane. The blurs of two sides are therefore accepted as equal if they are equal in the picture, in the object plane, or
+in between.
 """
 
 import numpy as np

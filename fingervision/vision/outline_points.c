@@ -1,15 +1,13 @@
 /* after profile_lines */
 /* after edge_filters */
-/* The points of one finger's half-level outline in the finger's own axes: side of every place, weight, contrast, fixed,
-   position, u_position, slope, curvature gain (2, PLACES), blur (2, 2), which finger, least contrast, sign of the inner
-   side, origin across and along; x, y, u, blur, side; how many there are.
-
-   The blur is what the curvature of the outline is felt through (sigma_e, the pixel included). Blur along the edge moves a
-   curved edge's half-level, blur across it does not. Motion makes the two differ: what is seen on the flanks is the blur
-   across the fingers, what is seen on the tips that along them. What counts is the variance along the edge of what stays on
-   it: det S / n' S n for a covariance S and the edge's normal n. What a fit with free levels adds on a slanted line comes
-   from the blur across the edge, n' S n. A short window takes a little of a slanted line's share away: never all that stays
-   on the edge. */
+/* Points of one finger's half-level outline in the finger's own axes. Arguments: side of every entry, weight, contrast,
+   fixed, position, u_position, slope, curvature gain (2, PLACES), blur (2, 2), which finger, least contrast, sign of the
+   inner side, origin across and along; results, x, y, u, blur, side. Returns the number of points. The blur is the one
+   (sigma_e, including the pixel) that determines the effect of the outline's curvature: blur along the edge moves the
+   half-level of a curved edge, blur across the edge does not. Motion makes the blurs differ: flanks show the blur across the
+   fingers, tips the blur along them. The relevant variance is that along the edge for a fixed position across the edge: det
+   S / n' S n for a covariance S and the edge's normal n. The effect of a fit with free levels on a slanted line comes from
+   the blur across the edge, n' S n. A short window reduces the effect on a slanted line, but not below zero. */
 LOOP(outline_points_seen_from, "IFFIFFFFFididdffffj", "i") {
     int64_t k = in[9].i, first = k * PLACES, count = 0;
     const double *weight = FLOATS(1) + first, *contrast = FLOATS(2) + first, *position = FLOATS(4) + first;

@@ -1,5 +1,5 @@
-/* A closed outline (x, y) in the fingers' axes (across, along), from its lowest point on: pixels, whether the fingers are
-   vertical, whether flipped, size along; the outline. */
+/* A closed outline (x, y) in the fingers' axes (across, along), beginning at its lowest point. Arguments: pixels, whether
+   the fingers are vertical, whether flipped, size along; result, the outline. */
 LOOP(outlines_from_lowest, "OiiiO", "") {
     const int32_t *pixels = POINTS(0);
     int32_t *outline = (int32_t *)in[4].data;
@@ -16,7 +16,8 @@ LOOP(outlines_from_lowest, "OiiiO", "") {
     }
 }
 
-/* Columns and rows that the widest and the tallest outline take: points (n, 2) of all, where each starts. */
+/* Number of columns of the widest outline, and of rows of the tallest: points (n, 2) of all outlines, start of each outline.
+   */
 LOOP(outlines_largest_extents, "OI", "ii") {
     const int32_t *points = POINTS(0);
     out[0].i = out[1].i = 0;

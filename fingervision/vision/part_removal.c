@@ -4,7 +4,8 @@ static int by_size(const void *a, const void *b) {
     return (first > second) - (first < second);
 }
 
-/* Whether something stands out of the inner side of a finger's coarse outline: outline, sign of the inner side, first row. */
+/* Whether an object protrudes from the inner side of a finger's coarse outline: outline, sign of the inner side, first row.
+   */
 LOOP(part_removal_has_step, "Oid", "b") {
     const int32_t *outline = POINTS(0);
     int64_t crest = 0, count = 0, steps = 0, has_kink = 0;
@@ -22,10 +23,10 @@ LOOP(part_removal_has_step, "Oid", "b") {
         for (int64_t i = 0; i < half; i++) order[i] = (v[half + i] - v[i]) / (t[half + i] - t[i] - 0.5);
         double m = middle_in_place(order, half);
         for (int64_t i = 0; i < count; i++) order[i] = v[i] -= m * t[i];
-        /* The finger's own edge is the innermost thing: a part only ever adds. */
+        /* The finger's own edge is the one farthest from the gap, because a part only adds to the finger. */
         qsort(order, (size_t)count, sizeof(double), by_size);
         for (int64_t i = 0; i < count; i++) steps += v[i] - order[count / 4] > STEP_PX;
-        /* A round corner falls back towards the tip, ever more steeply; a step rises, or is followed by a flat side. */
+        /* A round corner recedes towards the tip, more and more steeply; a step protrudes, or is followed by a flat side. */
         for (int64_t i = STEP_ROWS; i + STEP_ROWS < count; i++)
             has_kink |= v[i + STEP_ROWS] - v[i] > STEP_PX || v[i + STEP_ROWS] - 2.0 * v[i] + v[i - STEP_ROWS] > STEP_PX;
     }
@@ -33,15 +34,15 @@ LOOP(part_removal_has_step, "Oid", "b") {
     free(t);
 }
 
-/* Rows in which something lies at the left side, at the right one, and touches both: picture, the two lines, last row;
-   three flags a row, and the pixels in all. */
+/* Rows in which an object touches the left side, the right side, or both. Arguments: picture, the two lines, last row;
+   result, three flags for each row. Returns the number of the objects' pixels. */
 LOOP(part_removal_part_rows, "Bddddibbb", "i") {
     int64_t columns = in[0].shape[1], pixels = 0;
     for (int64_t row = 0; row <= in[5].i; row++) {
         int64_t a = (int64_t)rint(in[1].d + in[2].d * (double)row), b = (int64_t)rint(in[3].d + in[4].d * (double)row);
         FLAGS(6)[row] = FLAGS(7)[row] = FLAGS(8)[row] = 0;
         if (a < 0 || b >= columns || b - a < 2 * SPECK_PX + 2) continue;
-        /* Two pixels beside the line may be the finger's own edge. */
+        /* Two pixels beside the line may belong to the finger's own edge. */
         int64_t first = a + 2, past = b - 1, filled = 0, left = 0, right = 0;
         const uint8_t *line = FLAGS(0) + row * columns;
         for (int64_t x = first; x < past; x++) filled += line[x] != 0;
@@ -61,7 +62,8 @@ static uint8_t *flag_at(const Arg *mask, int64_t row, int64_t column) {
     return (uint8_t *)mask->data + row * mask->stride[0] + column * mask->stride[1];
 }
 
-/* Clear all between the two sides, from the picture's end down to the channel's, and what is left beside them. */
+/* Clear all pixels between the two sides, from the picture's end to the channel's end, and the remaining pixels of the part
+   beside them. */
 LOOP(part_removal_clear, "Pddddi", "") {
     int64_t columns = in[0].shape[1];
     for (int64_t row = 0; row <= in[5].i; row++) {

@@ -2,9 +2,9 @@
 
 Texture of a frequency f above the Nyquist frequency (half a cycle per pixel) appears at the frequency `1 - f` and seems
 to move in the opposite direction: relative to the rest of the patch its phase changes by 2 pi for every pixel of
-displacement. After a displacement d its residual is `2 sin(pi d)` times as large as the aliased texture itself. The
-part of the aliased residual that looks like a displacement is a bias, which depends on the sub-pixel phase. The bias
-has two parts:
+displacement. After a displacement d of the patch, the residual due to aliased texture is `2 sin(pi d)` times as large
+as the aliased texture itself. The part of the aliased residual that looks like a displacement is a bias, which depends
+on the sub-pixel phase. The bias has two parts:
 
 * The product of the residual with the aliased texture's own gradient is the same for every texture of equal power: the
   product pulls the patch towards whole pixels by `pull sin(2 pi d)`. The pull is computed and corrected
@@ -150,7 +150,8 @@ def aliasing_at(
 
     The power of aliased texture contributes with the factor `4 sin^2(pi d) = 2 (1 - cos(2 pi d))` at the displacement
     d, averaged over a rotated patch. The power near the Nyquist frequency is the sum of noise and texture, and so is
-    the mean square of the residuals. The noise is found from these two sums, and only the remaining power is texture.
+    the mean square of the residuals. The power near the Nyquist frequency and the mean square of the residuals together
+    give the noise; only the remaining power is texture.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def aliasing_at(
 
 
 def _folded_power(light: Doubles, axis: int, margin_px: int) -> tuple[Doubles, Doubles, float]:
-    """Power spectra of the texture that is aliased along an axis, by its apparent frequency, of the patch's shape.
+    """Power spectra, in the shape of the patch, of the texture that is aliased along an axis, by apparent frequency.
 
     The first spectrum assumes the blur of optics, which leaves the least aliased power, and serves for a correction.
     The second spectrum assumes edges and lines. The third result is the mean power near the Nyquist frequency, from

@@ -1,5 +1,5 @@
-/* One row of a patch, seen in a spline's coefficients: places of its pixels, and the levels there. Arithmetic in single
-   precision: the levels hold seven digits, their noise two. */
+/* One row of a patch, interpolated from a spline's coefficients: positions of the row's pixels, and levels at these
+   positions. The arithmetic has single precision (seven digits), because only two digits of a level exceed the noise. */
 static void sampled_row(const float *c, int64_t width, int64_t n, float *x, float *y, float *level, int32_t *at,
                         float (*across)[4], float (*down)[4]) {
     for (int64_t i = 0; i < n; i++) {
@@ -23,10 +23,10 @@ static void sampled_row(const float *c, int64_t width, int64_t n, float *x, floa
     }
 }
 
-/* Register one patch: coefficients of the picture's part, levels and jacobian of the reference (3 by its pixels), inverse of
-   its Gram matrix, pixels to either side across and down, first guess of x, y and turn; written are the gradients' products
-   with the residuals by blocks of the patch. Gives x, y, turn, gain, correlation, sum of squared residuals, whether it
-   settled inside the part. */
+/* Register one patch. Arguments: coefficients of the picture's part, levels and Jacobian of the reference (3 by number of
+   pixels), inverse of its Gram matrix, number of pixels on either side across and down, initial x, y and rotation; result,
+   products of gradients and residuals for each block of the patch. Returns x, y, rotation, gain, correlation, sum of squared
+   residuals, and whether the iteration converged inside the part. */
 LOOP(patch_registration_settled, "SSSFiidddf", "ddddddb") {
     const float *c = (const float *)in[0].data, *own = (const float *)in[1].data, *jacobian = (const float *)in[2].data;
     const double *inverse = FLOATS(3);
@@ -35,7 +35,7 @@ LOOP(patch_registration_settled, "SSSFiidddf", "ddddddb") {
     double x = in[6].d, y = in[7].d, turn = in[8].d, gain = 1.0, correlation = 0.0, squares = 0.0, own_power = 0.0;
     double *scores = FLOATS(9);
     double rim = (double)larger_int(a, b);
-    /* Sums of squares of the places, for the plane that is taken off. */
+    /* Sums of the squared positions, for the subtraction of a plane. */
     double of_x = (double)m * (double)(a * (a + 1) * n) / 3.0, of_y = (double)n * (double)(b * (b + 1) * m) / 3.0;
     float *px = (float *)room(n, sizeof(float)), *py = (float *)room(n, sizeof(float));
     float *seen = (float *)room(pixels, sizeof(float));

@@ -15,7 +15,8 @@ def keep_picture_memory() -> bool:
     """Let this process keep freed memory of up to `KEPT_BYTES` for later pictures.
 
     The GNU C library returns the memory of a large picture to the system as soon as it is freed, and the system clears
-    every page that it gives out anew: for pictures of 3840 x 2160 pixels, this takes as long as the measurement.
+    every page that it gives out anew: for pictures of 3840 x 2160 pixels, clearing the pages takes as long as the
+    measurement.
 
     Returns
     -------

@@ -66,9 +66,9 @@ UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: no object differs 
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     """Measure one video frame, without any memory of earlier frames.
 
-    The first call limits OpenCV to one thread in this process: its other threads would wait busily between frames,
-    which takes two thirds of a processor core that the decoder needs. It also lets the process keep the memory of
-    intermediate pictures (`keep_picture_memory`).
+    The first call limits OpenCV to one thread in this process: the waiting of OpenCV's other threads between frames
+    would take two thirds of a processor core that the decoder needs. The first call also lets the process keep the
+    memory of intermediate pictures (`keep_picture_memory`).
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Select the model of the mean profile across a flank, from which the position of the finger's edge follows.
 
-A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. Some of these structures are
-indistinguishable on one flank alone: a wall half as light as the background looks like motion blur, and glare looks
-like a wall on the other side of the edge. Walls, motion, glare and shadows are distinguished by where they occur: a
-wall is visible on the inner flank only, because the camera looks into the gap from its middle; motion blurs both flanks
-but not the tip; glare and shadow surround the finger.
+A shadow, a visible side wall and a line of glare each cause a characteristic mean profile. On one flank alone, some
+structures are indistinguishable: a wall half as light as the background looks like motion blur, and glare looks like a
+wall on the other side of the edge. Walls, motion, glare and shadows are distinguished by where they occur: a wall is
+visible on the inner flank only, because the camera looks into the gap from its middle; motion blurs both flanks but not
+the tip; glare and shadow surround the finger.
 """
 
 from dataclasses import replace
@@ -46,11 +46,12 @@ Ints = NDArray[np.int_]
 
 # Ratio of a step's residuals to the noise of the picture's flat parts above which other models are tried.
 UNEXPLAINED = 1.2
-# Flanks with so many times the noise and so many times the squared blur of the tips, without a common profile, are no
-# steps: a pad or a shadow is as broad as the window there. Motion leaves less than twice the noise, texture the blur.
+# Ratios above which flanks without a common profile are not steps, but pads or shadows as wide as the window: residuals
+# to the noise of the picture's flat parts, and squared blur of the flanks to that of the tips. Motion causes a ratio of
+# residuals below 2, and texture does not change the blur.
 NO_STEP, NO_EDGE = 3.0, 4.0
-# One model is clearly better than another that leaves so much more chi-square, in units of what its own bins leave
-# (odds of e^8 to one).
+# Difference in chi-square above which one model is clearly better than another, in units of the residual per bin (odds
+# of e^8 to one).
 CLEARLY = 16.0
 # Largest integral of the squared residual of a Gaussian step, in units of contrast^2 times blur, that symmetric optics
 # can cause: a disc of defocus causes at most 0.0017 (a box 0.0038). A larger residual means two steps, or a line
@@ -59,7 +60,7 @@ DISC_LEAVES = 0.002
 # Ratio of the distance of a fitted glare to its blur below which defocus explains the glare; a disc of defocus of any
 # size gives 1.0 to 1.1.
 DISC_BREADTH = 1.12
-# Levels within so many standard deviations of the end of the scale are cut off now and then.
+# Distance from the end of the scale, in standard deviations of the noise, within which levels are sometimes clipped.
 CUT_OFF_SIGMAS = 2.0
 # Motion and defocus widen both flanks of a finger, and a wall widens the inner flanks of both fingers. If only one
 # inner flank is wider than the finger's outer flank, by this share of the squared blur and by this number of pixels, a
@@ -71,8 +72,8 @@ RESOLVED_BLURS = 1.6
 # Motion spreads a fillet of this radius like a box and not like a Gaussian: the half-level moves by up to half of the
 # variance that it adds over the radius.
 MOTION_RADIUS_PX = 15.0
-# Shadows are not quite ramps; glare lies elsewhere on a fillet than on the flank. This
-# share of a correction is its standard uncertainty.
+# Relative standard uncertainty of a correction for shadow and for glare: real shadows are not exactly ramps, and glare
+# has another position on a fillet than on the flank.
 U_SHADOW, U_GLARE = 0.1, 0.35
 
 
@@ -162,7 +163,7 @@ def with_profile(
             ]
             is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and are_of_size(wall, -1.0)
         chosen = [beyond_wall(fit) for fit in wall] if is_outline else wall
-        # A wall is there: the edge lies as far off as the fit says, give or take its own doubt.
+        # There is a wall, so that the edge may be displaced by the fitted distance plus its uncertainty.
         farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
         unsure = _unsure_of_width(edges, displaced_px)
         if not is_wall:
@@ -207,7 +208,7 @@ def with_profile(
         return edges
     wall, glare = fits.of(WALL), fits.of(GLARE)
     if not is_lopsided and left[GLARE] < enough and are_of_size(glare, 1.0):
-        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of light hides in such optics, or none
+        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of glare may be hidden by such optics
             return unsure_edges(edges, [abs(fit.position) for fit in glare], "glare")
         return edges
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
@@ -290,6 +291,6 @@ def _room(edges: EdgePoints) -> int:
 
 
 def _unsure_of_width(edges: EdgePoints, displaced_px: Displacement) -> EdgePoints:
-    """State how far a side wall may have moved the edges, where only the blur of the edges indicates a wall."""
+    """State how far a side wall may have moved the edges, if only the blur of the edges indicates a wall."""
     limits = wall_limits_px(edges, displaced_px)
     return edges if limits is None else unsure_edges(edges, limits, "wall")

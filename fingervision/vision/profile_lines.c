@@ -1,4 +1,4 @@
-/* Put the lines of one finger into their places: outline, sign of the inner side; fixed, coarse, slope, weight. */
+/* Write the lines of one finger into their array entries: outline, sign of the inner side; fixed, coarse, slope, weight. */
 LOOP(profile_lines_fill, "Oijjff", "") {
     const int32_t *outline = POINTS(0);
     int64_t n = in[0].shape[0], inner_sign = in[1].i, crest = 0, place;
@@ -29,8 +29,8 @@ LOOP(profile_lines_fill, "Oijjff", "") {
         int64_t thinning = (kept + past - first - 1) / (past - first);
         place = first;
         for (int64_t at = 0; at < kept; at += larger_int(thinning, 1)) {
-            /* A tip is thinned out from its inner side, so that a mirrored finger has the mirrored lines.
-               Flanks that are thinned out have even and odd rows all the same: an interlaced picture's two fields. */
+            /* The columns across a tip are selected from its inner side, so that a mirrored finger has mirrored lines. The
+               selected rows of a flank include even and odd rows, the two fields of an interlaced picture. */
             int64_t other = side < 2 && thinning % 2 == 0 && (place - first) % 2 == 1 && at + 1 < kept;
             int64_t i = side == 2 && inner_sign > 0 ? keep[kept - 1 - at] : keep[at + other];
             INTS(2)[place] = i + lowest;

@@ -1,20 +1,21 @@
 /* after linear_solve */
 /* after normal_distribution */
-/* Where the second edge of the part beside the step is felt (in blurs), at a distance from the edge outwards. */
+/* Distance (in blurs) from the second edge of the structure beside the step, at a distance outwards from the edge. */
 static inline double second_place(int64_t kind, double t, double blur, double breadth) {
     if (kind == GLARE) return (t + breadth) / blur;
     return kind == FADING ? t / blur - blur / breadth : (t - breadth) / blur;
 }
 
-/* The part beside the step, blurred: the step and its density there, and the same of the second edge. */
+/* The blurred structure beside the step, from the integral and the density of the step and of the structure's second edge.
+   */
 static inline double beside(
     int64_t kind, double t, double blur, double breadth, double step, double density, double far, double far_density
 ) {
-    if (kind == WALL) return step - far; /* what lies between the first step and the second */
-    if (kind == SHADOW) /* falls from one at the edge to nothing at its breadth */
+    if (kind == WALL) return step - far; /* light between the first step and the second */
+    if (kind == SHADOW) /* decreases linearly from one at the edge to zero at its breadth */
         return (1.0 - t / breadth) * (step - far) + blur / breadth * (far_density - density);
     if (kind == GLARE) return far_density;
-    /* falls from one at the edge as exp(-t / breadth) */
+    /* decreases from one at the edge as exp(-t / breadth) */
     if (kind == FADING) return exp(0.5 * square(blur / breadth) - t / breadth) * far;
     return 0.0;
 }
@@ -30,20 +31,21 @@ typedef struct {
     const double *t, *value, *weight;
 } Seen;
 
-/* The model's parts at every place (`unused`: room for densities that no part has), and the sums of their products that do not know the breadth. */
+/* Values of the model's terms at every position (`unused`: memory for densities that no term needs), and the sums of their
+   products that do not depend on the breadth. */
 typedef struct {
     double *step, *density, *tail, *addition, *model, *unused;
     double gram[LINEAR * LINEAR], right[LINEAR];
 } Parts;
 
-/* Room for the parts of `n` places: PARTS times as many numbers. */
+/* Memory for the terms at `n` positions: PARTS times n numbers. */
 enum { PARTS = 6 };
 static Parts parts_in(double *room, int64_t n) {
     Parts parts = {room, room + n, room + 2 * n, room + 3 * n, room + 4 * n, room + 5 * n, {0.0}, {0.0}};
     return parts;
 }
 
-/* The step, its density, and the tail: they do not know the breadth of what stands beside them. */
+/* The step, its density, and the tail, which do not depend on the breadth of the structure beside the step. */
 static void put_steps(const Seen *s, const double *p, Parts *to) {
     double blur = p[BLUR];
     for (int64_t i = 0; i < s->n; i++) {
@@ -66,7 +68,7 @@ static inline void put_additions_of(int64_t kind, const Seen *s, const double *p
         );
 }
 
-/* The addition, with a loop for every kind that the compiler need not ask in. */
+/* The structure beside the step, with a separate loop for each kind, so that the loops contain no branches. */
 static void put_additions(const Seen *s, const double *p, const Parts *steps, double *addition) {
     if (s->kind == WALL) put_additions_of(WALL, s, p, steps, addition);
     else if (s->kind == SHADOW) put_additions_of(SHADOW, s, p, steps, addition);
@@ -74,7 +76,7 @@ static void put_additions(const Seen *s, const double *p, const Parts *steps, do
     else if (s->kind == FADING) put_additions_of(FADING, s, p, steps, addition);
 }
 
-/* Sums of weighted products of level, step and tail with one another and with the light. */
+/* Sums of weighted products of level, step, tail and light. */
 static void sum_steps(const Seen *s, Parts *to) {
     double g00 = 0.0, g10 = 0.0, g11 = 0.0, g20 = 0.0, g21 = 0.0, g22 = 0.0, r0 = 0.0, r1 = 0.0, r2 = 0.0;
     for (int64_t i = 0; i < s->n; i++) {
@@ -95,8 +97,8 @@ static void sum_steps(const Seen *s, Parts *to) {
     memcpy(to->right, right, sizeof right);
 }
 
-/* Weighted squares with the linear parameters at their best, which are put into `p`; the model goes to `model`. Negative
-   where the linear parameters cannot be told apart. */
+/* Weighted sum of squares for the best linear parameters, which are stored in `p`; the model is stored in `model`. Negative
+   if the linear parameters are indistinguishable. */
 static double squares_with(const Seen *s, double *p, const Parts *parts, const double *addition, double *model) {
     int count = s->kind != STEP ? LINEAR : LINEAR - 1;
     double gram[LINEAR * LINEAR], right[LINEAR], total = 0.0;
@@ -121,7 +123,7 @@ static double squares_with(const Seen *s, double *p, const Parts *parts, const d
         right[3] = r;
     }
     for (int a = 0; a < count; a++) gram[a * count + a] *= 1.0 + 1e-9;
-    /* The tail is small: a weak pull to nothing keeps it from standing in for a wall. */
+    /* The tail is small: a weak prior at zero prevents the tail from replacing a wall. */
     gram[2 * count + 2] += 0.05 * gram[1 * count + 1];
     if (!solve(gram, count, right, 1)) return -1.0;
     for (int a = 0; a < LINEAR; a++) p[a] = a < count ? right[a] : 0.0;
@@ -133,7 +135,7 @@ static double squares_with(const Seen *s, double *p, const Parts *parts, const d
     return total;
 }
 
-/* The same with all parts found anew, which go to `to` with the model. */
+/* Weighted sum of squares after all terms are computed again; terms and model are stored in `to`. */
 static double squares_of(const Seen *s, double *p, Parts *to) {
     put_steps(s, p, to);
     put_additions(s, p, to, to->addition);
@@ -141,7 +143,7 @@ static double squares_of(const Seen *s, double *p, Parts *to) {
     return squares_with(s, p, to, to->addition, to->model);
 }
 
-/* Weighted products of the derivatives with one another and with what the model leaves: all sums in one pass. */
+/* Sums of weighted products of the derivatives with one another and with the residuals, in one pass. */
 static inline void put_normal_equations(
     int count, const Seen *s, const double *jacobian, const double *model, double *matrix, double *right
 ) {
@@ -158,8 +160,9 @@ static inline void put_normal_equations(
     memcpy(right, ends, sizeof ends);
 }
 
-/* Fit one model to a mean profile (Levenberg and Marquardt over position, blur and breadth): kind, t, value, weight, blur,
-   start, whether the blur is known, limits of the breadth, squares that are too many; whether it went, and the fit. */
+/* Fit one model to a mean profile (Levenberg and Marquardt over position, blur and breadth). Arguments: kind, t, value,
+   weight, blur, start, whether the blur is known, limits of the breadth, sum of squares at which the fit is given up;
+   result, the fit. Returns whether the fit succeeded. */
 LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
     int64_t n = in[1].n, kind = in[0].i;
     int free_count = kind != STEP ? 3 : 2, is_blur_known = (int)in[6].i;
@@ -176,13 +179,13 @@ LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
     for (int iteration = 0; iteration < ITERATIONS; iteration++) {
         for (int a = 0; a < free_count; a++) {
             double moved[PARAMETERS];
-            if (a == 1 && is_blur_known) { /* its row and column are taken out below */
+            if (a == 1 && is_blur_known) { /* its row and column are removed below */
                 for (int64_t i = 0; i < n; i++) jacobian[n + i] = 0.0;
                 continue;
             }
             memcpy(moved, p, sizeof moved);
             moved[POSITION + a] += 1e-4;
-            if (POSITION + a == BREADTH) { /* step and tail stay */
+            if (POSITION + a == BREADTH) { /* step and tail are not changed */
                 put_additions(&s, moved, base, addition);
                 if (squares_with(&s, moved, base, addition, other->model) < 0.0) goto done;
             } else if (squares_of(&s, moved, other) < 0.0) goto done;
@@ -195,7 +198,8 @@ LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
             matrix[4] = 1.0;
             right[1] = 0.0;
         }
-        /* What stands at its limit and is drawn beyond it stays there: the others go on as if it were known. */
+        /* A parameter at its limit that would be moved beyond the limit is kept there; the others are fitted as if it were
+           known. */
         double limits[3][2] = {{-FARTHEST_PX, FARTHEST_PX}, {LEAST_BLUR_PX, LARGEST_BLUR_PX}, {in[7].d, in[8].d}};
         double free_matrix[9], free_right[3];
         memcpy(free_matrix, matrix, sizeof free_matrix);
@@ -235,7 +239,7 @@ LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
         }
         if (!has_moved) break;
     }
-    /* The blur alone hardly shows in one profile: the other edges of the picture tell it to a part. */
+    /* A single profile hardly determines the blur; the other edges of the picture determine it approximately. */
     double last[9], unit[3] = {1.0, 0.0, 0.0};
     matrix[4] += 1.0 / square(U_BLUR * p[BLUR]);
     for (int a = 0; a < free_count; a++)

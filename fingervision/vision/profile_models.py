@@ -2,7 +2,8 @@
 
 A finger's edge is a step of light, blurred by the optics. Beside the edge there may be a second step (the side wall of
 a thick part, between the finger's face and the background), a ramp (a soft shadow on the background) or a bright line
-(glare along the edge, on the finger). Each of these structures displaces a fitted single step towards itself.
+(glare along the edge, on the finger). A side wall, a soft shadow or a line of glare displaces a fitted single step
+towards itself.
 """
 
 from typing import NamedTuple

@@ -1,7 +1,7 @@
 /* after finger_end */
 /* after first_guess */
 /* after median */
-/* How many neighbours share one residual: residuals, weights, sides. */
+/* Number of neighbouring points with a common residual: residuals, weights, sides. */
 LOOP(residuals_shared, "FFI", "d") {
     const double *residual = FLOATS(0), *robust = FLOATS(1);
     const int64_t *side = INTS(2), n = in[2].n;
@@ -24,7 +24,8 @@ LOOP(residuals_shared, "FFI", "d") {
     out[0].d = moving / ((LAGS + 1.0) * power);
 }
 
-/* Spread of the residuals from point to point: that of the noise, where a wrong shape differs from one end to the other. */
+/* Spread of the differences between residuals of neighbouring points, which is that of the noise even if a wrong shape
+   causes residuals that change along the outline. */
 LOOP(residuals_roughness, "FF", "d") {
     const double *residual = FLOATS(0), *robust = FLOATS(1);
     double *steps = floats(in[0].n), before = 0.0;
@@ -43,7 +44,7 @@ static int is_near(double x, double y, double edge, double height) {
     return fabs(y - height) < SHAPE_REACH_PX && fabs(x - edge) < 2.0 * SHAPE_REACH_PX;
 }
 
-/* Share of the points near the measuring point that the fit takes for dust: x, y, weights, edge, tip, height below it. */
+/* Share of the points near the measuring point that the fit rejected as dust: x, y, weights, edge, tip, measuring height. */
 LOOP(residuals_rejected, "FFFddd", "d") {
     int64_t near = 0, rejected = 0;
     for (int64_t i = 0; i < in[0].n; i++) {
@@ -54,8 +55,8 @@ LOOP(residuals_rejected, "FFFddd", "d") {
     out[0].d = (double)rejected / (double)larger_int(near, 1);
 }
 
-/* How far points stray that the fit takes for dust, just above or just below the measuring point, where they are the most
-   of what is there, or half of it on both sides: x, y, u, residuals, weights, edge, height. */
+/* Largest distance of rejected points just above or just below the measuring point, if they are the majority there, or half
+   of the points on both sides: x, y, u, residuals, weights, edge, height. */
 LOOP(residuals_set_aside, "FFFFFdd", "d") {
     double most = 0.0, half[2] = {0.0, 0.0};
     for (int side = 0; side < 2; side++) {
@@ -76,7 +77,7 @@ LOOP(residuals_set_aside, "FFFFFdd", "d") {
     out[0].d = half[0] > 0.0 && half[1] > 0.0 ? larger(most, larger(half[0], half[1])) : most;
 }
 
-/* Mean residual near the measuring point or near the tip, the larger, in units of its own uncertainty. */
+/* Larger of the mean residuals near the measuring point and near the tip, each in units of its own uncertainty. */
 LOOP(residuals_systematic, "FFFFddd", "d") {
     const double *x = FLOATS(0), *y = FLOATS(1), *residual = FLOATS(2), *robust = FLOATS(3), tip = in[5].d;
     double sums[2] = {0.0, 0.0}, weights[2] = {0.0, 0.0};
@@ -93,7 +94,8 @@ LOOP(residuals_systematic, "FFFFddd", "d") {
         if (weights[k] >= FEWEST_NEAR) out[0].d = larger(out[0].d, fabs(sums[k]) / sqrt(weights[k]));
 }
 
-/* Distance of a place to the nearest point; a large finger's outline is thinned out: its points stand farther apart. */
+/* Distance of a position from the nearest point; a large finger's outline has fewer points, with larger distances between
+   them. */
 LOOP(residuals_distance_in_spacings, "FFdd", "d") {
     const double *x = FLOATS(0), *y = FLOATS(1);
     double nearest = INFINITY, least_x, most_x, least_y, most_y;

@@ -30,9 +30,9 @@ static inline void forward(const double *l, int64_t n, double *b, int64_t wide) 
     }
 }
 
-/* Logarithm of the restricted likelihood, but for a constant, of the residuals of a parabola whose points have this
-   covariance (n, n), of which the lower half is overwritten: columns (n, OWN + 1), the last one the points themselves.
-   0 in `is_sound` where the covariance is not positive. */
+/* Logarithm of the restricted likelihood (without a constant) of the residuals from a parabola, for points with a given
+   covariance (n, n), whose lower half is overwritten: columns (n, OWN + 1), the last one the points themselves. `is_sound`
+   is 0 if the covariance is not positive definite. */
 static double restricted(double *covariance, double *columns, int64_t n, int *is_sound) {
     enum { WIDE = OWN + 1 };
     double normal[OWN * OWN] = {0.0}, solved[OWN] = {0.0}, lower[OWN * OWN], logarithm = 0.0, left = 0.0;
@@ -48,7 +48,7 @@ static double restricted(double *covariance, double *columns, int64_t n, int *is
             for (int b = 0; b < OWN; b++) normal[a * OWN + b] += columns[i * WIDE + a] * columns[i * WIDE + b];
         }
     memcpy(lower, normal, sizeof lower);
-    for (int a = 0; a < OWN; a++) { /* determinant by elimination */
+    for (int a = 0; a < OWN; a++) { /* determinant by Gaussian elimination */
         if (!(lower[a * OWN + a] > 0.0)) {
             *is_sound = 0;
             return 0.0;
@@ -68,8 +68,9 @@ static double restricted(double *covariance, double *columns, int64_t n, int *is
     return -0.5 * (logarithm + left);
 }
 
-/* Logarithm of the restricted likelihood of every deviation and length: along, across, variance of the points, deviations,
-   lengths; likelihood (deviations, lengths); whether it went, and the likelihood of no roughness. */
+/* Logarithm of the restricted likelihood for every deviation and correlation length. Arguments: along, across, variance of
+   the points, deviations, lengths; result, likelihood (deviations, lengths). Returns whether the computation succeeded, and
+   the likelihood without roughness. */
 LOOP(roughness_likelihood, "FFFFFf", "bd") {
     enum { WIDE = OWN + 1 };
     const double *along = FLOATS(0), *variance = FLOATS(2);
@@ -105,8 +106,8 @@ LOOP(roughness_likelihood, "FFFFFf", "bd") {
     free(basis);
 }
 
-/* Covariance of the errors of points that share what they stray by, in units of their own: x, y, u, u_own, covariance by
-   whole pixels of distance; errors (n, n). */
+/* Covariance of the errors of points with roughness, in units of the points' own uncertainties: x, y, u, u_own, covariance
+   by whole pixels of distance; errors (n, n). */
 LOOP(roughness_errors, "FFFFFf", "") {
     const double *x = FLOATS(0), *y = FLOATS(1), *u = FLOATS(2), *covariance = FLOATS(4);
     int64_t n = in[0].n, last = in[4].n - 1;

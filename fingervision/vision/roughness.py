@@ -5,9 +5,9 @@ independent points. Deviation and correlation length are estimated from the flan
 parabola, plus white noise of the points, plus a stationary process with a Matern covariance of smoothness 5/2 (whose
 tails are a little longer than a Gaussian's, so that the uncertainty is rather too large than too small). The standard
 deviation and the correlation length of the process are estimated by the restricted likelihood of Patterson and Thompson
-(Biometrika 58, 1971, 545), which accounts for the part of a long wave that the parabola absorbs. The covariance is
-averaged over the likelihood instead of taken at its maximum, because a few waves do not determine the correlation
-length well.
+(Biometrika 58, 1971, 545), which accounts for the part of a long wave that the parabola absorbs. The covariance is a
+mean over all tried values, weighted by their likelihood, because a few waves do not determine the correlation length
+well.
 """
 
 from collections.abc import Callable
@@ -78,7 +78,7 @@ class Roughness:
 
 
 def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd]) -> Roughness | None:
-    """Estimate the roughness from the flanks of both fingers; None if the flanks show none.
+    """Estimate the roughness from the flanks of both fingers; None if the flanks are smooth.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 /* after normal_distribution */
-/* Mean residual of a flank's rows: levels (rows, pixels), offset of the edge from the window's middle, contrast, weight,
-   slope, sigma; mean (pixels). Gives the rows that count, their mean square residual, mean offset and mean contrast. */
+/* Mean residual over a flank's rows. Arguments: levels (rows, pixels), offset of the edge from the window's centre,
+   contrast, weight, slope, sigma; result, mean (pixels). Returns the number of rows used, their mean square residual, mean
+   offset and mean contrast. */
 LOOP(shared_profile_mean, "FFFFFdf", "iddd") {
     int64_t rows = in[0].shape[0], pixels = in[0].shape[1], used = 0;
     double sigma = in[5].d, total = 0.0, offsets = 0.0, contrasts = 0.0, *mean = FLOATS(6);
@@ -14,7 +15,9 @@ LOOP(shared_profile_mean, "FFFFFdf", "iddd") {
         for (int64_t j = 0; j < pixels; j++) border[j + 1] = border[j] + 1.0;
         for (int64_t j = 0; j <= pixels; j++) share[j] = border[j] / sigma;
         normal_at_all(share, pixels + 1, share, density);
-        for (int64_t j = 0; j <= pixels; j++) share[j] = border[j] * share[j] + sigma * density[j]; /* the integral there */
+        for (int64_t j = 0; j <= pixels; j++) share[j] = border[j] * share[j] + sigma * density[j]; /* integral of the
+                                                                                                       profile at this
+                                                                                                       position */
         for (int64_t j = 0; j < pixels; j++) {
             own[j] = share[j + 1] - share[j];
             of_steps += own[j];

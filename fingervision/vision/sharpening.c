@@ -1,4 +1,4 @@
-/* Gaussian blur of a row, its ends repeated: levels, sigma; soft. */
+/* Gaussian blur of a row, whose end values are repeated: levels, sigma; blurred levels. */
 LOOP(sharpening_softened, "Fdf", "") {
     const double *levels = FLOATS(0), sigma = in[1].d;
     int64_t reach = (int64_t)ceil(3.5 * sigma), n = in[0].n;

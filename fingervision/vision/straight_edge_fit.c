@@ -1,10 +1,10 @@
 /* after linear_solve */
 /* after normal_distribution */
-/* The design is kept pixel by pixel, its columns side by side: level, along, each edge's step, step along, change with its
-   position, with its slope; change with the blur. */
+/* The design matrix is stored pixel by pixel, with these columns: level; slope of the level along the edges; for each edge,
+   its step, and its step times the distance along; derivatives by its position and by its slope; derivative by the blur. */
 
 enum { STRAIGHT_MOST_EDGES = MOST_EDGES, STRAIGHT_MOST_COLUMNS = 3 + 4 * STRAIGHT_MOST_EDGES, STRAIGHT_WANTED = 2 * STRAIGHT_MOST_EDGES };
-/* Why nothing was fitted: the sentences stand in that order in WHY_NOT. */
+/* Reasons why no fit was possible, in the order of the sentences in WHY_NOT. */
 enum { STRAIGHT_FITTED, STRAIGHT_TOO_FEW, STRAIGHT_NO_CONTRAST, STRAIGHT_NOT_SETTLED, STRAIGHT_UNDETERMINED };
 
 typedef struct {
@@ -20,7 +20,7 @@ typedef struct {
 
 static double straight_band_reach(double blur) { return REACH_SIGMAS * sqrt(blur * blur + ROUNDING) + REACH_EXTRA_PX; }
 
-/* The pixels within reach of the edges, along the band. */
+/* Pixels near the edges, within the length of the band. */
 static void straight_gather(StraightFit *f, double reach) {
     int low = 0, high = 0;
     for (int k = 1; k < f->edges; k++) {
@@ -43,7 +43,7 @@ static void straight_gather(StraightFit *f, double reach) {
         }
 }
 
-/* Fill the design: its linear columns alone, or all. */
+/* Fill the design matrix: only its linear columns, or all columns. */
 static void straight_fill(StraightFit *f, int is_whole) {
     int edges = f->edges, m = f->columns = is_whole ? 3 + 4 * edges : 2 + 2 * edges;
     double cosine[STRAIGHT_MOST_EDGES], wide[STRAIGHT_MOST_EDGES], sigma[STRAIGHT_MOST_EDGES];
@@ -75,7 +75,7 @@ static void straight_fill(StraightFit *f, int is_whole) {
     }
 }
 
-/* Gram matrix of the columns, each pixel by its weight, and what they are of other values. */
+/* Gram matrix of the columns with weighted pixels, and products of the columns with other values. */
 static void straight_gram(const StraightFit *f, const double *weight, int power, const double *values, double *matrix, double *right) {
     int m = f->columns;
     memset(matrix, 0, (size_t)(m * m) * sizeof(double));
@@ -96,7 +96,7 @@ static void straight_gram(const StraightFit *f, const double *weight, int power,
         for (int b = 0; b < a; b++) matrix[a * m + b] = matrix[b * m + a];
 }
 
-/* Least squares of scaled columns; 0 where the pixels do not determine them. */
+/* Least-squares solution with scaled columns; returns 0 if the pixels do not determine the parameters. */
 static int straight_least_squares(StraightFit *f) {
     int m = f->columns;
     double work[STRAIGHT_MOST_COLUMNS * STRAIGHT_MOST_COLUMNS];
@@ -123,7 +123,7 @@ static int straight_invert(const double *matrix, int m, double *inverse) {
     return solve(work, m, inverse, m);
 }
 
-/* One Gauss-Newton step; how far the farthest edge was moved. */
+/* One Gauss-Newton step; returns the largest displacement of an edge. */
 static int straight_newton(StraightFit *f, int *has_contrast, double *change) {
     int edges = f->edges;
     if (!*has_contrast) {
@@ -177,8 +177,8 @@ static int straight_settle(StraightFit *f, int has_contrast) {
     return STRAIGHT_NOT_SETTLED;
 }
 
-/* Sum of products of every pixel's value and that of its neighbour at a lag; `place` leads from the picture to the
-   pixels, -1 where there is none. */
+/* Sum of products of every pixel's value and that of its neighbour at a lag; `place` is the index of each position of the
+   picture in the list of pixels, -1 if it is not in the list. */
 static double straight_lagged(const StraightFit *f, const double *values, const int32_t *place, int64_t down, int64_t right) {
     double total = 0.0;
     for (int64_t i = 0; i < f->pixels; i++) {
@@ -190,7 +190,7 @@ static double straight_lagged(const StraightFit *f, const double *values, const 
     return total;
 }
 
-/* Variance of the positions and slopes over what it would be if every pixel's noise were its own. */
+/* Variance of positions and slopes divided by its value for independent noise of the pixels. */
 static void straight_share_noise(const StraightFit *f, const double *residual, const double *inverse, double power, double *shared) {
     static const int lags[LAGS_COUNT][2] = LAGS;
     int wanted = 2 * f->edges, m = f->columns, is_any = 0;
@@ -222,8 +222,8 @@ static void straight_share_noise(const StraightFit *f, const double *residual, c
     free(place);
 }
 
-/* How much more the pieces of an edge scatter than their noise, bend of the first edge, and the least contrast among its
-   pieces as a share of the whole's. */
+/* Ratio of the scatter of an edge's pieces to their noise, bend of the first edge, and least contrast of its pieces as a
+   share of the edge's contrast. */
 static double straight_pieces(const StraightFit *f, const double *residual, double variance, double *bend, double *least) {
     static const double quantile[CHI_SQUARE_999_COUNT] = CHI_SQUARE_999;
     int m = f->columns, edges = f->edges;
@@ -276,7 +276,7 @@ static double straight_pieces(const StraightFit *f, const double *residual, doub
     return worst;
 }
 
-/* Add the misfit of the flanks to the variance of the positions where it exceeds the noise (Hausman). */
+/* Add the misfit of the flanks to the variance of the positions if the misfit exceeds the noise (Hausman). */
 static void straight_add_misfit(const StraightFit *f, const double *residual, double variance, double *covariance) {
     int m = f->columns, wanted = 2 * f->edges;
     double width = CORE_SIGMAS * sqrt(f->blur * f->blur + ROUNDING) + 0.5, *weight = floats(f->pixels);
@@ -314,7 +314,8 @@ static void straight_add_misfit(const StraightFit *f, const double *residual, do
     free(weight);
 }
 
-/* Share of the first edge that clipping removed, from the bend of its profile, and its standard uncertainty. */
+/* Share of the first edge's contrast that clipping removed, from the curvature of its profile, and the standard uncertainty
+   of this share. */
 static void straight_cut_off_share(const StraightFit *f, const double *residual, double variance, int64_t cut_off, double *lost) {
     int m = f->columns, is_up = f->contrast[0] * (double)cut_off > 0.0;
     double *bend = floats(f->pixels), work[STRAIGHT_MOST_COLUMNS * STRAIGHT_MOST_COLUMNS], found[STRAIGHT_MOST_COLUMNS] = {0.0};
@@ -340,10 +341,11 @@ static void straight_cut_off_share(const StraightFit *f, const double *residual,
     free(bend);
 }
 
-/* Fit straight edges: levels, place of the part's first pixel from the band's middle, direction, length, blur, pixels that
-   count as one, cut-off side, whether contrasts are known; positions, slopes and contrasts (3, k), first guessed and then
-   found; covariance (2 k, 2 k); and level before, blur, noise, bend, least piece, lost share, its uncertainty. Gives why
-   nothing was fitted (0: it was) and the number of pixels. */
+/* Fit straight edges. Arguments: levels, position of the part's first pixel relative to the band's centre, direction,
+   length, blur, number of pixels that count as one, clipped side, whether the contrasts are known; positions, slopes and
+   contrasts (3, k), initially estimates, finally results; results, covariance (2 k, 2 k), level before the edges, blur,
+   noise, bend, least contrast of a piece, lost share and its uncertainty. Returns the reason why no fit was possible (0:
+   fitted), and the number of pixels. */
 LOOP(straight_edge_fit_edges, "Fddddddiifff", "ii") {
     StraightFit fit = {0}, *f = &fit;
     double *state = FLOATS(9), *covariance = FLOATS(10), *told = FLOATS(11);

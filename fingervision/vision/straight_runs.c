@@ -5,7 +5,8 @@ static double squares_about_line(const double *m) {
     return larger(0.5 * (xx + yy - hypot(xx - yy, 2.0 * xy)), 0.0);
 }
 
-/* The same for the points `first` to `last` (exclusive) of a chain whose sums are cumulative, six for every point. */
+/* Smallest sum of squared distances for the points `first` to `last` (exclusive) of a chain whose sums are cumulative, six
+   for every point. */
 static double squares_of_run(const double *sums, int64_t first, int64_t last) {
     double m[6];
     for (int a = 0; a < 6; a++) m[a] = sums[6 * last + a] - sums[6 * first + a];
@@ -14,14 +15,15 @@ static double squares_of_run(const double *sums, int64_t first, int64_t last) {
 
 LOOP(straight_runs_squares, "F", "d") { out[0].d = squares_about_line(FLOATS(0)); }
 
-/* Squares of every run of FEWEST_POINTS points: cumulative sums (n + 1, 6); squares (n - FEWEST_POINTS + 1). */
+/* Sums of squares of all runs of FEWEST_POINTS points: cumulative sums (n + 1, 6); sums of squares (n - FEWEST_POINTS + 1).
+   */
 LOOP(straight_runs_windows, "Ff", "") {
     for (int64_t first = 0; first < in[1].n; first++)
         FLOATS(1)[first] = squares_of_run(FLOATS(0), first, first + FEWEST_POINTS);
 }
 
-/* The cheapest way to explain the first k points, for every k: cumulative sums (n + 1, 6), noise; where the last run
-   begins, or -1 where the last point is left out (n + 1). */
+/* Division of the first k points with the lowest cost, for every k. Arguments: cumulative sums (n + 1, 6), noise; result,
+   for every k the start of the last run, or -1 if the last point is left out (n + 1). */
 LOOP(straight_runs_cheapest, "Fdj", "") {
     int64_t n = in[2].n - 1, *last_run = INTS(2);
     double *cost = floats(n + 1);

@@ -1,13 +1,13 @@
-/* Parabola's vertex through three values about a maximum. */
+/* Vertex of the parabola through three values about a maximum. */
 static double vertex(double before, double middle, double after) {
     double bend = before - 2.0 * middle + after;
     return bend < 0.0 ? 0.5 * (before - after) / bend : 0.0;
 }
 
-/* The best place of a template: part of the picture, its mean taken off; its correlation with the template, the template's
-   mean taken off (circular, from the template's first pixel); columns, rows and norm of the template; pixels at the border
-   that only show whether the best place's lobe ends. Gives column and row, between pixels by a parabola, zero-normalised
-   correlation, and whether it is alone. */
+/* Best match of a template. Arguments: part of the picture without its mean; its correlation with the template without its
+   mean (circular, from the template's first pixel); columns, rows and norm of the template; width of the border that only
+   serves to check where the peak ends. Returns column and row (interpolated by a parabola), zero-normalised correlation, and
+   whether the match is unique. */
 LOOP(template_search_best, "SSiidi", "dddb") {
     const float *part = (const float *)in[0].data, *product = (const float *)in[1].data;
     int64_t height = in[0].shape[0], width = in[0].shape[1], stride = in[1].shape[1], n = in[2].i, m = in[3].i;
@@ -34,7 +34,7 @@ LOOP(template_search_best, "SSiidi", "dddb") {
             if (x < n - 1) continue;
             int64_t column = x - n + 1;
             double spread = square_sum - sum * sum / pixels, found = product[row * stride + column], limit;
-            /* Rounding's share of a part without any contrast is no contrast. */
+            /* A contrast that does not exceed rounding errors counts as no contrast. */
             limit = spread <= smaller(0.5, 1e-6 * square_sum) ? 0.0 : sqrt(spread) * norm;
             seen[row * columns + column] = fabs(found) < limit ? (float)(found / limit)
                                            : fabs(found) < 1.125 * limit ? (found > 0.0 ? 1.0f : -1.0f) : 0.0f;
@@ -54,7 +54,7 @@ LOOP(template_search_best, "SSiidi", "dddb") {
     out[1].d = (double)best_row + (beyond ? vertex(at[-columns], at[0], at[columns]) : 0.0);
     out[2].d = best;
     if (best > 0.0f) {
-        /* The lobe of the best place, as far as it hangs together, and whatever else is as much alike. */
+        /* Connected area of the correlation peak at the best match, and other positions with a similar correlation. */
         float alike = (float)(ALIKE_SHARE * best);
         int64_t *waiting = ints(rows * columns), count = 1, is_alone = 1;
         waiting[0] = best_row * columns + best_column;

@@ -43,8 +43,8 @@ static int level_at(const Arg *upright, const Side *side, int64_t d, double *lev
     return 1;
 }
 
-/* Level half-way up the step in which a strip outside (sense 1) or inside (-1) of a side ends; 0 where there is none.
-   Only a step of the same sense as the edge itself ends a strip between finger and ground. */
+/* Mean level of the step at which a strip outside (sense 1) or inside (sense -1) a side ends; 0 if there is no strip. A
+   strip between finger and background ends with a step of the same sign as the edge. */
 static double strip_end(const Arg *upright, const Side *side, int64_t near, int64_t room_px, int64_t sense, double contrast,
                         double least) {
     double profile[REACH_PX + 1], most = least * fabs(contrast), found = 0.0;
@@ -61,8 +61,9 @@ static double strip_end(const Arg *upright, const Side *side, int64_t near, int6
     return found;
 }
 
-/* Both strips of a finger's side: picture, fixed, position, weight and outward sense (2, PLACES), which finger, first and
-   last place of the side, how near to the edge, how far out, smallest step inside (share of the contrast); levels of the inner and of the outer strip's end. */
+/* Inner and outer strip along a finger's side. Arguments: picture, fixed, position, weight and outward sign (2, PLACES),
+   which finger, first and last entry of the side, least and largest distance from the edge, least step inside (share of
+   the contrast); results, levels at the ends of the inner and of the outer strip. */
 LOOP(third_tone_strips, "pIFFIiiiiid", "dd") {
     int64_t first = in[5].i * in[1].shape[1] + in[6].i, near = in[8].i;
     double inside, outside;

@@ -26,9 +26,10 @@ REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
 # Least step at the end of a strip, as a share of the edge's contrast, within this number of pixels; strips are only
 # searched outside the blur of the edge.
 LEAST_STEP, STEP_PX = 0.12, 6
-# Fingers of one tone, whose lines leave less than so many times the noise of the flat parts, show a shadow that is
-# darker than that as well, down to this share: it has one tone, so that the levels at which its two strips end differ
-# by less than so much of the contrast.
+# Fingers have a uniform tone if the ratio of the edge fits' residuals to the noise of the picture's flat parts is below
+# the first value. Beside such fingers, steps down to the second value (share of the contrast) are accepted, if the
+# levels at the ends of the shadow's two strips differ by less than the third value (share of the contrast), because a
+# shadow has a uniform tone, too.
 ONE_TONE, LEAST_SHADE, ALIKE = 1.3, 0.05, 0.04
 
 THIRD_TONE = NoGap(

@@ -1,13 +1,14 @@
-/* One outline, turned so that it begins at its lowest point, and the tops on it. */
+/* An outline that begins at its lowest point, and its local maxima (tops). */
 typedef struct {
     int64_t n, tops;
     int32_t *along, *across;
     int64_t *start, *top, *valley, *prominence;
 } Skyline;
 
-/* A top counts once the outline has gone down from it by SMALLEST_PROMINENCE_PX, a valley once it has come up by as much. */
+/* A top is accepted if the outline descends from it by SMALLEST_PROMINENCE_PX, a valley if the outline ascends from it by
+   the same amount. */
 static void find_peaks(Skyline *s) {
-    /* The outermost place since the last valley, or the lowest since the last top. */
+    /* The highest point since the last valley, or the lowest point since the last top. */
     int64_t extreme = 0, lowest = s->along[0], is_rising = 1, first = 0;
     s->tops = 0;
     for (int64_t place = 1; place <= s->n; place++) {
@@ -45,9 +46,9 @@ static void find_peaks(Skyline *s) {
     }
 }
 
-/* The most prominent tops of all outlines: the picture seen with the tips up, points (n, 2), where each outline starts,
-   whether the fingers are vertical, whether flipped, size along; outline, place on it from its lowest point on,
-   prominence, whether it goes down as far as the picture does; how many there are. */
+/* The most prominent tops of all outlines. Arguments: picture with the tips up, points (n, 2), start of each outline,
+   whether the fingers are vertical, whether flipped, size along; results, outline, index on it from its lowest point,
+   prominence, and whether the outline extends to the picture's lower end. Returns the number of tops. */
 LOOP(tops_find, "pOIiiijjjb", "i") {
     int64_t outlines = in[2].n - 1, axis = in[3].i ? 1 : 0, size = in[5].i, most = in[6].n, count = 0, longest = 1;
     const int64_t *starts = INTS(2);
@@ -72,7 +73,7 @@ LOOP(tops_find, "pOIiiijjjb", "i") {
         find_peaks(&s);
         for (int64_t k = 0; k < s.tops; k++) {
             int64_t height = s.along[s.top[k]], between = ((int64_t)s.across[s.start[k]] + s.across[s.top[k]]) / 2;
-            if (!pixel(&in[0], smaller_int(height + 2, size - 1), between)) continue; /* the top of a hole, not of a thing */
+            if (!pixel(&in[0], smaller_int(height + 2, size - 1), between)) continue; /* top of a hole, not of an object */
             int64_t at = count;
             while (at > 0 && INTS(8)[at - 1] < s.prominence[k]) at--;
             if (at == most) continue;

@@ -65,7 +65,7 @@ def wall_limits_px(edges: EdgePoints, displaced_px: Displacement) -> list[float]
 
 
 def are_broader_together(edges: EdgePoints, displaced_px: Displacement) -> bool:
-    """Whether the flanks of both fingers together are broader than the tips by more than noise and codec explain."""
+    """Whether the flanks of both fingers together are wider than the tips by more than noise and codec explain."""
     flanks, tips = squared_blurs(edges)
     more = float((flanks - tips).sum())
     return more > BOTH_WIDER * tips.sum() and more > SURE * float(np.hypot(*_u_excess(edges, displaced_px)))

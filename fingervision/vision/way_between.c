@@ -1,4 +1,4 @@
-/* Where the outline of a finger, its inner side first, rises past a height. */
+/* Point at which a finger's outline, followed from its inner side, first exceeds a height. */
 LOOP(way_between_inner_crossing, "Od", "dd") {
     const int32_t *outline = POINTS(0);
     int64_t i = 0;
@@ -7,7 +7,8 @@ LOOP(way_between_inner_crossing, "Od", "dd") {
     out[1].d = outline[2 * i + 1];
 }
 
-/* Share of the way that is set in the mask, but for its two ends: mask, x and y of the start and of the end. */
+/* Share of the set pixels of a mask along the path between two positions, without its ends: mask, x and y of start and end.
+   */
 LOOP(way_between_covered, "pdddd", "d") {
     double x0 = in[1].d, y0 = in[2].d, x1 = in[3].d, y1 = in[4].d;
     int64_t steps = (int64_t)larger(fabs(x1 - x0), fabs(y1 - y0)), covered = 0, counted = 0;

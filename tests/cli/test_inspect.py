@@ -29,7 +29,7 @@ def test_text_picture_and_json(frames: Path, tmp_path: Path) -> None:
     picture = tmp_path / "seen.png"
     result = run(frames, "--rate-hz", "25", "--px-per-mm", "34", "--picture", picture)
     assert result.exit_code == 0, result.output
-    assert "Nothing to improve" in result.output
+    assert "Nothing to mend" in result.output
     assert cv2.imread(str(picture)).shape[1] > 800
     content = json.loads(run(frames, "--px-per-mm", "34", "--no-picture", "--json").output)
     assert content["nothing_to_mend"]

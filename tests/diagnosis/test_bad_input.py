@@ -78,7 +78,7 @@ def test_times_in_whole_seconds_that_repeat_are_refused_and_others_are_used(tmp_
 
 def test_times_that_are_all_equal_are_refused(tmp_path: Path) -> None:
     table = stage("+-", 3)
-    with pytest.raises(DataError, match="time_s must be unique within a run, but 7 s stands in every row"):
+    with pytest.raises(DataError, match="time_s must be unique within a run, but 7 s occurs in every row"):
         asked(tmp_path, table | {"time_s": np.full(table["time_s"].size, 7.0)})
 
 

@@ -41,7 +41,7 @@ def write(folder: Path, text: str, name: str = "measured.csv") -> Path:
         ("input_mm,gap_mm\n0,NaN\n" + GOOD, "gap_mm must be a finite number, but is NaN in data row 1"),
         (
             "input_mm,gap_mm,time_s\n" + "\n".join(f"0.{k},{k},{k // 2}" for k in range(8)),
-            "time_s must be unique within a run, but 0 s stands twice",
+            "time_s must be unique within a run, but 0 s occurs twice",
         ),
         ("input_mm,gap_mm\n" + GOOD + "\n1", "must have 2 cells like the header, but has 1"),
     ],

@@ -64,7 +64,7 @@ def test_swapped_directions_are_asked_about_and_nothing_is_named(tmp_path: Path)
     report = staged(tmp_path, play_mm=PLAY_MM, listed=True, sign=-1.0).report
     assert report.verdict is Verdict.UNKNOWN
     assert report.effects == ()
-    assert any("directions exchanged" in note for note in report.notes)
+    assert any("are the directions swapped" in note for note in report.notes)
 
 
 def moved(folder: Path, u: np.ndarray, gap: np.ndarray, rate_hz: float = 25.0) -> Diagnosis:

@@ -198,7 +198,7 @@ def test_a_play_of_several_steps_of_a_staircase_gives_no_other_step():
     ("number", "words"),
     [
         pytest.param(99001177, "set-points", id="set-points of short moves, whose frames were left out as wrong"),
-        pytest.param(88151011, "fits at 2 offsets", id="a play of a step behind rows slower than the moves"),
+        pytest.param(88151011, "equally well at 2 offsets", id="a play of a step behind rows slower than the moves"),
         pytest.param(
             88151032,
             "set-points",

@@ -42,7 +42,7 @@ BAD: dict[str, tuple[object, str]] = {
     "test_it_shows": (lambda u, h, v: u + 1e-9 * v["bend_per_mm2"] * u, "changes them by"),
     "test_the_same_values_give_the_same_answer": (
         lambda u, h, v: u + v["bend_per_mm2"] * np.random.default_rng().random(u.size),
-        "differs by",
+        "results differ by",
     ),
     "test_it_answers_at_its_bounds": (
         lambda u, h, v: u + (v["bend_per_mm2"] if abs(v["bend_per_mm2"]) < 0.09 else np.inf),

@@ -112,8 +112,11 @@ class MeasuringChain:
 
     def _driven_mm(self, acting: Settings) -> Array:
         history = self.history if self.path is None else self.path.history
-        input_mm = history.input_mm
-        for effect in self._stages[0]:
+        input_mm, drives = history.input_mm, self._stages[0]
+        if history.commanded:
+            # A delay may act before or after what does not change with time: delayed jumps fall between the points.
+            drives = tuple(sorted(drives, key=lambda effect: effect.delay_s is not None))
+        for effect in drives:
             if effect.name in acting:
                 input_mm = effect.act(input_mm, history, acting[effect.name])
         return input_mm

@@ -187,7 +187,7 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
         return None
     return Finding(
         f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "
-        "mechanism does: check whether the directions are swapped, or the sign of the gap's error is wrong.",
+        "mechanism does: are the directions swapped, or is the sign of the gap wrong?",
         blocks=True,
     )
 

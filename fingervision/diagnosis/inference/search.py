@@ -203,9 +203,8 @@ def _findings(state: SearchState, forced: frozenset[str]) -> Findings:
     """Collect explanations indistinguishable from the best; for *unknown*, keep an effect that explains much."""
     problem, best, nothing = state.problem, state.best, state.nothing
     alternatives, distances = [best], dict[tuple[str, ...], float]()
-    if best.names and not forced:
-        pool = [*state.singles, *state.peers] if len(best.names) > 1 else state.singles
-        alternatives, distances = ambiguity_set(problem, best, nothing, pool, state.pairs)
+    if best.names:
+        alternatives, distances = _indistinguishable(state) if not forced else _with_required(state, forced)
     alternatives = beside_foretold(problem, alternatives)
     best = min(alternatives, key=lambda e: odds(problem, e, state.values)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
@@ -243,6 +242,26 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
         return replace(state, best=problem.nothing(), imitation=None)
     found = [*state.singles, *state.pairs, *state.triples]
     holding = [explanation for explanation in found if able <= set(explanation.names)]
-    begin = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able} | dict(state.best.values)
-    together = fit(problem, tuple(begin), begin, iterations=20)
-    return replace(state, best=likeliest([*holding, together], state.values), imitation=None)
+    required = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able}
+    # Explanations that are equally good without the required effects are not so beside them, or it is chance which is
+    # the best of them.
+    bases = _indistinguishable(state)[0] if state.best.names else [state.best]
+    begins = [required | dict(base.values) for base in bases]
+    together = [fit(problem, tuple(begin), begin, iterations=20) for begin in begins]
+    peers = [*holding, *together]
+    return replace(state, best=likeliest(peers, state.values), peers=peers, imitation=None)
+
+
+def _indistinguishable(state: SearchState) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
+    """Collect the explanations that the data cannot distinguish from the best, and their distances from it."""
+    pool = [*state.singles, *state.peers] if len(state.best.names) > 1 else state.singles
+    return ambiguity_set(state.problem, state.best, state.nothing, pool, state.pairs)
+
+
+def _with_required(
+    state: SearchState, forced: frozenset[str]
+) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
+    """Collect the same among the explanations that contain every effect that the user requires."""
+    able = forced & set(state.problem.effects)
+    pool = [peer for peer in state.peers if able <= set(peer.names)]
+    return ambiguity_set(state.problem, state.best, state.nothing, pool, [])

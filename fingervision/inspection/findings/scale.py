@@ -17,7 +17,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare the scale with the best possible one, and compute the part of the uncertainty due to the calibration."""
+    """Compare the scale with the best possible scale, and compute the uncertainty's part due to the calibration."""
     if not sample.looks:
         return None
     ratio = min(1.0, sample.fill / FILLED)

@@ -169,7 +169,7 @@ class Playback:
 
     @property
     def table(self) -> Path | None:
-        """The gaps.csv of the complete recording; None until it is complete."""
+        """The gaps.csv of the complete recording; None until the whole recording is measured."""
         track = self._track
         return track.table if track is not None and track.is_whole else None
 

@@ -1,9 +1,10 @@
-"""The judge: which answers are right for a table, from fits of every effect to the truth without noise.
+"""The judge of the benchmark: right answers for a table, from fits of every effect to the truth without noise.
 
-A distance is the squared whitened distance D_jk of diagnosing.md. An explanation nearer than 4 belongs to the answer,
-one farther than 20 does not, in between it may or may not. What rests on a choice is decided in favour of the tool:
-distances that must be in are taken with the input's error switched off (all the information there could be), those that
-must be out with the recorded input's whole error and with profiled offsets of the runs.
+A distance is the squared whitened distance D_jk of diagnosing.md. An explanation with a distance below 4 must be in the
+answer, with a distance above 20 must not, and otherwise may be. Choices are made in favour of the diagnosis: for
+explanations that must be in the answer, distances are computed without an error of the input, which is the largest
+possible information; for explanations that must not be in the answer, with the whole error of the recorded input and
+with profiled offsets of the runs.
 """
 
 from dataclasses import dataclass, replace
@@ -27,32 +28,32 @@ LIMITING = {
     "end_stop": {"finger_contact"},
     "thermal_drift": {"rest_gap_error", "edge_bias", "camera_scale_drift"},
 }
-"""Effects whose limiting case is a simpler one: they may stand beside it in a set, or be folded into it."""
+"""Effects with a simpler effect as a limiting case: a set may contain both effects, or the simpler effect only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judgement:
-    """The right answers for one table.
+    """Right answers for one table.
 
     Parameters
     ----------
     must : tuple of frozenset of str
-        Explanations that belong to the set.
+        Explanations that must be in the set.
     may : tuple of frozenset of str
         Explanations that may be in it.
     nothing : float
-        Distance of no effect at all; `agrees` is right below 20 and required below 4.
+        Distance of the model without an effect; `agrees` is right below 20 and required below 4.
     own : float
-        What the catalogue's form of the hidden effects leaves over.
+        Distance that the catalogue's formulas of the simulated effects leave.
     effects : dict
-        The hidden effects' parameters in the catalogue's form.
+        Parameters of the simulated effects by the catalogue's formulas.
     nearest : dict
-        The nearest explanations and their distances, for a person who asks why.
+        The nearest explanations and their distances, for information.
     outside : bool
-        Whether every single effect and pair is at least 25 away.
+        Whether the distance of every single effect and pair is at least 25.
     rival : float
-        How much farther than the hidden effects the nearest other explanation is from the truth itself; negative where
-        another explanation comes nearer to the plant than the catalogue's form of what is hidden.
+        Distance of the nearest other explanation from the truth, minus that of the simulated effects; negative if
+        another explanation is nearer to the truth than the catalogue's formulas of the simulated effects.
     """
 
     must: tuple[frozenset[str], ...]
@@ -64,16 +65,16 @@ class Judgement:
     outside: bool
     rival: float = 0.0
     run_start: tuple[float, ...] = ()
-    """Where plays and sliders start each run in the catalogue's form of what is hidden."""
+    """Start states of plays and sliders in each run, by the catalogue's formulas of the simulated effects."""
 
     @property
     def acting(self) -> Effects:
-        """The hidden effects in the catalogue's form, with their starts."""
+        """Simulated effects by the catalogue's formulas, with their start states."""
         return self.effects | ({RUN_START: np.array(self.run_start)} if self.run_start else {})
 
 
 def own_fit(search: Search, experiment: Experiment, target: Curve) -> Fit:
-    """The hidden effects in the catalogue's form, at the parameters nearest to the truth."""
+    """Fit of the catalogue's formulas of the simulated effects to the truth."""
     names = [h.name for h in experiment.plant.hidden]
     chosen = [c for c in search.known if c.name in names]
     if not chosen:
@@ -99,7 +100,7 @@ def own_fit(search: Search, experiment: Experiment, target: Curve) -> Fit:
     starts = [next(b for c, b in tries if c.name == o.name) for o in order]
     first = fit(search.problem, target, order, starts, 200)
     if names == ["stick_slip"] or "stick_slip" in names:
-        # The distance jumps with the jump's size: look around the plant's own value.
+        # The distance is a discontinuous function of the jump's size: values around the simulated size are tried.
         place = [o.name for o in order].index("stick_slip")
         for factor in np.linspace(0.97, 1.03, 31):
             trial = dict(first.effects) | {"stick_slip": starts[place] * factor}
@@ -124,7 +125,7 @@ def judge(experiment: Experiment) -> Judgement:
         nearest |= {"+".join(f.names): round(f.distance, 1) for f in pairs[:4]}
         least = min([search.cautious(target, f.effects) for f in singles + pairs] + [skipped])
         return Judgement((), (), nothing, own.distance, {}, nearest, outside=least >= OUTSIDE)
-    # Distances are those between forms of the catalogue: the truth is taken at its nearest catalogue form.
+    # Distances are between formulas of the catalogue: the truth is represented by its nearest catalogue formula.
     form = respond(search.problem.model, search.problem.at, own.effects)
     must, may, nearest = [frozenset(own.names)], [], {"+".join(own.names): round(own.distance, 2)}
     surely_single: set[str] = set(own.names) if len(own.names) == 1 else set()
@@ -147,7 +148,7 @@ def judge(experiment: Experiment) -> Judgement:
             rival = min(rival, search.problem.distance(target, found.effects) - own.distance)
         verdict = verdict_on(search, form, found, own, target)
         if verdict is not None:
-            # A pair against a single effect: the tool's order of preference may drop it.
+            # A pair may be dropped from the answer because a single effect is preferred.
             sure = verdict and len(own.names) == 2
             (must if sure else may).append(names)
     must, folded = _foldable(must)
@@ -163,7 +164,7 @@ def judge(experiment: Experiment) -> Judgement:
 
 
 def _foldable(must: list[frozenset[str]]) -> tuple[list[frozenset[str]], list[frozenset[str]]]:
-    """Part off what only repeats another right answer at its limit: friction without reach beside a play."""
+    """Separate explanations that only repeat another right answer in a limiting case (friction without reach)."""
     kept = list(must)
     for names in must[1:]:
         simpler = set().union(*(LIMITING.get(name, set()) for name in names)) if len(names) == 1 else set()
@@ -173,7 +174,7 @@ def _foldable(must: list[frozenset[str]]) -> tuple[list[frozenset[str]], list[fr
 
 
 def _among(search: Search, form: Curve, singles: list[Fit], own: Fit) -> list[Fit]:
-    """Single explanations of the catalogue's form of the truth, refitted to it."""
+    """Fits of single effects to the truth in the catalogue's formulas."""
     again = []
     for found in singles:
         if frozenset(found.names) == frozenset(own.names):
@@ -187,14 +188,14 @@ def _among(search: Search, form: Curve, singles: list[Fit], own: Fit) -> list[Fi
 
 
 def verdict_on(search: Search, form: Curve, found: Fit, own: Fit, target: Curve) -> bool | None:
-    """True where the explanation must be in the set, False where it may, None where it must not."""
+    """True if the explanation must be in the set, False if it may be, None if it must not be."""
     away = search.cautious(form, found.effects)
     excess = search.problem.distance(target, found.effects) - own.distance
     if away > FAR and excess > FAR:
         chosen = [c for c in search.known if c.name in own.names]
         if away > 6 * FAR or not chosen:
             return None
-        # The other way round: from the explanation at its estimate to the truth's form.
+        # The opposite distance: from the explanation at its estimate to the formula of the truth.
         other = respond(search.problem.model, search.problem.at, found.effects)
         back = fit(search.problem, other, chosen, [own.effects[c.name] for c in chosen], 40, begun=own.effects)
         if search.cautious(other, back.effects) > FAR:

@@ -1,4 +1,4 @@
-"""Peer: forward selection of whitened signatures by BIC (Schwarz 1978). It never abstains."""
+"""Other method: forward selection of whitened signatures by BIC (Schwarz 1978), without a verdict *unknown*."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ MOST = 4
 
 
 def greedy_bic(folder: Path) -> Answer:
-    """Add the group of signatures that lowers BIC most, until none does."""
+    """Add the group of signatures that reduces BIC most, until no group reduces it."""
     seen = whiten(folder)
     library, r = seen.library, seen.residual
     n = len(r)
@@ -27,7 +27,7 @@ def greedy_bic(folder: Path) -> Answer:
             gram = library.gram[np.ix_(now, now)] + 1e-9 * np.eye(len(now))
             reach = library.columns[:, now].T @ r
             rest = max(float(r @ r - reach @ np.linalg.solve(gram, reach)), 1e-12)
-            # A shape that is searched (period, reach of the sliders) costs one parameter more.
+            # A shape parameter that is searched (period, reach of the sliders) counts as one more parameter.
             searched = float(np.sum(library.owner == library.owner[g]) > 1)
             trials.append((n * np.log(rest / n) + (len(now) + searched) * np.log(n), g, now))
         score, group, now = min(trials, key=lambda t: t[0])

@@ -1,4 +1,4 @@
-"""Peer: a Gaussian process as the model's discrepancy (Kennedy & O'Hagan 2001). It predicts, and names nothing."""
+"""Other method: a Gaussian process for the model's discrepancy (Kennedy & O'Hagan 2001), which names no effect."""
 
 import warnings
 from pathlib import Path
@@ -21,7 +21,7 @@ def _features(at: Samples) -> Array:
 
 
 def gp_prediction(folder: Path, unseen: Samples) -> tuple[Array, Array]:
-    """Gap and midline of an unseen run: the simulation plus a process over input and direction."""
+    """Predict gap and midline of an unseen run: simulation plus a Gaussian process over input and direction."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 

@@ -1,4 +1,4 @@
-"""What the naming peers work on: whitened residuals and linear signatures of every effect, from the files alone."""
+"""Data for other methods that name effects: whitened residuals and linear signatures, from the files only."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Whitened:
-    """Residual, signatures and their owners."""
+    """Whitened residual, and signatures with the effects to which they belong."""
 
     residual: Array
     library: Library
@@ -31,7 +31,9 @@ def _spread(values: Array) -> float:
 
 
 def whiten(folder: Path) -> Whitened:
-    """Noise from differences within runs (white part and AR(1) from lags one to three), then every signature."""
+    """Estimate the noise from differences within runs (white part and AR(1) from lags one to three), and whiten all
+    signatures.
+    """
     table, model = read_measured(folder / "measured.csv"), read_simulation(folder / "simulation.csv")
     bare = respond(model, table.at, {})
     model = replace(model, placement_mm=float(np.median(table.midline_mm - bare[1])))

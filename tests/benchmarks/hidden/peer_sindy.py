@@ -1,4 +1,4 @@
-"""Peer: ensemble sparse regression, E-SINDy (Fasel et al. 2022), with pysindy's own optimiser on the signatures."""
+"""Other method: ensemble sparse regression, E-SINDy (Fasel et al. 2022), with the optimiser of pysindy."""
 
 import warnings
 from pathlib import Path
@@ -10,18 +10,19 @@ from tests.benchmarks.hidden.peer_signatures import whiten
 
 MODELS = 30
 RIDGE = 0.05
-"""On columns of unit length: keeps near copies from growing against each other."""
+"""Ridge parameter for columns of unit length: prevents large opposite coefficients of similar columns."""
 INCLUDED = 0.6
-"""An effect counts as named where it is in more than this share of the ensemble, as in the paper."""
+"""Share of the ensemble above which an effect counts as named, as in the paper."""
 
 
 def e_sindy(folder: Path) -> Answer:
-    """Bagged sequentially thresholded least squares; the threshold is three standard errors of a signature."""
+    """Bagging of sequentially thresholded least squares; the threshold is three standard errors of a signature."""
     import pysindy
 
     seen = whiten(folder)
     library, r = seen.library, seen.residual
-    # One shape for each effect, that of the smallest rest: STLSQ cannot choose between hundreds of near copies.
+    # Only the shape with the smallest residual is used for each effect: STLSQ cannot select among hundreds of similar
+    # columns.
     reach = library.columns.T @ r
     columns: list[int] = []
     owners: list[int] = []

@@ -1,4 +1,4 @@
-"""The whole bench: a gripper with hidden effects, integrated in time on a grid finer than the frames."""
+"""The simulated set-up: a gripper with effects, integrated in time on a grid finer than the frames."""
 
 from dataclasses import dataclass, field
 
@@ -12,12 +12,12 @@ from tests.benchmarks.hidden.motion import Motion
 
 Array = NDArray[np.float64]
 FINE_STEPS = 12
-"""Steps of integration per frame."""
+"""Integration steps per frame."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """One effect that acts, by its canonical name, with the parameters of its plant."""
+    """A simulated effect, by its name in the catalogue, with its parameters."""
 
     name: str
     parameters: dict[str, float]
@@ -25,7 +25,7 @@ class Hidden:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """One run as the bench lives it, at the frames' times, without noise.
+    """One simulated run at the times of the frames, without noise.
 
     Parameters
     ----------
@@ -47,24 +47,24 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plant:
-    """A gripper and what is hidden in it.
+    """A gripper with simulated effects.
 
     Parameters
     ----------
     table : GripperTable
-        The simulation, which knows nothing of what is hidden.
+        Simulation table of the gripper without effects.
     inputs : InputRange
         Range of the runs.
     hidden : tuple of Hidden
-        Acting in the physical order, whatever their order here.
+        Simulated effects; they act in their physical order.
     foreign : Foreign or None
-        A thing from outside the catalogue.
+        An effect from outside the catalogue.
     total_s : float
-        Length of the whole experiment.
+        Duration of the whole experiment.
     placement_mm : float
-        Where the gripper stands in the picture, off the image's centre: cameras act on that place.
+        Distance of the gripper from the image centre, on which camera effects depend.
     run_start : tuple of float
-        Where plays and frictions stand when each run begins, -1..1; centred for runs beyond.
+        Start states of plays and frictions in each run, from -1 to 1; centred for further runs.
     """
 
     table: GripperTable
@@ -80,7 +80,7 @@ class Plant:
         object.__setattr__(self, "_by_name", {h.name: h.parameters for h in self.hidden})
 
     def trace(self, motion: Motion, rate_hz: float, started_s: float, run: int) -> Trace:
-        """Drive one motion from rest and return it at the frames."""
+        """Simulate one motion from rest, and return it at the times of the frames."""
         dt = 1 / rate_hz / FINE_STEPS
         frames = int(np.floor(motion.duration_s * rate_hz + 1e-9)) + 1
         time_s = np.arange((frames - 1) * FINE_STEPS + 1) * dt

@@ -1,11 +1,11 @@
-"""Promises of the next run alone: what a poor first run leaves open, the run that is proposed, and what came of it.
+"""Proposed next runs after a poor first run: predicted gain, actual gain, and final diagnosis.
 
     python -m tests.benchmarks.hidden.promises --tables 40 --seed 1 [--out DIR]
 
-Every poor table of one hidden effect whose answer is open is driven on by the plant as proposed: printed are the gain
-that was promised and that came (`next_run_gain`), and what `diagnose` makes of both runs together. Where nothing was
-proposed or settled, the judge says whether any of his own motions would have told the truth from all that it was taken
-for. Build with seeds below 1000, judge with seeds from 2000 on.
+For every poor table of one simulated effect with an ambiguous answer, the proposed run is simulated. Printed are the
+predicted and the actual gain (`next_run_gain`), and the diagnosis of both runs together. If no run was proposed, or the
+answer remains ambiguous, the benchmark tests whether any of its own motions would have separated the truth from the
+other explanations. Seeds below 1000 are for development, seeds from 2000 on for results.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 
 Array = NDArray[np.float64]
 APART = 16.0
-"""Distance above which the judge holds a set for one that a motion can settle: 9, and what noise takes of it."""
+"""Distance above which a motion counts as able to resolve a set: 9, plus an allowance for noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +40,11 @@ class Followed:
     Parameters
     ----------
     first, then : Answer
-        To the first run, and to both together; `then` None where nothing could be run.
+        Answers for the first run and for both runs together; the second is None if no run was possible.
     gain : Gain or None
-        Promised and come, where the truth was one of the two that were to be separated.
+        Predicted and actual gain, if the truth was one of the two explanations to be separated.
     why : str
-        Why nothing was run, or nothing.
+        Reason why no run was simulated; empty otherwise.
     """
 
     hidden: str
@@ -55,12 +55,12 @@ class Followed:
 
     @property
     def settled(self) -> bool:
-        """Whether both runs together name the truth alone."""
+        """Whether the diagnosis of both runs names the truth only."""
         return self.then is not None and self.then.verdict == "named" and self.then.sets == (frozenset({self.hidden}),)
 
 
 def followed(table: JudgedTable) -> Followed | None:
-    """Diagnose, run what is proposed, diagnose both; None where the first answer is not open."""
+    """Diagnose, simulate the proposed run, and diagnose both; None if the first answer is not ambiguous."""
     (hidden,) = (h.name for h in table.experiment.plant.hidden)
     first = diagnose(table.folder)
     if first.verdict != "ambiguous":
@@ -79,7 +79,7 @@ def followed(table: JudgedTable) -> Followed | None:
 
 
 def motions_of_the_judge(low_mm: float, high_mm: float) -> list[Motion]:
-    """Runs that any bench drives, up to five minutes."""
+    """Runs that any test bed can execute, of up to five minutes."""
     low, high = low_mm + 0.03 * (high_mm - low_mm), high_mm - 0.03 * (high_mm - low_mm)
     way = high - low
     strokes = [triangle(low, high, way / seconds, cycles) for seconds, cycles in ((4.0, 30), (20.0, 8), (8.0, 5))]
@@ -90,7 +90,7 @@ def motions_of_the_judge(low_mm: float, high_mm: float) -> list[Motion]:
 
 
 def could_be_settled(table: JudgedTable, answer: Answer) -> bool:
-    """Whether one of the judge's motions, after the first run, parts the truth from every other in the set."""
+    """Whether one of the benchmark's motions, after the first run, separates the truth from the rest of the set."""
     experiment = table.experiment
     own = frozenset(h.name for h in experiment.plant.hidden)
     inputs = experiment.plant.inputs
@@ -119,7 +119,7 @@ def could_be_settled(table: JudgedTable, answer: Answer) -> bool:
 
 
 def line_of(index: int, case: Followed) -> str:
-    """One case as text."""
+    """Text line for one case."""
     sets = ",".join("+".join(sorted(s)) for s in case.first.sets)
     there = frozenset({case.hidden}) in case.first.sets
     words = f"{index:4d} {case.hidden}{'' if there else ' (NOT IN SET)'} of {len(case.first.sets)} [{sets}]"
@@ -138,7 +138,7 @@ def line_of(index: int, case: Followed) -> str:
 
 
 def main() -> None:
-    """Read the options, work, print."""
+    """Read the options, process the tables, and print the results."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--tables", type=int, default=40)
     options.add_argument("--first", type=int, default=0)

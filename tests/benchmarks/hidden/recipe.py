@@ -1,4 +1,4 @@
-"""A proposed run as motions: the recipe file's kinds that move the stage, driven by the same plant."""
+"""A proposed run as motions: steps of a recipe that move the stage, simulated with the same effects."""
 
 import tomllib
 from pathlib import Path
@@ -10,7 +10,7 @@ from tests.benchmarks.hidden.plant import Trace
 
 
 class NotDrivenError(ValueError):
-    """The recipe asks for something that this bench has no stand-in for."""
+    """The recipe has a step that cannot be simulated."""
 
 
 def _motion(step: dict[str, Any], now_mm: float, closed_mm: float) -> Motion:
@@ -33,7 +33,7 @@ def _motion(step: dict[str, Any], now_mm: float, closed_mm: float) -> Motion:
 
 
 def motions_of(path: Path, closed_mm: float) -> list[Motion]:
-    """The runs of a recipe: one, for what would begin another (`rezero`) has no stand-in."""
+    """Runs of a recipe: only one, because a step that begins another run (`rezero`) cannot be simulated."""
     recipe = tomllib.loads(path.read_text(encoding="utf-8"))
     motion: Motion | None = None
     for step in recipe["step"]:
@@ -43,7 +43,7 @@ def motions_of(path: Path, closed_mm: float) -> list[Motion]:
 
 
 def drive(experiment: Experiment, motions: list[Motion]) -> list[Trace]:
-    """Further runs, after those of the table."""
+    """Simulate further runs after those of the table."""
     design = experiment.design
     started = 0.0 if design.time_restarts else experiment.starts_s()[-1] + design.motions[-1].duration_s + 30.0
     traces = []
@@ -55,5 +55,5 @@ def drive(experiment: Experiment, motions: list[Motion]) -> list[Trace]:
 
 
 def drive_recipe(experiment: Experiment, path: Path) -> list[Trace]:
-    """The recipe's runs, after those of the table."""
+    """Simulate the runs of a recipe after those of the table."""
     return drive(experiment, motions_of(path, experiment.plant.inputs.lower_mm))

@@ -1,4 +1,4 @@
-"""The definitions with memory, sample by sample over all runs; `starts` are the runs' first samples, and n."""
+"""Definitions of effects with memory, computed sample by sample; `starts` contains each run's first sample, and n."""
 
 import numpy as np
 from numba import njit
@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 @njit(cache=True)
 def limited(u: Array, t: Array, starts: NDArray[np.int64], speed: float) -> Array:
-    """Follows at most at a speed."""
+    """Output that follows the input at no more than a given speed."""
     out = np.empty_like(u)
     for r in range(starts.size - 1):
         place = u[starts[r]]
@@ -23,7 +23,7 @@ def limited(u: Array, t: Array, starts: NDArray[np.int64], speed: float) -> Arra
 
 @njit(cache=True)
 def play(u: Array, starts: NDArray[np.int64], full_width: float, begin: Array) -> Array:
-    """Play operator; at each run's start the place is `begin` half widths beside the input."""
+    """Play operator; at each run's start, the output is `begin` half widths from the input."""
     out = np.empty_like(u)
     half = 0.5 * full_width
     for r in range(starts.size - 1):
@@ -36,7 +36,7 @@ def play(u: Array, starts: NDArray[np.int64], full_width: float, begin: Array) -
 
 @njit(cache=True)
 def jump(u: Array, starts: NDArray[np.int64], size: float) -> Array:
-    """Stays until the input is more than `size` away, then follows at once."""
+    """Output that stays constant until the input is more than `size` away, then follows at once."""
     out = np.empty_like(u)
     for r in range(starts.size - 1):
         place = u[starts[r]]
@@ -49,9 +49,10 @@ def jump(u: Array, starts: NDArray[np.int64], size: float) -> Array:
 
 @njit(cache=True)
 def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float, begin: Array) -> Array:
-    """Eight elastic sliders of reach k / 8; at each run's start each is strained by -`begin` times its reach.
+    """Eight elastic sliders with reaches k / 8 of `reach`; at each run's start, the extension of each is -`begin` times
+    its reach.
 
-    The sign is that of the play: -1 stands where upward motion has left it.
+    The sign is that of the play: -1 is the state after upward motion.
     """
     out = np.empty_like(u)
     e = np.zeros(8)
@@ -71,9 +72,10 @@ def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float, 
 
 @njit(cache=True)
 def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float, begin: Array) -> Array:
-    """First order, exact for an input linear between samples.
+    """First-order low-pass filter, exact for an input that is linear between samples.
 
-    At each run's start relaxed where `begin` is 0, at the least or largest of all values where it is -1 or 1.
+    At each run's start, the filter is relaxed if `begin` is 0, and at the smallest or largest value if `begin` is -1 or
+    1.
     """
     out = np.empty_like(o)
     least, largest = np.min(o), np.max(o)
@@ -91,7 +93,7 @@ def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float, begin: A
 
 @njit(cache=True)
 def oscillator(o: Array, t: Array, starts: NDArray[np.int64], frequency_hz: float, zeta: float) -> Array:
-    """Second order, damped to ground, unit gain, exact for an input linear between samples, from rest."""
+    """Damped second-order system with unit gain, from rest; exact for an input that is linear between samples."""
     out = np.empty_like(o)
     omega = 2 * np.pi * frequency_hz
     zeta = min(zeta, 0.999999)
@@ -102,7 +104,7 @@ def oscillator(o: Array, t: Array, starts: NDArray[np.int64], frequency_hz: floa
         for i in range(starts[r] + 1, starts[r + 1]):
             dt = t[i] - t[i - 1]
             slope = (o[i] - o[i - 1]) / dt
-            # Particular solution for a ramp: o - 2 zeta slope / omega, moving with the slope.
+            # The particular solution for a ramp o is o - 2 zeta slope / omega.
             lag = 2 * zeta * slope / omega
             a = x - (o[i - 1] - lag)
             b = (v - slope + zeta * omega * a) / damped

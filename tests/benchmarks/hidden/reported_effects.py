@@ -1,4 +1,4 @@
-"""The effects of a report.json as the judge's own chain takes them."""
+"""Effects of a report.json, in the form of the benchmark's own measuring chain."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ from tests.benchmarks.hidden.catalogue_chain import MAP, Effects
 
 
 def reported_effects(report: dict[str, Any], known: list[Candidate]) -> Effects:
-    """Values in the order of effects.md; a side that an end stop does not give lies at its bound.
+    """Values in the order of effects.md; the side of an end stop that is not reported lies at its bound.
 
-    A map of position errors is left out: its curve stands in model.toml, not in the report.
+    A map of position errors is left out, because its curve is in model.toml, not in the report.
     """
     by_name = {candidate.name: candidate for candidate in known}
     found: Effects = {}

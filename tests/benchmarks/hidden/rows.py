@@ -1,13 +1,13 @@
-"""The rows of the table of diagnosing.md, section 5."""
+"""Rows of the table in section 5 of diagnosing.md."""
 
 from tests.benchmarks.hidden.catalogue_chain import MAP
 from tests.benchmarks.hidden.experiment import Row
 from tests.benchmarks.hidden.sizes import WITH_START
 
 OFFSETS = ("input_offset", "rest_gap_error", "edge_bias")
-"""What a play that is engaged throughout a run looks like."""
+"""Effects to which a play that is engaged throughout a run is equivalent."""
 BESIDE = ("rest_gap_error", "drive_lag", "input_scale", "viscoelastic_creep", "thermal_drift", "encoder_cyclic_error")
-"""What a play or a friction is hidden beside."""
+"""Effects that are simulated together with a play or a friction."""
 
 ROWS = {
     row.name: row
@@ -22,7 +22,7 @@ ROWS = {
         Row("pair_3", ("rich",), 2, False, (3.0,)),
         Row("pair_1", ("rich",), 2, False, (1.0,)),
         Row("poor", ("poor",), 1, False, (1.0, 3.0)),
-        # Since effects with memory start anywhere, and maps and limits of speed are in the catalogue.
+        # Rows with random start states, maps, and speed limits, which were added later.
         Row("start_3", ("rich",), 1, False, (3.0,), WITH_START, free_start=True),
         Row("start_1", ("rich",), 1, False, (1.0,), WITH_START, free_start=True),
         Row("start_ordinary", ("ordinary",), 1, False, (1.0, 3.0), WITH_START, free_start=True),

@@ -1,11 +1,11 @@
-"""The hidden-effect benchmark: draw tables, ask every method, print the table of marks.
+"""Benchmark of hidden effects: simulate tables, apply every method, and print a table of marks.
 
     python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,bic
 
-Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; the rows grow
-together, --minutes M begins no table after that time, and --minutes 0 prints the table from what is kept; --again
-METHOD asks it anew. --scheduler tcp://HOST:PORT works on a Dask cluster whose workers were started at the top of the
-repository. Build with seeds below 1000, judge with seeds from 1000 on.
+All results are stored under --out by seed, row and number, so that a run may be stopped and continued. All rows are
+processed in turn. With --minutes M, no table is begun after that time; --minutes 0 prints the stored results; --again
+METHOD repeats a method. --scheduler tcp://HOST:PORT uses a Dask cluster whose workers were started at the top of the
+repository. Seeds below 1000 are for development, seeds from 1000 on for results.
 """
 
 import argparse
@@ -53,12 +53,12 @@ class Task:
 
     @property
     def folder(self) -> Path:
-        """Where the table, the answers and the marks are kept."""
+        """Folder of the table, the answers and the marks."""
         return self.out / f"seed{self.seed}" / self.row / f"{self.index:04d}"
 
     @property
     def kept(self) -> Path:
-        """The marks."""
+        """File of the marks."""
         return self.folder / f"{self.method}_marks.json"
 
 
@@ -81,7 +81,7 @@ def _ask(table: JudgedTable, method: str) -> Answer:
 
 
 def marked(task: Task) -> dict[str, object]:
-    """`work`, kept beside the table: a run that was stopped goes on, and its figures can be printed at any time."""
+    """Result of `work`, stored with the table, so that an interrupted run can be continued."""
     if task.kept.exists():
         return dict(json.loads(task.kept.read_text(encoding="utf-8")))
     result = work(task)
@@ -90,7 +90,7 @@ def marked(task: Task) -> dict[str, object]:
 
 
 def work(task: Task) -> dict[str, object]:
-    """Draw, ask, mark; a plain dictionary, so that it can be kept."""
+    """Simulate a table, apply the method, and mark its answer; returns a dictionary that can be stored."""
     row, folder = ROWS[task.row], task.folder
     table = draw_table_of_row(row, task.seed, task.index, folder)
     hidden = frozenset(h.name for h in table.experiment.plant.hidden)
@@ -121,7 +121,7 @@ def work(task: Task) -> dict[str, object]:
 
 
 def guarded(task: Task) -> dict[str, object]:
-    """`marked`, with a fault of a table told instead of the whole run stopped."""
+    """Result of `marked`; an exception for one table is reported and does not end the run."""
     try:
         return marked(task)
     except Exception:
@@ -129,7 +129,7 @@ def guarded(task: Task) -> dict[str, object]:
 
 
 def report_of(method: str, results: dict[str, list[dict[str, object]]]) -> list[str]:
-    """The printed table for one method."""
+    """Printed table for one method."""
     lines = [f"== {method}"]
     for name, found in results.items():
         marks = [Mark(**r["mark"]) for r in found if "mark" in r]  # type: ignore[arg-type]
@@ -162,7 +162,7 @@ def report_of(method: str, results: dict[str, list[dict[str, object]]]) -> list[
 
 
 def main() -> None:
-    """Read the options, work, print."""
+    """Read the options, process the tables, and print the results."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--tables", type=int, default=20, help="tables a row")
     options.add_argument("--first", type=int, default=0, help="number of the first table")
@@ -195,7 +195,7 @@ def main() -> None:
             (task.folder / f"{task.method}.json").unlink(missing_ok=True)
             task.kept.unlink(missing_ok=True)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    # All methods of one table stay in one process: the table is drawn once.
+    # All methods for one table run in one process, so that the table is simulated once.
     results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
     batches = [tasks[i : i + len(methods)] for i in range(0, len(tasks), len(methods))]
     known = [batch for batch in batches if all(task.kept.exists() for task in batch)]

@@ -1,4 +1,4 @@
-"""Marks for one answer, and the table of diagnosing.md, section 5, from all of them."""
+"""Marks for one answer, and the table in section 5 of diagnosing.md from all marks."""
 
 from dataclasses import dataclass
 
@@ -12,20 +12,21 @@ from tests.benchmarks.hidden.oracle import Judgement
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """What an answer is worth.
+    """Mark of one answer.
 
     Parameters
     ----------
     right : bool
-        The verdict and the set are among the right ones.
+        Whether verdict and set are right.
     contains_truth : bool
-        What is hidden is in the set (or need not be).
+        Whether the simulated effects are in the set, or need not be.
     wrong : bool
-        It names, and no explanation that it gives is right; where nothing is hidden, any claim, `unknown` too.
+        Whether it names effects, and no stated explanation is right; without a simulated effect, any claim, including
+        `unknown`.
     named : bool
-        It names anything.
+        Whether it names any effect.
     size, oracle_size : int
-        Explanations given, and explanations that belong to the set.
+        Number of stated explanations, and number of explanations that must be in the set.
     """
 
     right: bool
@@ -37,7 +38,7 @@ class Mark:
 
 
 def mark(row: Row, judgement: Judgement, answer: Answer, hidden: frozenset[str]) -> Mark:
-    """Mark one answer; `agrees` is the explanation with nothing in it."""
+    """Mark one answer; `agrees` is treated as the explanation without an effect."""
     named = answer.verdict in ("named", "ambiguous")
     given = frozenset(answer.sets) if named else frozenset({frozenset[str]()} if answer.verdict == "agrees" else ())
     must, may = frozenset(judgement.must), frozenset(judgement.may)
@@ -57,14 +58,14 @@ def mark(row: Row, judgement: Judgement, answer: Answer, hidden: frozenset[str])
 
 @dataclass(frozen=True, slots=True)
 class Covered:
-    """One parameter's interval."""
+    """Deviation of one parameter relative to its stated uncertainty."""
 
     name: str
     deviation: float
 
 
 def intervals(judgement: Judgement, answer: Answer, names_of: dict[str, tuple[str, ...]]) -> list[Covered]:
-    """(value - truth) / u of every parameter with an uncertainty, where exactly the hidden effects were named."""
+    """(value - truth) / u of every parameter with an uncertainty, if exactly the simulated effects were named."""
     out = []
     if not answer.sets or answer.sets[0] != frozenset(judgement.effects):
         return out
@@ -81,7 +82,7 @@ def intervals(judgement: Judgement, answer: Answer, names_of: dict[str, tuple[st
 
 
 def row_lines(row: Row, marks: list[Mark]) -> list[str]:
-    """The row's figures as text."""
+    """Text lines with the results of a row."""
     n = len(marks)
     if n == 0:
         return []

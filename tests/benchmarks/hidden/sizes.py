@@ -1,4 +1,4 @@
-"""How big a hidden effect is: draws at everyday sizes, and the same effect made smaller or larger by one factor."""
+"""Sizes of simulated effects: random ordinary sizes, and scaling of an effect by one factor."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tests.benchmarks.hidden.gripper_table import GripperTable, InputRange
 from tests.benchmarks.hidden.plant import Hidden
 
 CLOCKED = ("thermal_drift", "camera_drift", "camera_scale_drift")
-"""Excluded where time restarts between runs, as effects.md says."""
+"""Effects that are excluded if the time restarts between runs, as stated in effects.md."""
 
 NAMES = (
     "drive_lag", "input_offset", "input_scale", "encoder_cyclic_error", "end_stop", "backlash", "stick_slip",
@@ -16,18 +16,18 @@ NAMES = (
     "camera_scale_drift", "out_of_plane_motion", "scale_error", "lens_distortion", "camera_tilt", "edge_bias",
     "camera_latency",
 )  # fmt: skip
-"""The catalogue that the first rows draw from, in its order."""
+"""Effects from which the first rows draw, in the catalogue's order."""
 
 WITH_START = ("backlash", "friction_hysteresis")
-"""What may stand anywhere when a run begins."""
+"""Effects with random start states."""
 MAP_HEIGHTS = 8
-"""Knots of a hidden map of position errors."""
+"""Number of knots of a simulated map of position errors."""
 
 
 def draw_hidden(
     rng: np.random.Generator, name: str, table: GripperTable, inputs: InputRange, design: Design, total_s: float
 ) -> Hidden:
-    """Draw an effect at an everyday size for this gripper and these runs."""
+    """Draw an effect with an ordinary size for a gripper and its runs."""
     width, sign = inputs.width_mm, float(rng.choice([-1.0, 1.0]))
     opening = float(np.max(np.abs(table.gap(np.array([inputs.lower_mm, inputs.upper_mm])) - table.rest_gap_mm)))
 
@@ -98,7 +98,9 @@ def draw_hidden(
 
 
 def scaled(effect: Hidden, factor: float, inputs: InputRange, table: GripperTable) -> Hidden:
-    """The same effect with its size multiplied; what gives it its shape (period, reach of the sliders) stays."""
+    """The same effect with its size multiplied by a factor; shape parameters (period, reach of the sliders) are
+    unchanged.
+    """
     p = dict(effect.parameters)
     match effect.name:
         case "encoder_cyclic_error" | "thermal_drift":
@@ -140,14 +142,14 @@ LIMITS = {
 
 
 def within_bounds(effect: Hidden, table: GripperTable, inputs: InputRange, rate_hz: float) -> bool:
-    """Whether the catalogue's bounds, drawn in a little, hold the effect."""
+    """Whether the parameters are within the catalogue's bounds, with a small margin."""
     p = effect.parameters
     ends = table.gap(np.array([inputs.lower_mm, inputs.upper_mm])) - table.rest_gap_mm
     match effect.name:
         case "position_error_map":
             return max(abs(v) for v in p.values()) < 0.2 * inputs.width_mm
         case "slew_limit":
-            # The slowest strokes of every design take 18 s, their corners included.
+            # The slowest strokes of every design take 18 s, including reversals.
             return p["speed_mm_s"] > inputs.width_mm / 15
         case "end_stop":
             stop = p.get("upper_mm", p.get("lower_mm", 0.0))

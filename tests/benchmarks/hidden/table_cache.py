@@ -1,4 +1,4 @@
-"""One table of the benchmark on disk: experiment, judgement and answers, so that a run can be stopped and goes on."""
+"""Stored table of the benchmark (experiment, judgement and answers), so that a run can be stopped and continued."""
 
 import json
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from tests.benchmarks.hidden.experiment_files import write
 from tests.benchmarks.hidden.oracle import NEAR, Judgement, judge
 
 FORM_SHARE = 0.003
-"""The catalogue's form leaves at most this share of the hidden chi-square (5 % of the amplitude), or 20."""
+"""Largest share of the simulated chi-square that the catalogue's formula may leave (5 % of the amplitude), or 20."""
 TRIES = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedTable:
-    """A table that asks a fair question, and its right answers."""
+    """A suitable table, and its right answers."""
 
     experiment: Experiment
     judgement: Judgement
@@ -25,7 +25,7 @@ class JudgedTable:
 
 
 def fair(row: Row, judgement: Judgement) -> bool:
-    """Whether the table asks what its row asks: near the catalogue, or truly outside, or truly two effects."""
+    """Whether the table suits its row: near the catalogue's formulas, clearly outside, or clearly two effects."""
     if row.foreign:
         return judgement.outside
     if row.hidden == 2 and any(len(names) < 2 for names in judgement.must + judgement.may):
@@ -60,7 +60,7 @@ def _read(text: str) -> Judgement:
 
 
 def draw_table_of_row(row: Row, seed: int, index: int, folder: Path) -> JudgedTable:
-    """Draw, judge and write one table; draws again where the question is not fair. The same seed, the same table."""
+    """Draw, judge and write one table; draw again until the table is suitable. The same seed gives the same table."""
     remembered, right = folder / "attempt.json", folder / "right.json"
     base = (seed * 10_000 + index) * TRIES
     if remembered.exists():

@@ -1,4 +1,4 @@
-"""Answers that the judge did not list: each is fitted by itself before it counts as wrong."""
+"""Explanations that the judge did not list: each is fitted before it counts as wrong."""
 
 from dataclasses import replace
 
@@ -11,14 +11,14 @@ from tests.benchmarks.hidden.oracle import Judgement, verdict_on
 from tests.benchmarks.hidden.table_cache import JudgedTable
 
 LINE = frozenset({"input_offset", "rest_gap_error", "edge_bias", "input_scale", "lever_ratio_error", "scale_error"})
-"""What the straight line of a map of position errors looks like."""
+"""Effects to which the straight line of a map of position errors is equivalent."""
 
 
 def admitted(experiment: Experiment, judgement: Judgement, names: frozenset[str]) -> bool:
-    """Whether an explanation that the judge did not list may be in the set all the same.
+    """Whether an explanation that the judge did not list may nevertheless be in the set.
 
-    It is fitted by itself, with creep that is not relaxed at the runs' starts and with a map of position errors:
-    freedoms of the definitions that the judge's own list leaves out. What contains the truth is no alternative.
+    The explanation is fitted with creep that is not relaxed at the start of runs, and with a map of position errors,
+    which the judge's list does not include. An explanation that contains the truth is no alternative.
     """
     search, target = search_of(experiment, experiment.traces(), known_input=False, with_map=MAP in names)
     chosen = [c for c in search.known if c.name in names]
@@ -44,14 +44,14 @@ def admitted(experiment: Experiment, judgement: Judgement, names: frozenset[str]
 
 
 def widened(table: JudgedTable, answer: Answer, hidden: frozenset[str]) -> Judgement:
-    """The judgement, with what the answer gives and the judge did not list, but admits when it is asked."""
+    """The judgement, extended by explanations of the answer that are admitted although the judge did not list them."""
     judgement = table.judgement
     if not hidden or answer.verdict not in ("named", "ambiguous"):
         return judgement
     listed = {*judgement.must, *judgement.may}
     more = []
     for names in dict.fromkeys(answer.sets):
-        # A map has no line over its travel; the tool's, over other weights, may have one.
+        # A map has no straight line over its travel; that of the diagnosis, with other weights, may have one.
         bare = names - LINE if MAP in hidden & names else names
         if names not in listed and (bare in listed or admitted(table.experiment, judgement, names)):
             more.append(names)

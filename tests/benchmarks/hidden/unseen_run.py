@@ -1,4 +1,4 @@
-"""A run that nobody has fitted: how far predictions miss it, over how far the judge's miss it."""
+"""Prediction error for a run that was not used in a fit, relative to that of the judge's prediction."""
 
 from dataclasses import replace
 
@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 
 def unseen_error_ratio(table: JudgedTable, effects: Effects | None) -> float:
-    """RMS over left and right of a noisy unseen run less the prediction, over the same with the judge's effects.
+    """RMS of both edges of a noisy unseen run minus the prediction, divided by the same with the judge's effects.
 
-    `effects` None asks the Gaussian process instead. The midline's constant is free, as everywhere.
+    If `effects` is None, the Gaussian process is used instead. The midline's constant is a free parameter.
     """
     experiment = table.experiment
     rate = experiment.design.rate_hz
@@ -38,7 +38,7 @@ def unseen_error_ratio(table: JudgedTable, effects: Effects | None) -> float:
         off = off - off.mean()
         return float(np.sqrt(np.mean(off**2 + (gap - prediction[0]) ** 2 / 4)))
 
-    # Where nobody saw the unseen run start, it starts centred for both.
+    # The start state of the unseen run is unknown; both predictions assume the centre.
     judge = respond(model, at, table.judgement.effects)
     asked = gp_prediction(table.folder, at) if effects is None else respond(model, at, effects)[:2]
     return error_mm((asked[0], asked[1])) / error_mm((judge[0], judge[1]))

@@ -1,4 +1,4 @@
-"""Whitening with the noise that the generator really used: the metric of every distance that the judge states."""
+"""Whitening with the noise that was simulated: the metric of all distances in the benchmark."""
 
 from dataclasses import dataclass
 
@@ -10,16 +10,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weights:
-    """Turns (gap, midline, force) into numbers whose sum of squares is a chi-square.
+    """Transforms (gap, midline, force) to numbers whose sum of squares is a chi-square.
 
     Parameters
     ----------
     gap_sd_mm, midline_sd_mm : ndarray, shape (n,)
-        Standard deviation per sample, the input's error included in the gap.
+        Standard deviation of each sample; that of the gap includes the error of the input.
     correlation : float
-        AR(1) coefficient within runs.
+        AR(1) coefficient within each run.
     run_offset_mm : float
-        Standard deviation of one edge's offset per run; marginalised.
+        Standard deviation of one edge's offset per run, over which the likelihood is marginalised.
     starts : ndarray of int, shape (runs + 1,)
         First sample of each run.
     force_sd_n : float or None
@@ -34,7 +34,7 @@ class Weights:
     force_sd_n: float | None
 
     def _whitened(self, values: Array, sd: Array, offset_mm: float) -> tuple[Array, Array]:
-        """Whitened values, and per run the chi-square of the run's mean."""
+        """Whitened values, and the chi-square of the mean of each run."""
         rho = self.correlation
         ones = 1 / sd
         z = values / sd
@@ -53,7 +53,7 @@ class Weights:
         return out, between
 
     def apply(self, gap: Array, midline: Array, force: Array) -> Array:
-        """Whitened residual, the constant of the midline projected out; shape (2 n,) or (3 n,) with force."""
+        """Whitened residual without the constant of the midline; shape (2 n,), or (3 n,) with force."""
         gap_w, _ = self._whitened(gap, self.gap_sd_mm, np.sqrt(2) * self.run_offset_mm)
         mid_w, _ = self._whitened(midline, self.midline_sd_mm, self.run_offset_mm / np.sqrt(2))
         one, _ = self._whitened(np.ones_like(midline), self.midline_sd_mm, self.run_offset_mm / np.sqrt(2))
@@ -64,7 +64,7 @@ class Weights:
         return np.concatenate(parts)
 
     def cautious(self, chi_square: float, gap: Array, midline: Array) -> float:
-        """Chi-square where the variance between runs is not known but profiled: R log(1 + q / R) for their part."""
+        """Chi-square if the variance between runs is unknown and profiled: the part of the runs is R log(1 + q / R)."""
         runs = len(self.starts) - 1
         if runs < 2:
             return chi_square
