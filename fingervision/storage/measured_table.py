@@ -192,7 +192,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
     said += "in every row" if repeated.size == time_s.size - 1 else "twice"
     whole = bool(np.all(time_s == np.round(time_s)))
     cure = "write the times with more digits" if whole else "add a run column, or remove the repeated rows"
-    raise DataError(f"{said} of run {name or '(unnamed)'} of {path}: {cure}.")
+    raise DataError(f"{said} in run {name or '(unnamed)'} of {path}: {cure}.")
 
 
 def _by_run(names: Sequence[str], key: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:

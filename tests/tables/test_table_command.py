@@ -230,5 +230,5 @@ def test_a_moving_run_has_no_repeatability(tmp_path: Path) -> None:
     held = [gaps(tmp_path, f"held{k}.csv", 4.0 + 0.0003 * rng.standard_normal(60)) for k in (1, 2)]
     assert "repeatability" in call("calibrate", "repeat", *held, "--tolerance-mm", "0.02")
     moving = gaps(tmp_path, "moving.csv", 4.0 + 8.0 * np.sin(np.arange(60) / 9.0) + 0.0003 * rng.standard_normal(60))
-    with pytest.raises(NoCalibrationError, match=r"moving\.csv.*move from"):
+    with pytest.raises(NoCalibrationError, match=r"moving\.csv.*range from"):
         call("calibrate", "repeat", held[0], moving, "--tolerance-mm", "0.02")
