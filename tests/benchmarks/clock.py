@@ -193,7 +193,7 @@ def main():
         off_s = abs(found.log_time_s(middle_s) - case.true_log_time_s(middle_s))
         scores.append(score)
         tally["within 2u"] += abs(score) < 2.0
-        said = any(word in note for note in found.notes for word in ("known only with", "than a frame", "set-points"))
+        said = any(word in note for note in found.notes for word in ("one frame", "set-points"))
         tally["within 2u in the middle"] += off_s < 2.0 * found.u_time_s
         tally["off by more than a frame"] += off_s > case.frame_s
         tally["of these said"] += off_s > case.frame_s and said
