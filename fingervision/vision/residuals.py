@@ -35,6 +35,9 @@ MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
 # Least number of rejected points near the corners of both fingers that indicates cut corners. Dust seldom hides so many
 # points at both fingers, whereas a straight cut lies on both sides of the fillet that fits best.
 FEWEST_OF_CORNER = 3
+# A fillet that ends above this share of the way to the measuring height does not shift the edge there, whatever the
+# corner is (in compressed pictures, ringing displaces the points of sharp corners).
+FILLET_SHARE = 0.9
 # Where most of the points within so many pixels above or below the measuring point are rejected, or half of them on
 # both sides, they may be the finger's own edge (a corner that is cut off, a bend) and not dust.
 BESIDE_PX = 4.0
@@ -121,7 +124,7 @@ def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint
     """
     is_corner = (points.x > found.apex) & (points.y < found.tip + below_tip_px + SHAPE_REACH_PX)
     is_aside = is_corner & (end.robust <= 0.0)
-    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER:
+    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER or end.parameters[INNER_R] < FILLET_SHARE * below_tip_px:
         return 0.0
     return float(np.max(np.abs(end.residual * points.u)[is_aside]))
 
