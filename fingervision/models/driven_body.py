@@ -105,7 +105,7 @@ class DrivenBody:
 
     @cached_property
     def touches(self) -> dict[float, Equilibrium]:
-        """Cache of the inputs of first touch in the deformed shape; the key is the initial estimate of that input."""
+        """Cache of the drive displacements at which the fingers first touch; the key is the initial estimate."""
         return {}
 
     @property

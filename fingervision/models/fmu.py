@@ -128,8 +128,8 @@ def _drive_between_steps() -> None:
     """Let FMPy's integrator read the input at each time that it evaluates, instead of the input at the last step.
 
     FMPy 0.3 sets inputs only before a step of the integrator and in the root function. During a step of the integrator
-    CVode a moving input then lags, and the integrator's error test fails where the input jumps. The change of FMPy
-    applies to the whole worker process, which runs only the model.
+    CVode a moving input then lags, and the integrator's error test fails where the input jumps. FMPy's class is
+    replaced in the whole worker process, which runs only the model.
     """
     from fmpy import sundials
 

@@ -121,7 +121,7 @@ class Registry(Generic[T]):
         return tuple(self._refused.values())
 
     def add(self, name: str, value: T, origin: Origin = SESSION) -> None:
-        """Add a part for this process; an earlier part of this session with the same name is replaced.
+        """Add a plug-in for this Python process; a plug-in of the same name that was added before is replaced.
 
         Raises
         ------

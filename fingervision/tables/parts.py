@@ -33,7 +33,9 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
     listed = ", ".join(f"'{name}'" for name in names)
     if (stated := given.words.get("part")) is not None:
         if stated not in names:
-            raise DataError(f"part must be a {what} of {path} ({listed or 'it has none'}), but is '{stated}'.")
+            raise DataError(
+                f"The key part must name a {what} of {path} ({listed or 'it has none'}), but is '{stated}'."
+            )
         return stated
     if len(names) == 1:
         return next(iter(names))

@@ -104,8 +104,8 @@ def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, heigh
     """Variance of the edge due to points near the measuring point that the fit rejected as dust (pixels squared).
 
     The edge may lie anywhere between the fitted shape and the farthest rejected point (a rectangular distribution).
-    The errors of the two fingers may be equal, so that each finger's variance is doubled to cover the variance of the
-    sum (JCGM 100:2008, 4.3.7 and 5.2.2).
+    The errors of the two fingers may be fully correlated. Each finger's variance is therefore doubled, so that the
+    variance of the gap is large enough (JCGM 100:2008, 4.3.7 and 5.2.2).
     """
     return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
 

@@ -147,7 +147,7 @@ class _Cut(NamedTuple):
 
 
 def _corners(points: OutlinePoints, end: FingerEnd, shared_px: float) -> _Corners | None:
-    """Properties of a finger's corners that all chamfers share; None if the inner corner is too small for a chamfer."""
+    """Geometry of a finger's two corners before a chamfer; None if the inner corner is too small for a chamfer."""
     p, (x0, y0) = end.parameters.tolist(), end.origin.tolist()
     if p[INNER_R] < SMALLEST_PX:
         return None

@@ -90,7 +90,7 @@ class Template:
 
 
 def independent_pixels(template: Floats) -> float:
-    """Number of independent pixels of a texture: number of pixels per area of the squared autocorrelation."""
+    """Number of independent pixels of a texture: its pixels divided by the area under its squared autocorrelation."""
     levels = template.astype(np.float64) - template.mean()
     spectrum = np.abs(np.fft.fft2(levels, [2 * size for size in levels.shape])) ** 2
     correlation = np.fft.ifft2(spectrum).real

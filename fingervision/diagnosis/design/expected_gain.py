@@ -37,7 +37,7 @@ class ExpectedGain:
 
     If one explanation is true, the gain often differs from the gain if the other explanation is true. The median gain
     over both explanations would lie between the two gains, where hardly any gain occurs. `modest` is the most probable
-    gain (chi-square) below `MODERATE`.
+    of the gains below `MODERATE`. All gains are differences in chi-square.
     """
 
     gain: float

@@ -179,7 +179,7 @@ def _leans(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
     """Subtract each run's deviation from the mean of all runs; a significant offset shared by all runs remains.
 
-    A mean offset is not significant if random zeroing of the runs, judged by their scatter, would cause a mean as
+    Each run may be zeroed anew. A mean offset is not significant if the scatter of the runs' offsets causes a mean as
     large.
     """
     means = np.array([values[run].mean() for run in runs])

@@ -110,7 +110,7 @@ def diagnosis_report(
 
 
 def _disagreement(answered: Answer) -> Disagreement:
-    """The disagreement without and with the named effects: in total, by channel, and as the verdict counts it."""
+    """Disagreement without and with the named effects: over all rows, by channel, and over the rows of the verdict."""
     data, found = answered.data, answered.found
     before, after = answered.before_mm, answered.after_mm
     n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges

@@ -23,7 +23,7 @@ class ReportPart(Protocol):
 def _held(held: object) -> dict[str, ReportPart]:
     if not isinstance(getattr(held, "TITLE", None), str) or not callable(getattr(held, "html", None)):
         lacks = "html" if isinstance(getattr(held, "TITLE", None), str) else "TITLE"
-        raise MisfitError(f"must have TITLE and html(diagnosis), but has no {lacks}")
+        raise MisfitError(f"A report part must have TITLE and html(diagnosis), but this one has no {lacks}")
     return {"": cast("ReportPart", held)}
 
 

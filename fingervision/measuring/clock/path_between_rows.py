@@ -38,7 +38,14 @@ STANDS = 0.1
 def piece(
     time_s: Array, input_mm: Array, u_mm: Array
 ) -> tuple[Array, Array, Array, Array, NDArray[np.intp], Array, Array]:
-    """Path of one run: points (times, inputs, uncertainties, their part due to the curve, intervals), and corners."""
+    """Interpolate the input between the rows of one run.
+
+    Returns
+    -------
+    tuple
+        Times, inputs, standard uncertainties, the part of each uncertainty that the interpolation causes, and the
+        interval of each point; then times and inputs of the corners, at which the speed changes suddenly.
+    """
     if time_s.size < FEWEST:
         none = np.zeros(0)
         return time_s, input_mm, u_mm, np.zeros(time_s.size), np.arange(time_s.size), none, none

@@ -90,8 +90,8 @@ def _check_speed(number: int, step: Step, way_mm: float, limits: StageLimits) ->
         if entry.positioning_time_s < least_s * (1.0 - ROUNDING):
             raise LimitError(
                 f"positioning_time_s of step {number} must be at least {_rounded_up(least_s):g} s for its "
-                f"{abs(way_mm):g} mm with {step.load_kg:g} kg (at most {limits.speed_mm_s:g} mm/s and "
-                f"{limits.force_n:g} N), but is {entry.positioning_time_s:g}."
+                f"travel of {abs(way_mm):g} mm with a load of {step.load_kg:g} kg, because the stage permits at most "
+                f"{limits.speed_mm_s:g} mm/s and {limits.force_n:g} N, but is {entry.positioning_time_s:g}."
             )
     elif entry.speed_mm_s > limits.speed_mm_s:
         raise LimitError(
