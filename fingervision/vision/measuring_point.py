@@ -61,8 +61,8 @@ def squared(end: FingerEnd) -> FingerEnd:
     """Return the fitted finger end with its top made perpendicular to its flanks, unless the points contradict this.
 
     The top of a finger that is cut straight is perpendicular to its flanks, which are long and determine the tilt far
-    more precisely than the short top. If the measured angle between top and flanks is 90 degrees within its uncertainty,
-    the right angle is imposed (a Kalman update); a slanted top is not changed.
+    more precisely than the short top. If the measured angle between top and flanks is 90 degrees within its
+    uncertainty, the right angle is imposed (a Kalman update); a slanted top is not changed.
     """
     parameters, covariance = np.empty_like(end.parameters), np.empty_like(end.covariance)
     _squared(end.parameters, end.covariance, end.misfit, parameters, covariance)

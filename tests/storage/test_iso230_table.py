@@ -222,7 +222,7 @@ def test_a_file_that_is_not_there_is_left_to_its_reader(tmp_path: Path) -> None:
         ("target_mm,cycle,direction,position_mm\n0,1,up", "must have 4 cells"),
         (
             "target_mm,cycle,direction,position_mm\n" + "\n".join(f"{t},1,up,0.00{t}" for t in range(5)),
-            "if these are deviations, name the column deviation_mm",
+            "if the values are deviations from the target, name the column deviation_mm",
         ),
         (
             "target_mm,cycle,direction,deviation_um\n" + "\n".join(f"{t},1,up,{1000 * t + 3}" for t in range(5)),

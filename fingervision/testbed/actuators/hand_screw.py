@@ -76,7 +76,8 @@ class HandScrew:
     def run_step(self, number: int) -> None:
         """Refuse: step data exist only in a motor controller."""
         raise LimitError(
-            f'Step {number} must be stored in a motor controller, but a hand screw has none: write a step of kind = "move" in the recipe.'
+            f"Step {number} must be stored in a motor controller, but a hand screw has none: write a step of kind "
+            '"move" in the recipe.'
         )
 
     def stop(self) -> None:
