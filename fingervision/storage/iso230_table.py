@@ -241,7 +241,7 @@ def _check_quantity(path: Path, readings: list[Reading], quantity: str) -> None:
         )
     if quantity.startswith("position") and share < SMALLEST_TRAVEL:
         raise DataError(
-            f"{quantity} must range about as far as the target, which ranges over {np.ptp(targets):g} mm, but ranges over "
-            f"{np.ptp(values):g} mm in {path}: if the values are deviations from the target, name the column "
+            f"{quantity} must range about as far as the target, which ranges over {np.ptp(targets):g} mm, but ranges "
+            f"over {np.ptp(values):g} mm in {path}: if the values are deviations from the target, name the column "
             f"{quantity.replace('position', 'deviation')}."
         )

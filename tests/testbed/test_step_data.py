@@ -104,8 +104,8 @@ def test_a_time_too_short_is_answered_with_the_shortest_and_that_is_enough(tmp_p
     said = sentence_of(path, GOOD.replace("= 0.2\n[[", "= 0.02\n[["))
     # Distance s = 5 mm with 5.5 N on 0.2 kg (a = 27.5 m/s2): a triangular speed profile takes 2 sqrt(s / a) = 26.97 ms.
     assert said == (
-        "positioning_time_s of step 1 must be at least 0.027 s for its travel of 5 mm with a load of 0.2 kg, because the "
-        "stage permits at most 400 mm/s and 5.5 N, but is 0.02."
+        "positioning_time_s of step 1 must be at least 0.027 s for its travel of 5 mm with a load of 0.2 kg, because "
+        "the stage permits at most 400 mm/s and 5.5 N, but is 0.02."
     )
     path.write_text(GOOD.replace("= 0.2\n[[", "= 0.027\n[["), encoding="utf-8")
     assert planned_sequence(read_steps(path), LIMITS)[0].force_n == pytest.approx(5.5, rel=0.01)
