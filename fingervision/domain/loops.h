@@ -42,11 +42,11 @@ typedef union {
 #define POINTS(k) ((const int32_t *)in[k].data)
 
 /* A function in a version for every width of vector registers, of which the widest that the processor has is chosen when the
-   library is loaded. Numbers side by side are worked out as one by one: the same digits. */
+   library is loaded. Vectorised results have the same digits as scalar ones. */
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
 #define SIDE_BY_SIDE __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
-#define WIDE
+#define SIDE_BY_SIDE
 #endif
 
 static const double PI = 3.14159265358979323846;
