@@ -31,7 +31,7 @@ class Agreement:
 
     @property
     def e_n(self) -> float:
-        """Ratio E_n of deviation to expanded uncertainty (ISO 13528:2022, 9.6); the values agree if |E_n| <= 1."""
+        """Ratio `E_n` of deviation to expanded uncertainty (ISO 13528:2022); a magnitude of at most 1 is agreement."""
         expanded = COVERAGE_FACTOR * hypot(self.u_measured_mm, self.u_certified_mm)
         return self.deviation_mm / expanded if expanded > 0.0 else float("inf")
 

@@ -115,7 +115,7 @@ def test_what_is_done_stays_and_what_changed_is_done_again(run: Run, copy: Path)
     assert Path("out/b__good.mkv/gaps.csv").read_bytes() == Path("out/good_too.mkv/gaps.csv").read_bytes()
     # Other options are other results; a default that is written out is none.
     assert "nothing to do" in run(*arguments, "--below-tip-mm", 0.3)[1]
-    assert "4 worked on" in run(*arguments, "--below-tip-mm", 0.4)[1]
+    assert "4 processed by this call" in run(*arguments, "--below-tip-mm", 0.4)[1]
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_a_result_whose_table_was_changed_or_deleted_is_done_again(run: Run, cop
     whole = changed.read_bytes(), deleted.read_bytes()
     changed.write_bytes(whole[0].replace(b"ok", b"ko", 1))
     deleted.unlink()
-    assert "2 worked on" in run(*arguments)[1]
+    assert "2 processed by this call" in run(*arguments)[1]
     assert (changed.read_bytes(), deleted.read_bytes()) == whole
     assert "nothing to do" in run(*arguments)[1]
 
@@ -157,7 +157,7 @@ def test_the_content_of_a_calibration_counts_and_not_its_name(run: Run, copy: Pa
     assert "nothing to do" in run(*arguments, "--calibration", "d.json")[1]
     document["made_at"] = "2026-01-01T00:00:00+00:00"
     Path("d.json").write_text(json.dumps(document), encoding="utf-8")
-    assert "1 worked on" in run(*arguments, "--calibration", "d.json")[1]
+    assert "1 processed by this call" in run(*arguments, "--calibration", "d.json")[1]
 
 
 @pytest.mark.slow
@@ -284,10 +284,10 @@ def test_a_batch_that_was_stopped_goes_on(
     if blow is not signal.SIGKILL and long_batch.returncode != 0:
         assert long_batch.returncode == 1
         assert "Stopped by the user" in err
-        assert "goes on from there" in err
+        assert "repeat the command to process the others" in err
     code, out, _ = run("batch", "measure", f"{recordings}/*/good*.mkv", *ALONE, "--out", "out")
     assert code == 0
-    assert (f"{4 - len(kept)} worked on" if len(kept) < 4 else "nothing to do") in out
+    assert (f"{4 - len(kept)} processed by this call" if len(kept) < 4 else "nothing to do") in out
     assert {name: made(tmp_path / "out")[name] for name in kept} == kept
     assert not list((tmp_path / "out").glob(".*.part*"))
 

@@ -47,7 +47,7 @@ def test_every_frame_is_measured_and_a_cut_is_a_gap(
     assert min(late_s[-PROMPT_AMONG:]) == pytest.approx(min(late_s[:PROMPT_AMONG]), abs=4 * 0.04)
     longest_s = max(after["time_s"] - line["time_s"] for line, after in pairwise(lines))
     assert longest_s > CUT_S
-    assert "The source has returned" in view.text()
+    assert "The source is back" in view.text()
 
     (run,) = view.runs()
     table = (run / "gaps.csv").read_text()

@@ -158,7 +158,7 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
 
     page.locator("body").press("z")
     says(page, "Displayed gaps are reduced by")
-    off_mm = float(re.search(r"less ([\d.]+) mm", page.locator("#log li", has_text="less").inner_text())[1])
+    off_mm = float(re.search(r"reduced by ([\d.]+) mm", page.locator("#log li", has_text="reduced by").inner_text())[1])
     page.locator("#unzero").wait_for()
     page.locator("body").press("p")
     assert page.inner_text("#pause") == "Go on"
@@ -250,7 +250,7 @@ def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     # How soon is counted by the program, and not by a browser that waits for a busy machine.
     assert SILENT_S + STATE_EVERY_S < SAID_WITHIN_S
     camera.start()
-    says(page, "The source has returned")
+    says(page, "The source is back")
     shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
 
 

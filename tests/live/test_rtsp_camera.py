@@ -78,7 +78,7 @@ def test_an_rtsp_camera_keeps_its_clock_and_comes_back_after_a_cut(
     before = len(view.lines())
     time.sleep(CUT_S)
     rtsp_camera.start()
-    view.until(lambda seen: "The source has returned" in seen.text() and len(seen.lines()) > before + 25)
+    view.until(lambda seen: "The source is back" in seen.text() and len(seen.lines()) > before + 25)
     assert view.stop() == 0
 
     lines = view.lines()

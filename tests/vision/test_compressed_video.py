@@ -17,6 +17,8 @@ from tests.benchmarks.compressed_video import Shot, shots
 # Recordings a class; four pictures of each are measured. Two u hold 95 % of errors: of 16 pictures in four recordings,
 # whose errors go together in a recording, at least 12.
 CLIPS, LEAST_WITHIN = 4, 12
+# A codec bends the outline of a moving finger in one picture of fifty by more than any shape explains: it is refused.
+MOST_REFUSED = 1
 
 
 def measured(shot: Shot, frame: Frame) -> GapMeasurement:
@@ -28,12 +30,16 @@ def measured(shot: Shot, frame: Frame) -> GapMeasurement:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["h264-1-upright", "h264-4-upright"])
 def test_two_u_hold_the_errors_of_upright_fingers(name: str) -> None:
-    within = total = 0
+    within = refused = total = 0
     for shot in shots(name, CLIPS, 5):
-        found = measured(shot, shot.frame)
-        within += abs(found.gap_px - shot.gap_px) < 2.0 * np.hypot(found.u_gap_px, found.u_picture_px)
+        found = measure_frame(shot.frame, Settings(shot.below_px, Direction.UP, other_response=None))
         total += 1
+        if isinstance(found, GapMeasurement):
+            within += abs(found.gap_px - shot.gap_px) < 2.0 * np.hypot(found.u_gap_px, found.u_picture_px)
+        else:
+            refused += 1
     assert total == 4 * CLIPS
+    assert refused <= MOST_REFUSED
     assert within >= LEAST_WITHIN
 
 
