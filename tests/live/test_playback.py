@@ -97,6 +97,20 @@ def test_a_time_that_no_frame_has_is_not_taken_for_a_neighbours(recordings: dict
     assert number_in(found.pixels) == 40
 
 
+def test_a_picture_that_was_put_back_is_read_again(recordings: dict[str, Path], tmp_path: Path) -> None:
+    folder = tmp_path / "images"
+    shutil.copytree(recordings["images"], folder)
+    source = open_source(str(folder))
+    reader = FrameReader(lambda: iter(source), str(folder), are_files=True)
+    third = source.description.files[3]
+    third.rename(tmp_path / "away")
+    assert isinstance(reader.at(3, None), LostFrame)
+    (tmp_path / "away").rename(third)
+    found = reader.at(3, None)
+    assert isinstance(found, Frame)
+    assert number_in(found.pixels) == 3
+
+
 def test_a_range_has_the_numbers_of_the_whole() -> None:
     frames = [Frame(np.zeros((2, 2), np.uint8), index, index / 10) for index in range(10)]
     read: list[int] = []

@@ -26,10 +26,14 @@ class FrameReader:
         Function that starts reading the recording from its beginning.
     name : str
         Name of the recording.
+    are_files : bool
+        Whether every frame is a file of its own. A lost frame is then read again at each access, because a file that
+        was missing may be there again.
     """
 
-    def __init__(self, begin: Callable[[], Iterator[Item]], name: str) -> None:
+    def __init__(self, begin: Callable[[], Iterator[Item]], name: str, *, are_files: bool = False) -> None:
         self._begin = begin
+        self._are_files = are_files
         self._items = begin()
         self._following = 0
         self._kept: OrderedDict[int, Item] = OrderedDict()
@@ -78,6 +82,8 @@ class FrameReader:
         return None
 
     def _keep(self, item: Item) -> None:
+        if self._are_files and isinstance(item, LostFrame):
+            return
         self._kept[item.index] = item
         size = sum(each.pixels.nbytes for each in self._kept.values() if isinstance(each, Frame))
         while size > KEPT_BYTES and len(self._kept) > 1:

@@ -62,8 +62,13 @@ class Playback:
         self._identity = secrets.token_hex(4)
         marks = lost_frames(self.description.files)
         source = opened.source
-        self._reader = FrameReader(lambda: iter(marked(source, marks) if marks else source), opened.name)
+        self._reader = FrameReader(
+            lambda: iter(marked(source, marks) if marks else source),
+            opened.name,
+            are_files=self.description.kind == "images",
+        )
         self._shown: object = None
+        self._requests = 0
         self._stopped = False
         self._changed = Condition()
         self._thread = Thread(target=self._play, name="playing", daemon=True)
@@ -92,6 +97,7 @@ class Playback:
         with self._changed:
             self.is_playing = False
             self.frame = max(0, min(frame, self.frame_count - 1))
+            self._requests += 1  # the same frame is read again, because its file may have been put back
             self._changed.notify_all()
 
     def play(self, *, on: bool, speed: float) -> None:
@@ -251,7 +257,7 @@ class Playback:
                 self._follow_table()
                 self._advance()
                 frame, row = self.frame, self._row(self.frame)
-                wanted = (frame, row, self._generation, self.choices)
+                wanted = (frame, row, self._generation, self._requests, self.choices)
                 if self._shown == wanted:
                     self._changed.wait(LOOK_EVERY_S)
                     continue
