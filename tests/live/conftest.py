@@ -92,6 +92,8 @@ class NetworkCamera:
         while not is_listened_at(self.port):
             assert time.monotonic() < end_s, f"ffmpeg does not listen within {START_S} s"
             time.sleep(0.02)
+            if self.process.poll() is not None:  # another connection had this port for a moment, and ffmpeg gave up
+                self.process = subprocess.Popen(command)
 
     def stop(self) -> None:
         if self.process is not None:
