@@ -44,8 +44,9 @@ def level_halts(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: flo
     for k in np.flatnonzero(last - first > MORE_ROWS).tolist():
         begin, end = int(first[k]), int(last[k])
         # The stage may have had the first reading before the record began, and the last reading after the end.
-        before_s = float(np.median(taken_s[max(k - NEAR, 0) : k])) if k else 0.0
-        after_s = float(np.median(taken_s[k + 1 : k + 1 + NEAR])) if k + 1 < first.size else 0.0
+        # How long the reading of the last row lasted is unknown: at least one interval between rows is assumed.
+        before_s = max(float(np.median(taken_s[max(k - NEAR, 0) : k])), row_s) if k else 0.0
+        after_s = max(float(np.median(taken_s[k + 1 : k + 1 + NEAR])), row_s) if k + 1 < first.size else 0.0
         if taken_s[k] <= LONGER * (before_s + after_s) + MORE_ROWS * row_s:
             continue
         level_mm = float(reading_mm[begin])
