@@ -8,7 +8,7 @@ from fingervision.diagnosis.inference.hypothesis import Explanation
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.inference.verdict import standing_of
+from fingervision.diagnosis.inference.verdict import LACK_OF_FIT, standing_of
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.independent_values import independent_values
 
@@ -18,9 +18,8 @@ kept."""
 AS_MUCH = 2.0**0.5
 """Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
 power, because a richer formula also fits part of that structure."""
-BY_STRUCTURE = 1e-3
-"""Probability (p-value) above which an effect is dropped: the probability that remaining structure alone reduces the
-residual as much as this effect does. It equals `verdict.LACK_OF_FIT`."""
+BY_STRUCTURE = LACK_OF_FIT
+"""Probability above which remaining structure may be the reason that one more effect fits, and the effect is dropped."""
 
 
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:

@@ -233,8 +233,8 @@ def _findings(state: SearchState, forced: frozenset[str]) -> Findings:
 def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     """Choose the best explanation that contains every effect that the user requires.
 
-    The required effects are also added to the best explanation that was found without them, because an effect that is
-    much smaller than two other effects is in none of the pairs that fit.
+    The required effects are also added to the explanations that were found without them, because an effect that is much
+    smaller than two other effects is in none of the pairs that fit.
     """
     problem = state.problem
     able = forced & set(problem.effects)
@@ -243,8 +243,8 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     found = [*state.singles, *state.pairs, *state.triples]
     holding = [explanation for explanation in found if able <= set(explanation.names)]
     required = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able}
-    # Explanations that are equally good without the required effects are not so beside them, or it is chance which is
-    # the best of them.
+    # The required effects are added to every explanation that the data do not distinguish from the best; if they were
+    # added to the best only, rounding errors would choose among explanations that are equal.
     bases = _indistinguishable(state)[0] if state.best.names else [state.best]
     begins = [required | dict(base.values) for base in bases]
     together = [fit(problem, tuple(begin), begin, iterations=20) for begin in begins]
@@ -261,7 +261,7 @@ def _indistinguishable(state: SearchState) -> tuple[list[Explanation], dict[tupl
 def _with_required(
     state: SearchState, forced: frozenset[str]
 ) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
-    """Collect the same among the explanations that contain every effect that the user requires."""
+    """Collect the indistinguishable explanations among those that contain every effect that the user requires."""
     able = forced & set(state.problem.effects)
     pool = [peer for peer in state.peers if able <= set(peer.names)]
     return ambiguity_set(state.problem, state.best, state.nothing, pool, [])
