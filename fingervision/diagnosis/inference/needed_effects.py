@@ -19,7 +19,8 @@ AS_MUCH = 2.0**0.5
 """Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
 power, because a richer formula also fits part of that structure."""
 BY_STRUCTURE = LACK_OF_FIT
-"""Probability above which remaining structure may be the reason that one more effect fits, and the effect is dropped."""
+"""Probability (p-value) above which an effect is dropped: the probability that remaining structure alone reduces the
+residual as much as this effect does."""
 
 
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
