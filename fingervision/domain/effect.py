@@ -107,6 +107,14 @@ class History:
         steps = np.concatenate([np.diff(self.times[run]) for run in self.runs])
         return float(np.median(steps)) if steps.size else 1.0
 
+    def rate_of(self, signal: Array) -> Array:
+        """Rate of change of a signal within each run (its unit per second), shape (n,); 0 in a run of one sample."""
+        rates = np.zeros(signal.shape)
+        for run in self.runs:
+            if run.stop - run.start > 1:
+                rates[run] = np.gradient(signal[run], self.times[run])
+        return rates
+
     @cached_property
     def input_span_mm(self) -> float:
         """Difference between the largest and smallest recorded input (mm)."""

@@ -53,6 +53,9 @@ PAUSING = 0.02
 """Ratio of the number of pauses of a single row, within a motion by single steps, to the number of moving samples,
 above which the values were rounded: a motion at 0.98 steps per row pauses once in 50. Set points in equal steps pause
 at their ends only."""
+OTHER_SPEED = 0.25
+"""Change of an increment, in grid steps, beyond that due to unequal time steps, above which the speed changed: rounding
+changes an increment by a whole step or, between unequal time steps, by any part of it."""
 FEWEST_SINGLE = 3
 """Least number of single steps that distinguish an encoder from set points in round numbers."""
 
@@ -85,7 +88,7 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...], time_s: Array | None =
     sigma = min(_sigma_by_differences(input_mm, times, runs, order) for order in orders)
     step = _grid(input_mm)
     # Rounding that is finer than the noise needs no encoder step: it averages out with the noise.
-    if step < sigma or not _rounds(input_mm, runs, step):
+    if step < sigma or not _rounds(input_mm, times, runs, step):
         step = 0.0
     if step > 0.0:
         # Alternating rounding has large third differences, whereas a curved motion scatters about straight lines.
@@ -199,10 +202,11 @@ def _grid(input_mm: Array) -> float:
     return step if np.all(np.abs(steps / step - np.round(steps / step)) < 0.02) and lines.size else 0.0
 
 
-def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
+def _rounds(input_mm: Array, time_s: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
     """Whether a motion was rounded to a grid: it pauses on grid values, or its increments differ by single grid steps.
 
     At a little less than one step per row, nearly all rows advance by one step, and only pauses reveal the grid.
+    Increments that differ because rows are missing between them, at one speed, do not reveal a grid.
 
     Set points in round numbers lie on a grid as well, but advance in equal steps.
     """
@@ -210,8 +214,10 @@ def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
         return False
     fast, halting, paused, moved = 0, 0, 0, 0
     for run in runs:
-        moves = np.abs(np.diff(input_mm[run])) / step_mm
-        single = np.abs(np.abs(np.diff(input_mm[run], 2)) / step_mm - 1.0) < 0.1
+        taken, lasting = np.diff(input_mm[run]) / step_mm, np.diff(time_s[run])
+        moves = np.abs(taken)
+        faster = np.abs(taken[1:] - taken[:-1] * lasting[1:] / lasting[:-1]) > OTHER_SPEED
+        single = (np.abs(np.abs(np.diff(taken)) - 1.0) < 0.1) & faster
         several = moves[1:] > 1.5
         fast += int(np.sum(single & several))
         halting += int(np.sum(single & ~several))

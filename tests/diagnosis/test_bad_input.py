@@ -60,10 +60,29 @@ def test_play_seen_from_one_side_is_one_of_several_constants(tmp_path: Path, cyc
     assert any("cannot be distinguished from an offset" in note for note in report.notes)
 
 
-def test_nothing_hidden_and_one_visit_of_each_place_agrees(tmp_path: Path) -> None:
-    report = asked(tmp_path, stage("+", 1, play_mm=0.0))
-    assert report.verdict is Verdict.AGREES
+def test_one_visit_of_nine_places_agrees_only_if_its_noise_is_stated(tmp_path: Path) -> None:
+    table = stage("+", 1, play_mm=0.0)
+    report = asked(tmp_path, table)
+    assert report.verdict is Verdict.UNKNOWN
+    assert not report.effects
     assert report.pure_error_mm is None
+    assert "no position was read twice" in report.sentence
+    assert "state u_random_mm" in report.sentence
+    stated = asked(tmp_path, table | {"u_random_mm": np.full(TARGETS.size, NOISE_MM)})
+    assert stated.verdict is Verdict.AGREES
+
+
+def test_a_run_of_one_row_is_diagnosed_with_the_others(tmp_path: Path) -> None:
+    table = stage("+-", 3)
+    last = np.arange(table["input_mm"].size) == table["input_mm"].size - 1
+    report = asked(tmp_path, {"run": np.where(last, 2.0, 1.0)} | table)
+    assert "backlash" in singles(report)
+
+
+def test_without_times_the_effects_that_need_an_order_are_said_to_be_hidden(tmp_path: Path) -> None:
+    table = stage("+-", 3)
+    del table["time_s"]
+    assert any("the table has no times" in note for note in asked(tmp_path, table).notes)
 
 
 def test_times_in_whole_seconds_that_repeat_are_refused_and_others_are_used(tmp_path: Path) -> None:

@@ -144,7 +144,8 @@ def fit(
     # The prior of a start state is uniform between -1 and 1, with a variance of 1/3; this also holds for a start state
     # at a bound. The penalty is at most that of a free parameter; otherwise a play would be less probable than two
     # effects that imitate it.
-    prices = np.log1p(np.diag(found.normal)[~own] * START_VARIANCE)
+    # Rounding may leave a curvature that is zero slightly below zero.
+    prices = np.log1p(np.maximum(np.diag(found.normal)[~own], 0.0) * START_VARIANCE)
     return Explanation(
         names=order,
         values=squares.settings(found.x),

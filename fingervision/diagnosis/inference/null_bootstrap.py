@@ -108,6 +108,8 @@ def linear_thresholds(
         gains = gains * margin + 1.5 if mine.sum() > 1 else gains
         tail[name] = float(np.quantile(gains, OWN_QUANTILE))
         excess = np.maximum(excess, gains - tail[name])
+    if not tail:
+        return {}
     beyond = float(np.quantile(excess, QUANTILE))
     return {name: own + beyond for name, own in tail.items()}
 

@@ -109,8 +109,10 @@ def _widths(problem: Problem, explanation: Explanation, walk: _Coordinates, best
     covariance = np.diag(span**2)
     for _ in range(2):
         # Repeat the differences over the width found, because the prediction of a play is not smooth.
-        normal = _curvature(problem, explanation, walk, best, step) + np.diag(1.0 / span**2)
-        covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+        scaled = span[:, None] * _curvature(problem, explanation, walk, best, step) * span
+        # The width of the bounds is the prior; rounding may leave a curvature that is zero slightly below zero.
+        values, axes = np.linalg.eigh(scaled)
+        covariance = np.asarray((axes / (np.maximum(values, 0.0) + 1.0)) @ axes.T) * span[:, None] * span
         step = np.clip(np.sqrt(np.diag(covariance)), 1e-9 * span, 0.1 * span)
     # Parameters with jumps have no derivative: the walk starts with a width of a hundredth of the parameter.
     covariance[rugged] = 0.0

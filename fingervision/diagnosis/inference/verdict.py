@@ -26,6 +26,11 @@ MANY_ASIDE = 0.1
 """Largest share of rows that may be gross errors if the model agrees; a larger share must have a cause."""
 COMMON = 2.0
 """Mean of the runs' offsets, in standard errors from zero, above which it counts as a common constant."""
+FEWEST_ROWS = 20
+"""Least number of rows whose own scatter may count as noise without repeats: its relative uncertainty is then a sixth.
+Fewer rows cannot distinguish noise from an error of the model."""
+UNDECIDED = "The table cannot show whether simulation and measurement agree"
+"""Beginning of an *unknown* result that found no structure, but no noise either."""
 LACK_OF_FIT = 1e-3
 """Significance of the F ratio of lack of fit to pure error above which there is nothing to explain."""
 
@@ -53,6 +58,8 @@ class Standing:
         Share of the rows excluded as gross errors.
     left_out : tuple of int
         Rows that were not used.
+    noise_is_known : bool
+        Whether repeats, a stated uncertainty or enough rows determine the noise, or no digit differs.
     """
 
     before_mm: float
@@ -63,6 +70,7 @@ class Standing:
     rounding_mm: float = 0.0
     aside_share: float = 0.0
     left_out: tuple[int, ...] = ()
+    noise_is_known: bool = True
 
     @property
     def explained_share(self) -> float:
@@ -122,8 +130,8 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         most = [most_noise(part, history.input_mm, runs, digits) for part in parts]
         noises = [min(noise, limit or noise) for noise, limit in zip(noises, most, strict=True)]
     if data.table.u_random_mm is not None:
-        stated = TRUSTED * float(np.median(data.table.u_random_mm))
-        noises[0] = min(noises[0], stated or noises[0])
+        most_mm = TRUSTED * float(np.median(data.table.u_random_mm))
+        noises[0] = min(noises[0], most_mm or noises[0])
     error = np.hypot(problem.whitener.input_mm, problem.whitener.passing_mm)[~aside]
     gap2 = noises[0] ** 2 + float(np.mean(error**2)) if error.size else noises[0] ** 2
     noise = float(np.sqrt(0.25 * gap2 + noises[1] ** 2)) if both else float(np.sqrt(gap2))
@@ -137,10 +145,13 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
     errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
     degrees = None if errors is None else min(error.degrees for error in errors)
-    rounding_mm = 0.5 * resolution(data.table.gap_mm) if data.repeats is not None else 0.0
+    half_digit_mm = 0.5 * resolution(data.table.gap_mm)
+    rounding_mm = half_digit_mm if data.repeats is not None else 0.0
     kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
     left_out = tuple(np.flatnonzero(aside).tolist())
-    return Standing(rms(before_mm), rms(after_mm), noise, kept, degrees, rounding_mm, gross, left_out)
+    left_mm = rms(after_mm)
+    known = degrees is not None or data.table.u_random_mm is not None or kept >= FEWEST_ROWS or left_mm <= half_digit_mm
+    return Standing(rms(before_mm), left_mm, noise, kept, degrees, rounding_mm, gross, left_out, known)
 
 
 def isolated(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:
@@ -219,7 +230,16 @@ def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict
             "it",
         )
     if not named:
-        return (Verdict.AGREES, None) if stands.is_noise else (Verdict.UNKNOWN, remains)
+        if not stands.is_noise:
+            return Verdict.UNKNOWN, remains
+        if not stands.noise_is_known:
+            return (
+                Verdict.UNKNOWN,
+                f"{UNDECIDED}: no position was read twice, no u_random_mm is stated, and {stands.rows} rows are too "
+                f"few to distinguish noise from an error of the model; the difference is {1e3 * stands.after_mm:.3g} "
+                "um RMS. Read the positions again, or state u_random_mm",
+            )
+        return Verdict.AGREES, None
     if not stands.is_little:
         return Verdict.UNKNOWN, remains if found.left_over is None else f"{found.left_over}; {remains}"
     return (Verdict.NAMED if len(found.alternatives) < 2 else Verdict.AMBIGUOUS), None

@@ -14,6 +14,8 @@ each target, while cameras and data loggers record a motion at least every few s
 AT_REST_REVISITED_S = 1.0
 """Shortest time between readings at rest if rows return to exactly equal inputs: such inputs are set-points, not
 samples of a motion."""
+AT_REST_SHARE = 0.5
+"""Share of rows read at rest above which rows give no information on their neighbours' input."""
 REVISITED_SHARE = 0.5
 """Share of rows with an input that also occurs in another row, above which the record consists of set-points."""
 OVERSHOOT = 0.5
@@ -44,6 +46,13 @@ def readings_at_rest(table: MeasuredTable) -> Flags:
     for run in runs:
         out[run.start + 1 : run.stop] = np.diff(time_s[run]) >= apart
     return out
+
+
+def mostly_at_rest(table: MeasuredTable) -> bool:
+    """Whether most rows that follow another row of their run were read at rest."""
+    _, _, runs = recorded(table)
+    follows = np.delete(readings_at_rest(table), [run.start for run in runs])
+    return bool(follows.size and np.mean(follows) > AT_REST_SHARE)
 
 
 def recorded(table: MeasuredTable) -> tuple[Array, Array | None, tuple[slice, ...]]:

@@ -11,11 +11,11 @@ from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, 
 from fingervision.diagnosis.input.clock_nuisance import clock_columns
 from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest
+from fingervision.diagnosis.input.path import dwell_s, input_path, mostly_at_rest
 from fingervision.diagnosis.input.path import recorded as recorded_rows
-from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedInput
+from fingervision.diagnosis.input.recorded_input import RecordedInput
 from fingervision.diagnosis.input.row_screening import screened_rows
-from fingervision.diagnosis.noise.replicates import visits
+from fingervision.diagnosis.noise.replicates import FEWEST_DEGREES, repeats_in, visits
 from fingervision.domain.effect import REZEROED, Array, History
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
@@ -124,18 +124,27 @@ def _seen(table: MeasuredTable, chain: MeasuringChain) -> tuple[MeasuringChain, 
 
 
 def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
-    """Number the visits of each target, if most readings were taken at rest."""
-    if np.mean(readings_at_rest(table)) <= AT_REST_SHARE:
+    """Number the visits of each target, if most readings were taken at rest.
+
+    Runs of a few rows may have no other repeats than their first rows, whose side of approach is not known.
+    """
+    if not mostly_at_rest(table):
         return None
-    rows = np.arange(table.input_mm.size) if table.path is None else table.path.rows
     along_mm, _, along_runs = recorded_rows(table)
-    return visits(along_mm, along_runs, rows)
+    rows = np.arange(table.input_mm.size) if table.path is None else table.path.rows
+    sided = visits(along_mm, along_runs, rows)
+    return sided if repeats_in(sided, table.runs) >= FEWEST_DEGREES else visits(along_mm, along_runs, rows, first=True)
 
 
 def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str, ...]:
     notes = []
     if table.midline_mm is None:
         notes.append("only the gap was measured: effects that move both fingers together cannot be detected.")
+    if table.time_s is None:
+        notes.append(
+            "the table has no times: effects that depend on the order of the rows (backlash, friction, creep, delays, "
+            "drifts) cannot be detected; add a column time_s."
+        )
     if recorded.is_motion:
         notes.append(
             "the fluctuations of the input are also visible in the gap: they are real motion and were not smoothed."

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from fingervision.diagnosis.input.commands import is_commanded
-from fingervision.diagnosis.input.path import readings_at_rest, recorded
+from fingervision.diagnosis.input.path import mostly_at_rest, recorded
 from fingervision.diagnosis.noise.spectrum import LEAST_RUN
 from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.measured_table import MeasuredTable
@@ -22,8 +22,6 @@ STAYING = 0.2
 """Leverage below which neighbouring smoothed values have so many samples in common that their errors are equal."""
 STANDING_SHARE = 1e-3
 """Share of the input's range within which a stage counts as at rest."""
-AT_REST_SHARE = 0.5
-"""Share of rows read at rest above which rows give no information on their neighbours' input."""
 SURELY = 3.0
 """Standard errors by which the gap must follow the input's fluctuations before these count as motion."""
 
@@ -73,14 +71,14 @@ class RecordedInput:
     def of(cls, table: MeasuredTable, model: CorrectedModel) -> "RecordedInput":
         """Smooth the recorded input, unless it has commands or set-points, or the gap follows its fluctuations."""
         along_mm, time_s, runs = recorded(table)
-        if time_s is None or np.mean(readings_at_rest(table)) > AT_REST_SHARE:
+        if time_s is None or mostly_at_rest(table):
             return cls.exact(table)
         rows = np.arange(along_mm.size) if table.path is None else table.path.rows
         gap_of_input = model.base.respond(table.input_mm).gap_mm
         if is_commanded(table.input_mm, table.runs, gap_of_input, table.gap_mm):
             return cls.exact(table, commanded=True)
         snapped_mm = on_lines(along_mm, runs)
-        sigma, step = input_sigma(snapped_mm, runs)
+        sigma, step = input_sigma(snapped_mm, runs, time_s)
         if sigma == 0.0:
             return cls.exact(table)
         smooth, leverage = smoothed(snapped_mm, time_s, runs, sigma, step)

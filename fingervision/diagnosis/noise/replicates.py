@@ -66,7 +66,7 @@ class PureError:
         return self.trend_sigmas > TREND_SIGMAS
 
 
-def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> NDArray[np.intp]:
+def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp], *, first: bool = False) -> NDArray[np.intp]:
     """Number the combinations of position and side of approach that the stage visited.
 
     Parameters
@@ -77,6 +77,8 @@ def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> N
         Rows of the path in each run.
     rows : ndarray of int, shape (n,)
         Indices of the measured rows in the path.
+    first : bool
+        Whether the first rows of runs at one input count as visits from the same side, although the side is not known.
 
     Returns
     -------
@@ -98,8 +100,17 @@ def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> N
             side[i] = way or side[i - 1]
             seen = measured[i - 1] or (seen and not way)
             new[i] = way != 0.0 or not seen
-    label = 2 * place + (side > 0)
-    return np.where((side != 0) & new, label, -1)[rows]
+    label = np.where((side != 0) & new, 2 * place + (side > 0), -1)
+    if first:
+        begins = np.array([run.start for run in runs], dtype=np.intp)
+        label[begins] = 2 * int(place.max(initial=0)) + 2 + place[begins]
+    return label[rows]
+
+
+def repeats_in(label: NDArray[np.intp], runs: tuple[slice, ...]) -> int:
+    """Degrees of freedom that labelled visits have beside an offset of each run."""
+    counts = np.unique(label[label >= 0], return_counts=True)[1]
+    return int(np.sum(counts - 1)) - (len(runs) - 1)
 
 
 def pure_error(

@@ -41,7 +41,10 @@ be distinguished from a drift in a short run."""
 
 
 def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags]) -> _Likelihood:
-    """Subtract a straight line from each run, and evaluate the likelihood at every tabulated correlation."""
+    """Subtract a straight line from each run, and evaluate the likelihood at every tabulated correlation.
+
+    If all runs are too short for that, the noise is white, with the scatter about the runs' means.
+    """
     grid = CORRELATIONS
     cost = np.empty((len(residuals_mm), grid.size))
     spread = np.empty_like(cost)
@@ -67,7 +70,18 @@ def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[
             degrees[channel] = rows
             spread[channel, k] = np.sqrt(total / rows)
             cost[channel, k] = rows * np.log(max(total, 1e-300) / rows) + determinants
+        if all(np.sum(~out[run]) < FEWEST_SAMPLES for run in runs):
+            degrees[channel], spread[channel] = _about_means(residual, runs, out)
+            cost[channel] = np.where(grid > 0.0, np.inf, 0.0)
     return _Likelihood(grid, cost, spread, degrees)
+
+
+def _about_means(residual: Array, runs: tuple[slice, ...], out: Flags) -> tuple[int, float]:
+    """Degrees of freedom and standard deviation about each run's mean: runs of a few samples show nothing else."""
+    kept = [residual[run][~out[run]] for run in runs if not out[run].all()]
+    rest = np.concatenate([np.zeros(0), *(values - values.mean() for values in kept)])
+    degrees = max(1, rest.size - len(kept))
+    return degrees, float(np.sqrt(rest @ rest / degrees))
 
 
 def noise_of_short_runs(
@@ -119,7 +133,7 @@ def drawn_noises(
     weight = prior * np.exp(-0.5 * (cost - cost.min()))
     out = []
     for k in rng.choice(known.grid.size, count, p=weight / weight.sum()):
-        scales = known.spread_mm[:, k] * np.sqrt(known.rows / rng.chisquare(known.rows))
+        scales = np.maximum(known.spread_mm[:, k] * np.sqrt(known.rows / rng.chisquare(known.rows)), 1e-9)
         rho = max(float(known.grid[k]), 1e-3)
         out.append(tuple(Noise(1e-3 * scale, float(scale), rho) for scale in scales))
     return out

@@ -59,9 +59,7 @@ def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ..
 
 def _gap_speed(data: Observations) -> Array:
     """Speed (mm/s) of the predicted gap, shape (n,)."""
-    history = data.chain.history
-    gap_mm = data.chain.respond({}).gap_mm
-    return np.concatenate([np.gradient(gap_mm[run], history.times[run]) for run in history.runs])
+    return data.chain.history.rate_of(data.chain.respond({}).gap_mm)
 
 
 def _late_s(place: Place, data: Observations, gap_mm_s: Array) -> float | None:
@@ -70,7 +68,7 @@ def _late_s(place: Place, data: Observations, gap_mm_s: Array) -> float | None:
         return None
     history = data.chain.history
     input_mm = history.input_mm
-    speed = np.concatenate([np.gradient(input_mm[run], history.times[run]) for run in history.runs])
+    speed = history.rate_of(input_mm)
     moves = WAYS[place.variable] * speed > STILL * np.max(np.abs(speed))
     inside = moves & (input_mm >= place.start) & (input_mm <= place.end)
     typical = float(np.median(gap_mm_s[inside])) if inside.any() else 0.0

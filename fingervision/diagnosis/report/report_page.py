@@ -8,6 +8,7 @@ import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
 from fingervision.diagnosis.diagnose import Diagnosis
+from fingervision.diagnosis.inference.verdict import UNDECIDED
 from fingervision.diagnosis.report.chart_data import charts_of
 from fingervision.diagnosis.report.effect_figure import effect_figure
 from fingervision.diagnosis.report.gap_curves import GapCurves, gap_curves
@@ -114,7 +115,9 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement
     positioning = positioning_html(diagnosis.positioning)
     if positioning is not None:
         sections.insert(7, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))
-    return page(f"fingervision: {report.verdict}", HEADINGS[report.verdict], report.sentence, sections, charts)
+    undecided = report.sentence.startswith(UNDECIDED)
+    heading = "The table does not show its own noise" if undecided else HEADINGS[report.verdict]
+    return page(f"fingervision: {report.verdict}", heading, report.sentence, sections, charts)
 
 
 def _picture(png: bytes, words: str) -> str:

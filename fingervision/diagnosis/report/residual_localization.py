@@ -77,7 +77,7 @@ def _axes(history: History, aside: Flags) -> list[Axis]:
     n = history.input_mm.size
     variables: list[tuple[str, str, Array, Flags]] = [("input", "mm", history.input_mm, np.ones(n, dtype=bool))]
     if history.time_s is not None:
-        speed = np.concatenate([np.gradient(history.input_mm[run], history.times[run]) for run in history.runs])
+        speed = history.rate_of(history.input_mm)
         still = 0.05 * np.max(np.abs(speed))
         variables += [
             ("input, opening", "mm", history.input_mm, speed > still),

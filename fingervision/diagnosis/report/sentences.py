@@ -3,7 +3,7 @@
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.verdict import Standing
+from fingervision.diagnosis.inference.verdict import UNDECIDED, Standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.report.open_parameters import open_parameters
 from fingervision.domain.parameter import Estimate
@@ -69,6 +69,8 @@ def answer(
         names = "; ".join(" + ".join(names) for names in alternatives)
         which = f": {names}" if len(alternatives) <= FEW_NAMES else ""
         return f"These data cannot distinguish {len(alternatives)} explanations{which}. With the best fit, {fall}."
+    if unknown is not None and unknown.startswith(UNDECIDED):
+        return f"{unknown}."
     part = f" {what} explain{'s' if len(effects) == 1 else ''} a part; {fall}." if effects else ""
     return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
 
