@@ -109,11 +109,11 @@ def measured_rows(
     _check_uncertainties(column, kept, path)
     names = [run_cells[row] for row in kept.tolist()] if run_cells is not None else [""] * kept.size
     count = len(set(names))
-    if count > MOST_RUNS or (count == kept.size == on_path.size):
+    bound = f"at most {MOST_RUNS} runs" if count > MOST_RUNS else "several rows in a run"
+    if count > MOST_RUNS or count == kept.size == on_path.size:
         raise DataError(
-            f"{path} must have at most {MOST_RUNS} runs, and several rows in a run, but has {count} runs in "
-            f"{kept.size} rows: does the run column number the rows? Leave the run column out, or compare fewer runs "
-            "at once."
+            f"{path} must have {bound}, but has {count} runs in {kept.size} rows: does the run column number the rows? "
+            "Leave the run column out, or compare fewer runs at once."
         )
     time = column.get("time_s")
     if time is not None and run_cells is None and np.any(np.diff(time) < 0.0):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.diagnosis.input.turning_points import turning_points
 from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.measured_table import MeasuredTable
 
@@ -89,7 +90,12 @@ def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
 
 
 def input_path(
-    table: MeasuredTable, history: History, along_mm: Array, *, commanded: bool, overshoots: bool = False
+    table: MeasuredTable,
+    history: History,
+    along_mm: Array,
+    *,
+    commanded: bool,
+    overshoots: bool = False,
 ) -> InputPath | None:
     """Build the path on which effects with memory depend.
 
@@ -110,13 +116,25 @@ def input_path(
     -------
     InputPath or None
         None if the measured rows contain the whole path.
+
+    Notes
+    -----
+    A stage in motion turns beyond the rows beside its reversal (`turning_points`).
     """
     _, time_s, runs = recorded(table)
     if time_s is None:
         return None
     rows = np.arange(along_mm.size) if table.path is None else table.path.rows
     rest = readings_at_rest(table)
-    if table.path is None and not commanded and not rest.any():
+    turns = {}
+    if not commanded:
+        moving = [
+            p
+            for p in turning_points(along_mm, time_s, runs, history.input_sigma_mm)
+            if not rest[p.after : p.after + 2].any()
+        ]
+        turns = {point.after: point for point in moving}
+    if table.path is None and not commanded and not rest.any() and not turns:
         return None
     over = set(turning_readings(table).tolist()) if overshoots else set[int]()
     owner_of = np.full(along_mm.size, -1, dtype=np.intp)
@@ -150,6 +168,10 @@ def input_path(
             inputs.append(along_mm[i])
             times.append(time_s[i])
             owners.append(int(owner_of[i]))
+            if i in turns:
+                inputs.append(turns[i].input_mm)
+                times.append(turns[i].time_s)
+                owners.append(-1)
         path_runs.append(slice(begin, len(inputs)))
     along = replace(history, input_mm=np.array(inputs), time_s=np.array(times), runs=tuple(path_runs))
     found: NDArray[np.intp] = place[rows]
