@@ -11,11 +11,12 @@ from fingervision.domain.status import Status
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.common_clock import clock_of, refusal, sentence
 from fingervision.measuring.clock.common_clock import in_words as clock_in_words
-from fingervision.measuring.drive_jumps import within_jump
+from fingervision.measuring.drive_jumps import unseen_turns, within_jump
 from fingervision.measuring.frame_loop import Prepared
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.summary import summarise
 from fingervision.measuring.task import Task, in_words
+from fingervision.measuring.words import COVERAGE_FACTOR
 
 Clock = ClockOffset | NoClockOffset | None
 
@@ -35,19 +36,33 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
     description = how.description
     if isinstance(clock, ClockOffset):
         description = replace(description, notes=(*description.notes, sentence(clock), *clock.notes))
-    unknown = _within_jumps(task, series, clock)
-    if unknown:
-        description = replace(
-            description,
-            notes=(
-                *description.notes,
-                f"{unknown} frames lie within jumps of the drive's log, so that the position of the stage is unknown; "
-                "the input of these frames is empty.",
-            ),
-        )
+    description = replace(description, notes=(*description.notes, *_on_the_log(task, series, clock)))
     given_s = task.drive_offset_s if task.drive is not None else None
     settings = {**in_words(task, how.settings), **clock_in_words(clock, given_s)}
     return summarise(description, settings, task.scale, task.scale_file, series, complete=complete)
+
+
+def _on_the_log(task: Task, series: GapSeries, clock: Clock) -> list[str]:
+    """Sentences on frames whose input the drive's log does not show, or shows too small."""
+    notes = []
+    unknown = _within_jumps(task, series, clock)
+    if unknown:
+        notes.append(
+            f"{unknown} frames lie within jumps of the drive's log, so that the position of the stage is unknown; the "
+            "input of these frames is empty."
+        )
+    if task.drive is None or not series.gap_mm.size:
+        return notes
+    turned, missed_mm = unseen_turns(task.drive)
+    gap_per_input = float(np.ptp(series.gap_mm)) / max(float(np.ptp(task.drive.input_mm)), 1e-12)
+    # The error of the input is of interest once it moves the gap visibly.
+    if turned and gap_per_input * missed_mm > COVERAGE_FACTOR * float(np.median(series.u_random_mm)):
+        notes.append(
+            f"The stage turned {turned} times between two rows of the drive's log, up to {1e3 * missed_mm:.2g} um "
+            "beyond the line between them; the input of the frames is interpolated linearly and is too small there. "
+            "Log the drive at the camera's rate or faster."
+        )
+    return notes
 
 
 def _within_jumps(task: Task, series: GapSeries, clock: Clock) -> int:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.diagnosis.input.turning_points import turning_points
+from fingervision.stage_record.turning_points import turning_points
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 

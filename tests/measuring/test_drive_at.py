@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.measuring.drive_at import drive_at
-from fingervision.measuring.drive_jumps import within_jump
+from fingervision.measuring.drive_jumps import unseen_turns, within_jump
 
 # Rounding of a weighted mean of two doubles.
 ROUNDING = 1e-9
@@ -58,3 +58,13 @@ def test_a_ramp_between_corners_and_an_encoder_step_are_no_jumps() -> None:
     slow = np.round(np.arange(0.0, 40.0, 0.2) * 0.05 / 0.03) * 0.03
     encoder = DriveHistory(np.arange(slow.size) * 0.2, slow)
     assert all(drive_at(encoder, at) is not None for at in encoder.time_s[:-1] + 0.1)
+
+
+def test_turns_between_the_rows_of_a_log_are_counted_with_their_distance() -> None:
+    time_s = np.arange(0.0, 20.0, 0.1) + 0.03
+    strokes = 2.0 * np.abs((time_s / 4.0) % 1.0 * 2.0 - 1.0)
+    turned, missed_mm = unseen_turns(DriveHistory(time_s, strokes))
+    assert turned == 9
+    assert missed_mm == pytest.approx(0.042, abs=0.002)
+    corners = DriveHistory(np.arange(0.0, 20.0, 0.1), 2.0 * np.abs((np.arange(0.0, 20.0, 0.1) / 4.0) % 1.0 * 2.0 - 1.0))
+    assert unseen_turns(corners) == (0, 0.0)

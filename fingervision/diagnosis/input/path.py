@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.input.turning_points import turning_points
 from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.measured_table import MeasuredTable
+from fingervision.stage_record.turning_points import turning_points
 
 AT_REST_S = 5.0
 """Shortest time between rows that count as separate readings at rest: in ISO 230-2 a stage rests for some seconds at
