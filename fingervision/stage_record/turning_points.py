@@ -81,7 +81,8 @@ def turning_points(input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigm
 
 def _beyond(u: Array, t: Array, i: int, longest_s: float, sigma_mm: float) -> TurningPoint | None:
     """Find the turning point above the rows i and i + 1; None if the rows show none."""
-    if i < STENCIL - 1 or i + STENCIL >= u.size or t[i + 1] - t[i] > longest_s:
+    # Two equal rows are a short stop: a stage in motion is seldom at exactly the same place on both sides of a corner.
+    if i < STENCIL - 1 or i + STENCIL >= u.size or t[i + 1] - t[i] > longest_s or u[i] == u[i + 1]:
         return None
     before, after = slice(i - STENCIL + 1, i + 1), slice(i + 1, i + 1 + STENCIL)
     at = np.linspace(t[i], t[i + 1], FINE)[1:-1]

@@ -76,7 +76,7 @@ def refitted_search(
         Called with the share of the work that is done.
     """
     look = Look(rng, forced, progress)
-    state = look.again(data)
+    state = _at_the_rows(look.again(data), look)
     likelier = likelier_interpolation(state.data, state.found.problem, state.found.best)
     if likelier is not state.data:
         state = look.again(likelier)
@@ -88,19 +88,37 @@ def refitted_search(
     return _settled(_beside_drawing(state, look), rng)
 
 
+def _at_the_rows(state: Searched, look: Look) -> Searched:
+    """Search with a stage that turned at recorded rows instead of between them, if that clearly fits better."""
+    data = state.data.along_the_rows()
+    if data is state.data:
+        return state
+    found = state.found
+    tried = [found.best, *_with_memory(found)]
+    return look.again(data) if _refitted_score(found, data, tried) < found.best.score - LEAST_GAIN else state
+
+
 def _over_the_ends(state: Searched, look: Look) -> Searched:
     """Search along a path that includes overshoots; keep the result if an effect with memory then fits better."""
     data = state.data.with_overshoots()
     if data is state.data:
         return state
     found = state.found
-    with_memory = [name for name, effect in found.problem.effects.items() if effect.memory]
-    over = replace(found.problem, chain=data.chain)
-    tried = [e for e in found.singles if e.names[0] in with_memory]
+    tried = _with_memory(found)
     straight = min(e.score for e in [found.nothing, *tried])
-    refits = [fit(over, e.names, e.values, iterations=20).score for e in tried]
-    turned = min([over.nothing().score, *refits])
-    return look.again(data) if turned < straight - LEAST_GAIN else state
+    return look.again(data) if _refitted_score(found, data, tried) < straight - LEAST_GAIN else state
+
+
+def _with_memory(found: Findings) -> list[Explanation]:
+    """Explanations by a single effect with memory, which depend on where the stage turned."""
+    return [e for e in found.singles if found.problem.effects[e.names[0]].memory]
+
+
+def _refitted_score(found: Findings, data: Observations, tried: list[Explanation]) -> float:
+    """Best score of some explanations, and of no effect, along another path of the input."""
+    along = replace(found.problem, chain=data.chain)
+    refits = [fit(along, e.names, e.values, iterations=20).score for e in tried if e.names]
+    return min([along.nothing().score, *refits])
 
 
 def _common_offset(state: Searched, look: Look) -> Searched:

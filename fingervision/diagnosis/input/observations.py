@@ -202,6 +202,19 @@ class Observations:
         )
         return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
 
+    def along_the_rows(self) -> "Observations":
+        """Return the observations with a stage that turned at recorded rows; unchanged if the path has no other turn.
+
+        The path of the input then has no turning points between the rows.
+        """
+        along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
+        path = input_path(self.table, self.chain.history, along_mm, commanded=commanded, turns=False)
+        points = 0 if path is None else path.owner.size
+        before = self.chain.history.input_mm.size if self.chain.path is None else self.chain.path.owner.size
+        if before == (points or self.chain.history.input_mm.size):
+            return self
+        return replace(self, chain=replace(self.chain, path=path))
+
     def redrawn(self, problem: Problem, explanation: Explanation) -> "Observations":
         """Refit the drawing's uncertain dimensions for an explanation, and use them in all later predictions."""
         drawn = self.model.base

@@ -96,6 +96,7 @@ def input_path(
     *,
     commanded: bool,
     overshoots: bool = False,
+    turns: bool = True,
 ) -> InputPath | None:
     """Build the path on which effects with memory depend.
 
@@ -111,30 +112,22 @@ def input_path(
         Whether the input is a command that keeps its value until it jumps.
     overshoots : bool
         Whether the stage went beyond its targets where it reversed between two readings of the same target.
+    turns : bool
+        Whether a stage in motion turned beyond the rows beside its reversal (`turning_points`).
 
     Returns
     -------
     InputPath or None
         None if the measured rows contain the whole path.
-
-    Notes
-    -----
-    A stage in motion turns beyond the rows beside its reversal (`turning_points`).
     """
     _, time_s, runs = recorded(table)
     if time_s is None:
         return None
     rows = np.arange(along_mm.size) if table.path is None else table.path.rows
     rest = readings_at_rest(table)
-    turns = {}
-    if not commanded:
-        moving = [
-            p
-            for p in turning_points(along_mm, time_s, runs, history.input_sigma_mm)
-            if not rest[p.after : p.after + 2].any()
-        ]
-        turns = {point.after: point for point in moving}
-    if table.path is None and not commanded and not rest.any() and not turns:
+    found = turning_points(along_mm, time_s, runs, history.input_sigma_mm) if turns and not commanded else []
+    turned = {point.after: point for point in found if not rest[point.after : point.after + 2].any()}
+    if table.path is None and not commanded and not rest.any() and not turned:
         return None
     over = set(turning_readings(table).tolist()) if overshoots else set[int]()
     owner_of = np.full(along_mm.size, -1, dtype=np.intp)
@@ -168,14 +161,14 @@ def input_path(
             inputs.append(along_mm[i])
             times.append(time_s[i])
             owners.append(int(owner_of[i]))
-            if i in turns:
-                inputs.append(turns[i].input_mm)
-                times.append(turns[i].time_s)
+            if i in turned:
+                inputs.append(turned[i].input_mm)
+                times.append(turned[i].time_s)
                 owners.append(-1)
         path_runs.append(slice(begin, len(inputs)))
     along = replace(history, input_mm=np.array(inputs), time_s=np.array(times), runs=tuple(path_runs))
-    found: NDArray[np.intp] = place[rows]
-    return InputPath(along, found, np.array(owners, dtype=np.intp))
+    places: NDArray[np.intp] = place[rows]
+    return InputPath(along, places, np.array(owners, dtype=np.intp))
 
 
 def dwell_s(table: MeasuredTable) -> float:
