@@ -34,7 +34,7 @@ MOST_CHANNELS = 6
 # Largest number of background runs that are examined; a picture with more runs shows texture.
 MOST_RUNS = 4096
 
-_line = loop("channels_line")
+_lines = loop("channels_lines")
 _beside_lines = loop("channels_beside")
 _follow_chain = loop("channels_chain")
 _find_runs = loop("channels_runs")
@@ -119,12 +119,10 @@ def _is_same(channel: Channel, other: Channel) -> bool:
 
 def _straight(chain: Ints) -> Channel | None:
     """Fit straight lines to the two sides of a chain of runs; return None if the sides are not straight."""
-    row = chain[:, 0].astype(float)
-    fitted = [_line(row, chain[:, side].astype(float)) for side in (1, 2)]
-    if any(share < ON_LINE_SHARE or abs(m) > STEEPEST for _, m, share in fitted):
+    left_c, left_m, left_share, right_c, right_m, right_share, first_row, last_row = _lines(chain)
+    if min(left_share, right_share) < ON_LINE_SHARE or max(abs(left_m), abs(right_m)) > STEEPEST:
         return None
-    (left_c, left_m, _), (right_c, right_m, _) = fitted
-    return Channel(left_c, left_m, right_c, right_m, int(chain[:, 0].min()), int(chain[:, 0].max()), len(chain))
+    return Channel(left_c, left_m, right_c, right_m, first_row, last_row, len(chain))
 
 
 def _beside(upright: Mask, channel: Channel) -> tuple[Build, Build]:

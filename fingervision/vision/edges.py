@@ -174,7 +174,7 @@ def _fit(
                 noise,
                 top_level,
             )
-            for k, filled in enumerate(np.count_nonzero(lines.weight[:, :INNER], axis=1).tolist())
+            for k, filled in enumerate([int(np.count_nonzero(weight[:INNER])) for weight in lines.weight])
         )
         marks = (left, right)
     is_clipped = np.empty(len(position), dtype=np.bool_)

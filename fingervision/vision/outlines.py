@@ -1,7 +1,7 @@
 """Outlines of all objects in a binary picture, to the nearest pixel, in the fingers' axes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -34,6 +34,13 @@ class Outlines:
 
     points: Outline
     starts: NDArray[np.int64]
+    third_length: int = field(init=False)
+    """Number of points of the third longest outline; 0 if there are fewer outlines."""
+
+    def __post_init__(self) -> None:
+        lengths = self.lengths
+        third = int(np.partition(lengths, -3)[-3]) if len(lengths) > 2 else 0
+        object.__setattr__(self, "third_length", third)
 
     def __len__(self) -> int:
         return len(self.starts) - 1

@@ -33,7 +33,7 @@ from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import LEAST_SURE_PX, TOO_ROUGH, measure_gap
-from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.grey import GreyImage, full_scale, to_grey, top_level
 from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
@@ -250,7 +250,7 @@ def _edges_and_gap(
     upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: _Scale, light_gap: bool, coded: _Coded
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
     """Fit the edges of a pair of fingers, and derive the result."""
-    top, levels = scale.top, int(np.iinfo(upright.dtype).max) + 1
+    top, levels = scale.top, full_scale(upright) + 1
     light = _light(settings.response, top, levels, scale.highest)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
     edges, apart_px = fit_edges(upright, lines, light, top), 0.0

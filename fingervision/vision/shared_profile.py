@@ -6,6 +6,7 @@ about as large as the visible components. A displacement adds a profile that is 
 that spread light equally to both sides, whatever the shape of the blur, add an antisymmetric (odd) profile only.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -105,7 +106,7 @@ def shared_shift_px(found: list[Flank]) -> float:
         All flanks of a picture that a codec has changed.
     """
     excess = [(_whole(flank) - flank.chance) / flank.gain**2 for flank in found]
-    return float(np.sqrt(max(float(np.mean(excess)), 0.0))) if excess else 0.0
+    return sqrt(max(mean(excess), 0.0)) if excess else 0.0
 
 
 def even_shift_px(found: list[Flank]) -> float:
@@ -118,13 +119,18 @@ def even_shift_px(found: list[Flank]) -> float:
     found : list of Flank
         All flanks of a picture that is not known to have been changed after it was taken.
     """
-    if not found or np.mean([_whole(flank) / flank.chance for flank in found]) < LEAST_WHOLE:
+    if not found or mean([_whole(flank) / flank.chance for flank in found]) < LEAST_WHOLE:
         return 0.0
     even = [_even(flank) for flank in found]
-    if np.mean([power / flank.chance for power, flank in zip(even, found, strict=True)]) < LEAST_EVEN:
+    if mean([power / flank.chance for power, flank in zip(even, found, strict=True)]) < LEAST_EVEN:
         return 0.0
     excess = [(power - flank.chance) / flank.gain**2 for power, flank in zip(even, found, strict=True)]
-    return float(np.sqrt(max(float(np.mean(excess)), 0.0)))
+    return sqrt(max(mean(excess), 0.0))
+
+
+def mean(values: list[float]) -> float:
+    """Arithmetic mean of a few numbers."""
+    return sum(values) / len(values)
 
 
 def _whole(flank: Flank) -> float:
