@@ -36,18 +36,15 @@ LOOP(binarise_histogram, "pj", "") {
         return;
     }
     if (grey->bytes == 1 && levels == 256) {
-        static const int PARTS = 8;
-        uint32_t count[8][256];
+        enum { PARTS = 8 };
+        uint32_t count[PARTS][256];
         memset(count, 0, sizeof count);
         for (int64_t row = 0; row < rows; row++) {
             const uint8_t *at = (const uint8_t *)grey->data + row * grey->stride[0];
             int64_t step = grey->stride[1], j = 0;
-            for (; step == 1 && j + 8 <= columns; j += 8) {
-                uint64_t eight;
-                memcpy(&eight, at + j, 8);
-                for (int part = 0; part < 8; part++) count[part][(eight >> 8 * part) & 255]++;
-            }
-            for (; j < columns; j++) count[j % 8][at[j * step]]++;
+            for (; step == 1 && j + PARTS <= columns; j += PARTS)
+                for (int part = 0; part < PARTS; part++) count[part][at[j + part]]++;
+            for (; j < columns; j++) count[j % PARTS][at[j * step]]++;
         }
         for (int part = 0; part < PARTS; part++)
             for (int level = 0; level < 256; level++) total[level] += count[part][level];

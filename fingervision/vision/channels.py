@@ -102,11 +102,8 @@ def find_channel(upright: Mask, below_tip_px: float) -> Channel | None:
 
 
 def _lies_on(chain: Ints, channel: Channel) -> bool:
-    row = chain[:, 0].mean()
-    return bool(
-        abs(chain[:, 1].mean() - channel.left(row)) <= SAME_LINE_PX
-        and abs(chain[:, 2].mean() - channel.right(row)) <= SAME_LINE_PX
-    )
+    row, left, right = chain.mean(axis=0).tolist()
+    return bool(abs(left - channel.left(row)) <= SAME_LINE_PX and abs(right - channel.right(row)) <= SAME_LINE_PX)
 
 
 def _is_same(channel: Channel, other: Channel) -> bool:

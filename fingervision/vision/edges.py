@@ -153,7 +153,7 @@ def _fit(
         look = filters.look(seen.reshape(-1, pixels), shared, blur, position)
         position = look.position
         if not is_last:
-            moved_px = float(np.abs(look.blur - blur).max())
+            moved_px = max(abs(new - old) for new, old in zip(look.blur.tolist(), blur.tolist(), strict=True))
             is_settled = passes >= BLUR_PASSES and (moved_px < SETTLED_PX or passes >= BLUR_PASSES + MORE_PASSES)
             blur = look.blur
         if facing is not None:
