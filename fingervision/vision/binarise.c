@@ -97,20 +97,29 @@ LOOP(binarise_split, "I", "idd") {
     out[2].d = contrast / larger(sqrt(0.5 * (variances[0] + variances[1])), 1e-3);
 }
 
-/* Levels of one row divided by their illumination, where equality becomes half of the scale; several pixels at a time. */
+/* Levels of one row divided by their illumination, where equality becomes half of the scale; several pixels at a time. The
+   illumination is the sum of the levels around each pixel, times `share`. */
 SIDE_BY_SIDE static void flatten_row(
-    const uint8_t *restrict level, const float *restrict light, uint8_t *restrict flat, int64_t columns
+    const uint8_t *restrict level, const int32_t *restrict sum, double share, uint8_t *restrict flat, int64_t columns
 ) {
     enum { AT_ONCE = 64 };
-    double under[AT_ONCE], ratio[AT_ONCE];
+    double light[AT_ONCE], ratio[AT_ONCE];
     for (int64_t first = 0; first < columns; first += AT_ONCE) {
         int64_t count = smaller_int(columns - first, AT_ONCE);
-        for (int64_t j = 0; j < count; j++) under[j] = (double)light[first + j];
-        for (int64_t j = 0; j < count; j++) under[j] = under[j] > 1.0 ? under[j] : 1.0;
-        for (int64_t j = 0; j < count; j++) ratio[j] = 128.0 * (double)level[first + j] / under[j];
+        for (int64_t j = 0; j < count; j++) light[j] = (double)(float)((double)sum[first + j] * share);
+        for (int64_t j = 0; j < count; j++) light[j] = light[j] > 1.0 ? light[j] : 1.0;
+        for (int64_t j = 0; j < count; j++) ratio[j] = 128.0 * (double)level[first + j] / light[j];
         for (int64_t j = 0; j < count; j++) ratio[j] = ratio[j] < 255.0 ? ratio[j] : 255.0;
         for (int64_t j = 0; j < count; j++) flat[first + j] = (uint8_t)(int32_t)ratio[j];
     }
+}
+
+/* Picture of 8 bits divided by its illumination: picture, sums of the levels around each pixel, inverse of their number;
+   result. */
+LOOP(binarise_flatten_sums, "BOdb", "") {
+    int64_t rows = in[0].shape[0], columns = in[0].shape[1];
+    for (int64_t row = 0; row < rows; row++)
+        flatten_row(FLAGS(0) + row * columns, POINTS(1) + row * columns, in[2].d, FLAGS(3) + row * columns, columns);
 }
 
 /* Picture divided by its illumination, where equality becomes half of the scale: picture, illumination (of the same size);
@@ -118,16 +127,10 @@ SIDE_BY_SIDE static void flatten_row(
 LOOP(binarise_flatten, "pSb", "") {
     const float *light = (const float *)in[1].data;
     int64_t rows = in[0].shape[0], columns = in[0].shape[1];
-    for (int64_t row = 0; row < rows; row++) {
-        if (in[0].bytes == 1 && in[0].stride[1] == 1) {
-            const uint8_t *level = (const uint8_t *)in[0].data + row * in[0].stride[0];
-            flatten_row(level, light + row * columns, FLAGS(2) + row * columns, columns);
-            continue;
-        }
+    for (int64_t row = 0; row < rows; row++)
         for (int64_t column = 0; column < columns; column++) {
             int64_t at = row * columns + column;
             double flat = 128.0 * (double)pixel(&in[0], row, column) / (double)(light[at] > 1.0f ? light[at] : 1.0f);
             FLAGS(2)[at] = (uint8_t)smaller(flat, 255.0);
         }
-    }
 }

@@ -20,7 +20,7 @@ from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
-from fingervision.vision.candidates import candidates, found, has_edges
+from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coding_error import (
     EVEN_SHIFTS,
     SHARED_SHIFTS,
@@ -202,10 +202,12 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
         return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
     are_edges: dict[Binary, bool] = {}
+    change: GreyImage | None = None
     for split, fingers, light_gap in candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
             if fingers.status is not Status.NO_FINGERS and split not in are_edges:
-                are_edges[split] = has_edges(denoised, split, binary.contrast)
+                change = local_change(denoised) if change is None else change
+                are_edges[split] = has_edges(change, split, binary.contrast)
             if fingers.status is not Status.NO_FINGERS and not are_edges[split]:
                 fingers = NoGap(
                     Status.NO_FINGERS, "The picture has only gradual transitions from light to dark, but no edge."
