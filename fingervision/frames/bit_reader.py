@@ -24,9 +24,8 @@ class BitReader:
 
     def golomb(self) -> int:
         """Read a number in Exp-Golomb code (ITU-T H.264, 9.1; `uvlc` of AV1)."""
-        zeros = 0
-        while not self.take(1):
-            zeros += 1
-            if zeros > MOST_ZEROS:
-                raise ValueError
-        return (1 << zeros) - 1 + self.take(zeros)
+        rest = self._bits & ((1 << self._left) - 1)
+        zeros = self._left - rest.bit_length()
+        if zeros > MOST_ZEROS:
+            raise ValueError
+        return self.take(2 * zeros + 1) - 1

@@ -158,8 +158,10 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
         if is_timeless and packet is not None:
             packet.pts = packet.dts = None
         if before is not None:
-            is_last = (packet is None or not packet.size) and not end
-            yield replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
+            if hole or end:
+                is_last = (packet is None or not packet.size) and not end
+                before = replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
+            yield before
         if packet is None:
             return
         if is_timeless and before is None:

@@ -159,6 +159,10 @@ class VideoFile:
             if self.description.coding is Coding.INTERFRAME:
                 # With threads for slices, FFmpeg's H.264 decoder neither replaces nor marks missing parts of a picture
                 # (libavcodec/h264_slice.c, enable_er), so that parts of older pictures would remain unnoticed.
+                # With threads for frames, the exported quantiser steps of some pictures are incomplete, differently in
+                # every run, because FFmpeg exports them before the last slice is decoded.
+                # With threads for frames, the exported quantiser steps of some pictures are incomplete, differently in
+                # every run, because FFmpeg exports them before the last slice is decoded.
                 stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
             tick_s = stream.time_base

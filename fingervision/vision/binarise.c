@@ -36,18 +36,15 @@ LOOP(binarise_histogram, "pj", "") {
         return;
     }
     if (grey->bytes == 1 && levels == 256) {
-        static const int PARTS = 8;
-        uint32_t count[8][256];
+        enum { PARTS = 8 };
+        uint32_t count[PARTS][256];
         memset(count, 0, sizeof count);
         for (int64_t row = 0; row < rows; row++) {
             const uint8_t *at = (const uint8_t *)grey->data + row * grey->stride[0];
             int64_t step = grey->stride[1], j = 0;
-            for (; step == 1 && j + 8 <= columns; j += 8) {
-                uint64_t eight;
-                memcpy(&eight, at + j, 8);
-                for (int part = 0; part < 8; part++) count[part][(eight >> 8 * part) & 255]++;
-            }
-            for (; j < columns; j++) count[j % 8][at[j * step]]++;
+            for (; step == 1 && j + PARTS <= columns; j += PARTS)
+                for (int part = 0; part < PARTS; part++) count[part][at[j + part]]++;
+            for (; j < columns; j++) count[j % PARTS][at[j * step]]++;
         }
         for (int part = 0; part < PARTS; part++)
             for (int level = 0; level < 256; level++) total[level] += count[part][level];
@@ -98,6 +95,31 @@ LOOP(binarise_split, "I", "idd") {
     double contrast = means[1] - means[0];
     out[1].d = contrast;
     out[2].d = contrast / larger(sqrt(0.5 * (variances[0] + variances[1])), 1e-3);
+}
+
+/* Levels of one row divided by their illumination, where equality becomes half of the scale; several pixels at a time. The
+   illumination is the sum of the levels around each pixel, times `share`. */
+SIDE_BY_SIDE static void flatten_row(
+    const uint8_t *restrict level, const int32_t *restrict sum, double share, uint8_t *restrict flat, int64_t columns
+) {
+    enum { AT_ONCE = 64 };
+    double light[AT_ONCE], ratio[AT_ONCE];
+    for (int64_t first = 0; first < columns; first += AT_ONCE) {
+        int64_t count = smaller_int(columns - first, AT_ONCE);
+        for (int64_t j = 0; j < count; j++) light[j] = (double)(float)((double)sum[first + j] * share);
+        for (int64_t j = 0; j < count; j++) light[j] = light[j] > 1.0 ? light[j] : 1.0;
+        for (int64_t j = 0; j < count; j++) ratio[j] = 128.0 * (double)level[first + j] / light[j];
+        for (int64_t j = 0; j < count; j++) ratio[j] = ratio[j] < 255.0 ? ratio[j] : 255.0;
+        for (int64_t j = 0; j < count; j++) flat[first + j] = (uint8_t)(int32_t)ratio[j];
+    }
+}
+
+/* Picture of 8 bits divided by its illumination: picture, sums of the levels around each pixel, inverse of their number;
+   result. */
+LOOP(binarise_flatten_sums, "BOdb", "") {
+    int64_t rows = in[0].shape[0], columns = in[0].shape[1];
+    for (int64_t row = 0; row < rows; row++)
+        flatten_row(FLAGS(0) + row * columns, POINTS(1) + row * columns, in[2].d, FLAGS(3) + row * columns, columns);
 }
 
 /* Picture divided by its illumination, where equality becomes half of the scale: picture, illumination (of the same size);

@@ -18,7 +18,7 @@ LARGE_PX = 1_000_000
 
 _count = loop("binarise_histogram")
 _otsu = loop("binarise_split")
-_flatten = loop("binarise_flatten")
+_flatten, _flatten_sums = loop("binarise_flatten"), loop("binarise_flatten_sums")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,9 +73,15 @@ def binarise_local(denoised: GreyImage) -> Binary:
     threshold.
     """
     side = max(denoised.shape) // 8
-    light = cv2.blur(denoised.astype(np.float32), (2 * side + 1, 2 * side + 1), borderType=cv2.BORDER_REPLICATE)
+    square = (2 * side + 1, 2 * side + 1)
     flat = np.empty(denoised.shape, dtype=np.uint8)
-    _flatten(denoised, light, flat)
+    if denoised.dtype == np.uint8 and 255 * square[0] * square[1] < np.iinfo(np.int32).max:
+        # Sums of whole numbers take half of the time, and give the same means.
+        sums = cv2.boxFilter(denoised, cv2.CV_32S, square, normalize=False, borderType=cv2.BORDER_REPLICATE)
+        _flatten_sums(np.ascontiguousarray(denoised), sums, 1.0 / (square[0] * square[1]), flat)
+    else:
+        light = cv2.blur(denoised.astype(np.float32), square, borderType=cv2.BORDER_REPLICATE)
+        _flatten(denoised, light, flat)
     return binarise(flat)
 
 

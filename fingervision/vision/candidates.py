@@ -101,11 +101,25 @@ def found(
     return CROSSED if isinstance(fingers, CoarseFingers) and is_crossed(mask, fingers, below) else fingers
 
 
-def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
-    """Whether the grey level changes steeply at the border of light and dark, as even the most blurred edge does."""
+def local_change(denoised: GreyImage) -> GreyImage:
+    """Range of the grey levels within `EDGE_REACH_PX` of each pixel."""
     square = np.ones((2 * EDGE_REACH_PX + 1, 2 * EDGE_REACH_PX + 1), dtype=np.uint8)
+    return cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square)  # type: ignore[return-value]
+
+
+def has_edges(change: GreyImage, split: Binary, contrast: float) -> bool:
+    """Whether the grey level changes steeply at the border of light and dark, as even the most blurred edge does.
+
+    Parameters
+    ----------
+    change : ndarray, shape (height, width)
+        Range of the grey levels around each pixel (`local_change`).
+    split : Binary
+        Light and dark pixels.
+    contrast : float
+        Difference of the mean grey levels of light and dark.
+    """
     border = np.asarray(cv2.morphologyEx(split.dark, cv2.MORPH_GRADIENT, np.ones((3, 3), dtype=np.uint8))) > 0
-    change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))
     least = EDGE_SHARE * contrast
     # The median exceeds `least` if more than half of the pixels do; counting takes a third of the time of a median.
     steep, pixels = int(np.count_nonzero((change > int(least)) & border)), int(np.count_nonzero(border))

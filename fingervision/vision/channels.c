@@ -1,19 +1,31 @@
 /* after median */
-/* Line v = c + m t, from slopes between points of the two halves of the rows (Theil and Sen), and the share of rows on the
-   line. */
-LOOP(channels_line, "FF", "ddd") {
-    const double *t = FLOATS(0), *v = FLOATS(1);
-    int64_t n = in[0].n, half = n / 2, on = 0;
+/* Line v = c + m t through one side of a chain of runs (row, left, right), from slopes between points of the two halves of the
+   rows (Theil and Sen), and the share of rows on the line. `order`: memory for `n` numbers. */
+static void line_of_side(const int64_t *chain, int64_t n, int side, double *order, double *c, double *m, double *share) {
+    int64_t half = n / 2, on = 0;
+    for (int64_t i = 0; i < half; i++) {
+        const int64_t *first = chain + 3 * i, *second = chain + 3 * (n - half + i);
+        order[i] = (double)(second[side] - first[side]) / larger((double)(second[0] - first[0]), 1.0);
+    }
+    *m = middle_in_place(order, half);
+    for (int64_t i = 0; i < n; i++) order[i] = (double)chain[3 * i + side] - *m * (double)chain[3 * i];
+    *c = middle_in_place(order, n);
+    for (int64_t i = 0; i < n; i++) on += fabs((double)chain[3 * i + side] - *c - *m * (double)chain[3 * i]) <= ON_LINE_PX;
+    *share = (double)on / (double)n;
+}
+
+/* Lines through both sides of a chain of runs (n, 3), each with its share of rows on the line, and first and last row. */
+LOOP(channels_lines, "I", "ddddddii") {
+    const int64_t *chain = INTS(0), n = in[0].shape[0];
     double *order = floats(n);
-    for (int64_t i = 0; i < half; i++) order[i] = (v[n - half + i] - v[i]) / larger(t[n - half + i] - t[i], 1.0);
-    double m = middle_in_place(order, half);
-    for (int64_t i = 0; i < n; i++) order[i] = v[i] - m * t[i];
-    double c = middle_in_place(order, n);
-    for (int64_t i = 0; i < n; i++) on += fabs(v[i] - c - m * t[i]) <= ON_LINE_PX;
-    out[0].d = c;
-    out[1].d = m;
-    out[2].d = (double)on / (double)n;
+    for (int side = 0; side < 2; side++)
+        line_of_side(chain, n, side + 1, order, &out[3 * side].d, &out[3 * side + 1].d, &out[3 * side + 2].d);
     free(order);
+    out[6].i = out[7].i = chain[0];
+    for (int64_t i = 1; i < n; i++) {
+        out[6].i = smaller_int(out[6].i, chain[3 * i]);
+        out[7].i = larger_int(out[7].i, chain[3 * i]);
+    }
 }
 
 /* Length of a run of set pixels in a row from a given pixel on; the run may begin one pixel to either side. */

@@ -34,7 +34,7 @@ MOST_CHANNELS = 6
 # Largest number of background runs that are examined; a picture with more runs shows texture.
 MOST_RUNS = 4096
 
-_line = loop("channels_line")
+_lines = loop("channels_lines")
 _beside_lines = loop("channels_beside")
 _follow_chain = loop("channels_chain")
 _find_runs = loop("channels_runs")
@@ -102,11 +102,8 @@ def find_channel(upright: Mask, below_tip_px: float) -> Channel | None:
 
 
 def _lies_on(chain: Ints, channel: Channel) -> bool:
-    row = chain[:, 0].mean()
-    return bool(
-        abs(chain[:, 1].mean() - channel.left(row)) <= SAME_LINE_PX
-        and abs(chain[:, 2].mean() - channel.right(row)) <= SAME_LINE_PX
-    )
+    row, left, right = chain.mean(axis=0).tolist()
+    return bool(abs(left - channel.left(row)) <= SAME_LINE_PX and abs(right - channel.right(row)) <= SAME_LINE_PX)
 
 
 def _is_same(channel: Channel, other: Channel) -> bool:
@@ -119,12 +116,10 @@ def _is_same(channel: Channel, other: Channel) -> bool:
 
 def _straight(chain: Ints) -> Channel | None:
     """Fit straight lines to the two sides of a chain of runs; return None if the sides are not straight."""
-    row = chain[:, 0].astype(float)
-    fitted = [_line(row, chain[:, side].astype(float)) for side in (1, 2)]
-    if any(share < ON_LINE_SHARE or abs(m) > STEEPEST for _, m, share in fitted):
+    left_c, left_m, left_share, right_c, right_m, right_share, first_row, last_row = _lines(chain)
+    if min(left_share, right_share) < ON_LINE_SHARE or max(abs(left_m), abs(right_m)) > STEEPEST:
         return None
-    (left_c, left_m, _), (right_c, right_m, _) = fitted
-    return Channel(left_c, left_m, right_c, right_m, int(chain[:, 0].min()), int(chain[:, 0].max()), len(chain))
+    return Channel(left_c, left_m, right_c, right_m, first_row, last_row, len(chain))
 
 
 def _beside(upright: Mask, channel: Channel) -> tuple[Build, Build]:

@@ -20,11 +20,14 @@ LOOP(edge_filters_look, "FFFIFFFFFFffffjj", "") {
     const double *slope = FLOATS(1), *weight = FLOATS(2), *blur = FLOATS(4), *start = FLOATS(5);
     const int64_t *blur_of_line = INTS(3);
     double *change = floats(2 * blurs), *count = change + blurs;
+    int64_t row = 0; /* neighbouring lines often have the same slope, and hence the same filters */
+    double row_sigma = -1.0;
     for (int64_t k = 0; k < 2 * blurs; k++) change[k] = 0.0;
     for (int64_t i = 0; i < lines; i++) {
         double own = blur[blur_of_line[i]], steep = square(slope[i]), stretch = 1.0 + steep;
         double sigma = sqrt(own * own * stretch + steep * PIXEL_VARIANCE);
-        int64_t row = filter_row(sigma, in[6].shape[0]), column = filter_column(start[i]), at = (row * offsets + column) * pixels;
+        if (sigma != row_sigma) row = filter_row(row_sigma = sigma, in[6].shape[0]);
+        int64_t column = filter_column(start[i]), at = (row * offsets + column) * pixels;
         const double *by_contrast = FLOATS(6) + at, *by_shift = FLOATS(7) + at, *by_blur = FLOATS(8) + at;
         const double *level = FLOATS(0) + i * pixels;
         int64_t seen = weight[i] > 0.0 ? pixels : 0; /* an entry without a line is not changed */

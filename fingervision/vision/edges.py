@@ -153,7 +153,7 @@ def _fit(
         look = filters.look(seen.reshape(-1, pixels), shared, blur, position)
         position = look.position
         if not is_last:
-            moved_px = float(np.abs(look.blur - blur).max())
+            moved_px = max(abs(new - old) for new, old in zip(look.blur.tolist(), blur.tolist(), strict=True))
             is_settled = passes >= BLUR_PASSES and (moved_px < SETTLED_PX or passes >= BLUR_PASSES + MORE_PASSES)
             blur = look.blur
         if facing is not None:
@@ -174,7 +174,7 @@ def _fit(
                 noise,
                 top_level,
             )
-            for k, filled in enumerate(np.count_nonzero(lines.weight[:, :INNER], axis=1).tolist())
+            for k, filled in enumerate([int(np.count_nonzero(weight[:INNER])) for weight in lines.weight])
         )
         marks = (left, right)
     is_clipped = np.empty(len(position), dtype=np.bool_)

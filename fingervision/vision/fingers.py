@@ -176,7 +176,7 @@ def _best_pair(
 
 def _has_company(own: Outline, outlines: Outlines) -> bool:
     """Whether other objects of similar size are in view, as the letters of a text are."""
-    return bool(np.count_nonzero(outlines.lengths > COMPANY_SHARE * len(own)) > 2)
+    return outlines.third_length > COMPANY_SHARE * len(own)
 
 
 def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:

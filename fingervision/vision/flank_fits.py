@@ -20,6 +20,9 @@ HOPELESS_TIMES = 2.0
 # a fitted step.
 OWN_BLUR = 0.55
 RIVALS = (WALL, SHADOW, GLARE)
+# Difference in chi-square above which one model is clearly better than another, in units of the residual per bin (odds
+# of e^8 to one).
+CLEARLY = 16.0
 
 
 class FlankFits:
@@ -52,6 +55,19 @@ class FlankFits:
         """Weighted sum of squared residuals of a model, over both flanks."""
         return sum(fit.squares for fit in self.of(kind))
 
+    def margin(self, kind: int) -> float:
+        """Difference in the sum of squares by which another model is clearly worse than this model."""
+        return CLEARLY * max(self.squares(kind) / self.bins, 1.0)
+
+    def explains(self, kind: int) -> bool:
+        """Whether a model explains both flanks; it is not fitted to the second flank if the first excludes it."""
+        left = 0.0
+        for k in self._worst_first():
+            left += self._fit(kind, k).squares
+            if not left < self.enough:
+                return False
+        return True
+
     def is_step(self) -> bool:
         """Whether a single step explains the profiles, because no other model is clearly better.
 
@@ -60,16 +76,19 @@ class FlankFits:
         if self._is_explained:
             return True
         step = self.squares(STEP)
-        worst_first = sorted(range(len(self._flanks)), key=lambda k: -self._fit(STEP, k).squares)
         for kind in RIVALS:
             left = 0.0
-            for k in worst_first:
+            for k in self._worst_first():
                 left += self._fit(kind, k).squares
                 if step < STEP_TIMES * left:
                     break
             else:
                 return False
         return True
+
+    def _worst_first(self) -> list[int]:
+        """Numbers of the flanks, that which a step explains worst first."""
+        return sorted(range(len(self._flanks)), key=lambda k: -self._fit(STEP, k).squares)
 
     def _fit(self, kind: int, k: int) -> ProfileFit:
         if kind != STEP and self._is_explained:

@@ -171,7 +171,8 @@ def measure_gap(
                     return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
                 covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
                 covariance[1, 1] += beyond
-                covariance += top_aside_variance(p, end) * np.outer((1.0, found.slope), (1.0, found.slope))
+                if top_aside := top_aside_variance(p, end):
+                    covariance += top_aside * np.outer((1.0, found.slope), (1.0, found.slope))
                 own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
             if own is None:
                 return NoGap(Status.NO_FINGERS, BROKEN_BY[coding])

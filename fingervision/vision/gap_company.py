@@ -6,11 +6,11 @@ a letter, and the picture contains other parts of the same size. Between two fin
 single region.
 """
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gap import NoGap
+from fingervision.domain.loops import loop
 from fingervision.domain.status import Status
 from fingervision.vision.coarse_fingers import CoarseFingers
 from fingervision.vision.way_between import inner_crossing
@@ -24,6 +24,9 @@ LETTERS = NoGap(
     "The object between the two supposed fingers is one of several objects of the same size, as in a text: give the "
     "region of the two fingers (--roi).",
 )
+
+
+_same_size = loop("gap_company_same_size")
 
 
 def has_company(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: float) -> bool:
@@ -43,10 +46,4 @@ def has_company(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: f
     x, y = (round(place) for place in fingers.orientation.to_pixels(0.5 * sum(across), height))
     if not (0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]):
         return False
-    _, labels, stats, _ = cv2.connectedComponentsWithStats((mask == 0).view(np.uint8), connectivity=4)
-    own = int(labels[y, x])
-    if own == 0:
-        return False
-    size = stats[1:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
-    ratio = size / size[own - 1]
-    return int(np.count_nonzero((ratio > 1.0 / SAME_SIZE) & (ratio < SAME_SIZE))) > FEWEST_OTHERS
+    return int(_same_size(np.ascontiguousarray(mask), x, y)) > FEWEST_OTHERS

@@ -35,7 +35,7 @@ def to_grey(pixels: Pixels) -> GreyImage:
 
 def full_scale(grey: GreyImage) -> int:
     """Largest level that the picture's type can hold."""
-    return int(np.iinfo(grey.dtype).max)
+    return (1 << 8 * grey.itemsize) - 1
 
 
 def top_level(grey: GreyImage, bits: int | None = None) -> int:

@@ -1,21 +1,29 @@
+/* Move the values below a limit (`with_equal`: also those equal to it) to the front of a[first .. past), and return the first
+   place behind them. The loop contains no branch that depends on the values. */
+static inline int64_t to_front(double *a, int64_t first, int64_t past, double limit, int with_equal) {
+    int64_t place = first;
+    for (int64_t i = first; i < past; i++) {
+        double own = a[i];
+        a[i] = a[place];
+        a[place] = own;
+        place += with_equal ? own <= limit : own < limit;
+    }
+    return place;
+}
+
 /* Upper median of a few values (Hoare's selection), which reorders the values. */
 static double middle_in_place(double *a, int64_t n) {
-    int64_t low = 0, high = n - 1, wanted = n / 2;
-    while (low < high) {
-        double pivot = a[(low + high) / 2];
-        int64_t i = low, j = high;
-        while (i <= j) {
-            while (a[i] < pivot) i++;
-            while (a[j] > pivot) j--;
-            if (i <= j) {
-                double kept = a[i];
-                a[i++] = a[j];
-                a[j--] = kept;
-            }
+    int64_t first = 0, past = n, wanted = n / 2;
+    while (past - first > 1) {
+        double pivot = a[(first + past) / 2];
+        int64_t below = to_front(a, first, past, pivot, 0);
+        if (wanted < below) {
+            past = below;
+            continue;
         }
-        if (wanted <= j) high = j;
-        else if (wanted >= i) low = i;
-        else break;
+        int64_t up_to = to_front(a, below, past, pivot, 1);
+        if (wanted < up_to || up_to == first) break; /* the latter for a value that is not a number */
+        first = up_to;
     }
     return n > 0 ? a[wanted] : 0.0;
 }

@@ -19,8 +19,10 @@ static inline void series(double a, double h, double own, double whole, double *
     /* Derivatives of the density divided by the density: Hermite polynomials, each computed from the two before. */
     double d1 = -a, d2 = -a * d1 - 1.0, d3 = -a * d2 - 2.0 * d1, d4 = -a * d3 - 3.0 * d2, d5 = -a * d4 - 4.0 * d3;
     double d6 = -a * d5 - 5.0 * d4;
-    *density = own * (1.0 + h * (d1 + h / 2.0 * (d2 + h / 3.0 * (d3 + h / 4.0 * (d4 + h / 5.0 * (d5 + h / 6.0 * d6))))));
-    *integral = whole + own * h * (1.0 + h / 2.0 * (d1 + h / 3.0 * (d2 + h / 4.0 * (d3 + h / 5.0 * (d4 + h / 6.0 * d5)))));
+    /* Products instead of quotients, which take several times as long; the terms are so small that the digits agree. */
+    double h2 = 0.5 * h, h3 = h * (1.0 / 3.0), h4 = 0.25 * h, h5 = h * 0.2, h6 = h * (1.0 / 6.0);
+    *density = own * (1.0 + h * (d1 + h2 * (d2 + h3 * (d3 + h4 * (d4 + h5 * (d5 + h6 * d6))))));
+    *integral = whole + own * h * (1.0 + h2 * (d1 + h3 * (d2 + h4 * (d3 + h5 * (d4 + h6 * d5)))));
 }
 
 /* Integral up to z, and density at z. Beyond nine sigma, both equal their limits (zero or one) to 1e-18. */

@@ -5,6 +5,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+# The constant 1 / (2 sqrt pi).
+ROOT = 0.5 / float(np.sqrt(np.pi))
+
 
 def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
     """Bias of an edge fitted along a slanted line on a curved outline, relative to the bias of the half-level.
@@ -15,5 +18,4 @@ def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
     2w); the half-level itself is moved by sigma^2 kappa / 2.
     """
     level = 0.5 / np.maximum(reach_sigmas, 2.5)
-    root = 0.5 / np.sqrt(np.pi)
-    return np.asarray(1.0 + slope**2 * (0.5 * root - level) / (root - level))
+    return np.asarray(1.0 + slope**2 * (0.5 * ROOT - level) / (ROOT - level))

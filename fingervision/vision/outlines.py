@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import cv2
 import numpy as np
@@ -30,10 +31,13 @@ class Outlines:
         Coordinates (x, y) of the points of all outlines.
     starts : ndarray of int64, shape (m + 1,)
         Index in `points` at which each outline starts; the last entry is the number of points.
+    third_length : int
+        Number of points of the third longest outline; 0 if there are fewer outlines.
     """
 
     points: Outline
     starts: NDArray[np.int64]
+    third_length: int
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -41,20 +45,15 @@ class Outlines:
     def __getitem__(self, number: int) -> Outline:
         return self.points[self.starts[number] : self.starts[number + 1]]
 
-    @property
-    def lengths(self) -> NDArray[np.int64]:
-        """Number of points of each outline, shape (m,)."""
-        return np.diff(self.starts)
-
 
 def find_outlines(mask: NDArray[np.uint8]) -> Outlines:
     """Outlines (x, y) of all objects in a mask, including holes, without specks."""
     found, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     long = [outline for outline in found if len(outline) > SHORTEST_OUTLINE_PX]
-    points = np.concatenate(long)[:, 0] if long else np.empty((0, 2))
-    starts = np.zeros(len(long) + 1, dtype=np.int64)
-    np.cumsum([len(outline) for outline in long], out=starts[1:])
-    return Outlines(np.ascontiguousarray(points, dtype=np.int32), starts)
+    points = np.concatenate(long)[:, 0] if long else np.empty((0, 2), dtype=np.int32)
+    lengths = [len(outline) for outline in long]
+    starts = np.array([0, *accumulate(lengths)], dtype=np.int64)
+    return Outlines(np.asarray(points, dtype=np.int32), starts, sorted(lengths)[-3] if len(long) > 2 else 0)
 
 
 def longest_first(outlines: Outlines, directions: Sequence[Direction]) -> list[tuple[Direction, int]]:

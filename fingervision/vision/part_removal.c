@@ -71,7 +71,7 @@ LOOP(part_removal_clear, "Pddddi", "") {
         for (int64_t x = larger_int(ends[0] + 1, 0); x < smaller_int(ends[1], columns); x++) *flag_at(&in[0], row, x) = 0;
         for (int side = 0; side < 2; side++) {
             int64_t at = ends[side], step = side ? 1 : -1, x = at;
-            while (x >= 0 && x < columns && *flag_at(&in[0], row, x)) x += step;
+            while (x >= 0 && x < columns && llabs(x - at) <= SLIVER_PX && *flag_at(&in[0], row, x)) x += step;
             if (llabs(x - at) > SLIVER_PX) continue;
             while (x != at) {
                 x -= step;

@@ -20,7 +20,7 @@ from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
-from fingervision.vision.candidates import candidates, found, has_edges
+from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coding_error import (
     EVEN_SHIFTS,
     SHARED_SHIFTS,
@@ -33,7 +33,7 @@ from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import LEAST_SURE_PX, TOO_ROUGH, measure_gap
-from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.grey import GreyImage, full_scale, to_grey, top_level
 from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
@@ -202,10 +202,12 @@ def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
         return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
     are_edges: dict[Binary, bool] = {}
+    change: GreyImage | None = None
     for split, fingers, light_gap in candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
             if fingers.status is not Status.NO_FINGERS and split not in are_edges:
-                are_edges[split] = has_edges(denoised, split, binary.contrast)
+                change = local_change(denoised) if change is None else change
+                are_edges[split] = has_edges(change, split, binary.contrast)
             if fingers.status is not Status.NO_FINGERS and not are_edges[split]:
                 fingers = NoGap(
                     Status.NO_FINGERS, "The picture has only gradual transitions from light to dark, but no edge."
@@ -250,7 +252,7 @@ def _edges_and_gap(
     upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: _Scale, light_gap: bool, coded: _Coded
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
     """Fit the edges of a pair of fingers, and derive the result."""
-    top, levels = scale.top, int(np.iinfo(upright.dtype).max) + 1
+    top, levels = scale.top, full_scale(upright) + 1
     light = _light(settings.response, top, levels, scale.highest)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
     edges, apart_px = fit_edges(upright, lines, light, top), 0.0

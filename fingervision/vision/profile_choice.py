@@ -50,9 +50,6 @@ UNEXPLAINED = 1.2
 # to the noise of the picture's flat parts, and squared blur of the flanks to that of the tips. Motion causes a ratio of
 # residuals below 2, and texture does not change the blur.
 NO_STEP, NO_EDGE = 3.0, 4.0
-# Difference in chi-square above which one model is clearly better than another, in units of the residual per bin (odds
-# of e^8 to one).
-CLEARLY = 16.0
 # Largest integral of the squared residual of a Gaussian step, in units of contrast^2 times blur, that symmetric optics
 # can cause: a disc of defocus causes at most 0.0017 (a box 0.0038). A larger residual means two steps, or a line
 # between them, even if it is symmetric.
@@ -125,20 +122,20 @@ def with_profile(
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
     profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
     fits = FlankFits(profiles)
-    bins, enough, steps = fits.bins, fits.enough, fits.of(STEP)
+    bins, steps, left = fits.bins, fits.of(STEP), fits.squares
     all_around = np.hypot(1.0, edges.lines.slope)
     is_step = fits.is_step()
     # A profile that symmetric optics of any shape explain (a disc of defocus, a halo) is neither shadow nor glare.
     is_lopsided = not is_step and not _is_symmetric(profiles, steps)
-    # Sum of squared residuals of each model over both flanks, and the difference by which a model is clearly worse.
-    left = np.array([fits.squares(kind) for kind in range(4)]) if not is_step else np.full(4, fits.squares(STEP))
-    margin = CLEARLY * np.maximum(left / bins, 1.0)
-    if is_lopsided:
-        shadow, glare = fits.of(SHADOW), fits.of(GLARE)
-        is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
-        if is_shadow and are_of_size(shadow, -1.0):
+    # Models are fitted where they are needed, because most of the time is spent in these fits.
+    may_be_shadow, may_be_glare = is_lopsided and fits.explains(SHADOW), not is_step and fits.explains(GLARE)
+    if may_be_shadow and left(SHADOW) + fits.margin(SHADOW) < min(left(WALL), left(GLARE)):
+        shadow = fits.of(SHADOW)
+        if are_of_size(shadow, -1.0):
             return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
-        if left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and are_of_size(glare, 1.0):
+    if is_lopsided and may_be_glare and left(GLARE) + fits.margin(GLARE) < left(WALL):
+        glare = fits.of(GLARE)
+        if are_of_size(glare, 1.0):
             moved = moved_edges(edges, glare, U_GLARE, all_around, "glare")
             return without_additions(upright, moved, light, GLARE, glare)
     # Lines along the picture's border do not cross a flank.
@@ -147,7 +144,7 @@ def with_profile(
         outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         wall = fits.of(WALL)
-        is_wall = not is_step and left[WALL] < enough and are_of_size(wall, -1.0)
+        is_wall = not is_step and fits.explains(WALL) and are_of_size(wall, -1.0)
         is_strip = [
             step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
             for step, fit, (profile, _, _) in zip(steps, wall, profiles, strict=True)
@@ -161,7 +158,7 @@ def with_profile(
                 best_fit(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
                 for seen, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
             ]
-            is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and are_of_size(wall, -1.0)
+            is_wall = sum(fit.squares for fit in wall) < left(STEP) - SIGNIFICANT and are_of_size(wall, -1.0)
         chosen = [beyond_wall(fit) for fit in wall] if is_outline else wall
         # There is a wall, so that the edge may be displaced by the fitted distance plus its uncertainty.
         farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
@@ -171,13 +168,14 @@ def with_profile(
         # The profile of a wall narrower than the blur does not determine its tone, so that only its width is used.
         is_narrow = any(fit.breadth < RESOLVED_BLURS * fit.blur for fit in wall)
         return unsure_edges(unsure if is_narrow else edges, farthest, "wall")
-    if is_lopsided and left[SHADOW] < enough:
+    if may_be_shadow:
         # A shadow, which the inner flanks cannot distinguish from a wall, is also visible on the outer side.
         beyond = np.array(
             [[best_fit(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
         )
-        both = left[:3] + beyond.sum(axis=0)
-        is_likelier = both[SHADOW] + margin[SHADOW] < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
+        both = np.array([left(kind) for kind in range(3)]) + beyond.sum(axis=0)
+        is_likelier = both[SHADOW] + fits.margin(SHADOW) < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
+        shadow = fits.of(SHADOW)
         if is_likelier and are_of_size(shadow, -1.0):
             return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
     widths = [best_fit(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
@@ -195,7 +193,7 @@ def with_profile(
     if min(wider) < -ONE_SIDED * min(step.blur for step in steps) ** 2 and max(wider) > ONE_SIDED * min(widths) ** 2:
         return unsure_edges(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
     if all(step.blur**2 > (1.0 + WIDER) * width**2 for step, width in zip(steps, widths, strict=True)):
-        walled = with_narrow_wall(edges, profiles, [p for p in outer if p], enough, is_outline, displaced_px)
+        walled = with_narrow_wall(edges, profiles, [p for p in outer if p], fits.enough, is_outline, displaced_px)
         if walled is not None:
             return walled
     flanks, tips = squared_blurs(edges)
@@ -204,15 +202,17 @@ def with_profile(
         widened *= is_surely_broader(edges, displaced_px)
     if np.any(widened):
         return unsure_edges(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
-    if is_step:
+    if not may_be_glare:
         return edges
-    wall, glare = fits.of(WALL), fits.of(GLARE)
-    if not is_lopsided and left[GLARE] < enough and are_of_size(glare, 1.0):
+    glare = fits.of(GLARE)
+    if not is_lopsided and are_of_size(glare, 1.0):
         if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of glare may be hidden by such optics
             return unsure_edges(edges, [abs(fit.position) for fit in glare], "glare")
         return edges
-    is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
-    if not is_lopsided or left[GLARE] > enough or not is_resolved or not are_of_size(glare, 1.0):
+    if not is_lopsided or not are_of_size(glare, 1.0):
+        return edges
+    wall = fits.of(WALL)
+    if not all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall):
         return edges
     # The bright line is glare on the finger, or a bevel around it; the outline lies between the two positions.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]

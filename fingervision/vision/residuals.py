@@ -122,8 +122,10 @@ def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint
     below_tip_px : float
         Distance of the measuring point below the tip.
     """
-    is_corner = (points.x > found.apex) & (points.y < found.tip + below_tip_px + SHAPE_REACH_PX)
-    is_aside = is_corner & (end.robust <= 0.0)
+    is_aside = end.robust <= 0.0
+    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER:
+        return 0.0
+    is_aside &= (points.x > found.apex) & (points.y < found.tip + below_tip_px + SHAPE_REACH_PX)
     if np.count_nonzero(is_aside) < FEWEST_OF_CORNER or end.parameters[INNER_R] < FILLET_SHARE * below_tip_px:
         return 0.0
     return float(np.max(np.abs(end.residual * points.u)[is_aside]))
@@ -135,10 +137,13 @@ def top_aside_variance(points: OutlinePoints, end: FingerEnd) -> float:
     The true top may lie anywhere between the fitted top and the farthest rejected point, as in `set_aside_variance`.
     The result is 0 if fewer than half of the points are rejected, or if there is no straight top between the corners.
     """
+    is_aside = end.robust <= 0.0
+    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER:
+        return 0.0
     inner = end.parameters[INNER_C] - end.parameters[INNER_R]
     outer = end.parameters[OUTER_C] + end.parameters[OUTER_R]
     is_top = ~points.is_row & (points.x > outer) & (points.x < inner)
-    is_aside = is_top & (end.robust <= 0.0)
+    is_aside &= is_top
     if np.count_nonzero(is_aside) <= max(MOST_REJECTED * np.count_nonzero(is_top), FEWEST_OF_CORNER - 1):
         return 0.0
     return float(2.0 / 3.0 * np.max(np.abs(end.residual * points.u)[is_aside]) ** 2)

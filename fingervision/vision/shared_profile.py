@@ -6,6 +6,7 @@ about as large as the visible components. A displacement adds a profile that is 
 that spread light equally to both sides, whatever the shape of the blur, add an antisymmetric (odd) profile only.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -17,11 +18,9 @@ from fingervision.vision.edges import EdgePoints
 from fingervision.vision.facing import facing_lines
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.line_levels import line_levels
-from fingervision.vision.profile_lines import INNER, ROWS
 
 Floats = NDArray[np.float64]
 
-FLANKS = (slice(0, INNER), slice(INNER, ROWS))
 # Least number of rows of a flank, and largest slope (change of the edge from row to row).
 FEWEST_ROWS, STEEPEST = 8, 0.3
 # Number of degrees of freedom of a window that the fit absorbs: level, contrast, position and blur; and without the
@@ -34,7 +33,7 @@ LEAST_WHOLE, LEAST_EVEN = 1.5, 2.45
 # Least share of a profile's power that the fit does not absorb; profiles with less are not used.
 LEAST_OWN = 1e-3
 
-_mean = loop("shared_profile_mean")
+_means = loop("shared_profile_means")
 
 
 class Flank(NamedTuple):
@@ -77,20 +76,18 @@ def flanks(upright: GreyImage, edges: EdgePoints, light: Floats) -> list[Flank]:
     if facing_lines(edges.lines, edges.reach_px) is not None:
         return []
     levels = line_levels(upright, edges.lines, light, edges.reach_px)
-    offset = (edges.position - edges.lines.coarse) * edges.lines.outward
-    filters, pixels = edge_filters(edges.reach_px), levels.shape[-1]
+    lines, filters, pixels = edges.lines, edge_filters(edges.reach_px), levels.shape[-1]
+    means, numbers = np.empty((2, 2, pixels)), np.empty((2, 2, 4))
+    seen = (edges.position, lines.coarse, lines.outward, edges.contrast, lines.weight, lines.slope, edges.blur_px)
+    _means(levels, *seen, means, numbers)
     found = []
-    for k in range(2):
-        sigma = float(edges.blur_px[k, 0])
-        for part in FLANKS:
-            mean = np.empty(pixels)
-            seen = (levels, offset, edges.contrast, edges.lines.weight, edges.lines.slope)
-            rows, square, place, contrast = _mean(*(a[k, part] for a in seen), sigma, mean)
+    for finger, sides, sigma in zip(means, numbers.tolist(), edges.blur_px[:, 0].tolist(), strict=True):
+        unit_gain = float(filters.shift_gain[filters.middle(sigma)])
+        for mean_profile, (rows, square, place, contrast) in zip(finger, sides, strict=True):
             if rows < FEWEST_ROWS or square <= 0.0:
                 continue
             chance = square * pixels / ((pixels - FITTED_BY_ROW) * rows)
-            gain = abs(contrast) * float(filters.shift_gain[filters.middle(sigma)])
-            found.append(Flank(mean, chance, place, sigma, max(gain, 1e-9)))
+            found.append(Flank(mean_profile, chance, place, sigma, max(abs(contrast) * unit_gain, 1e-9)))
     return found
 
 
@@ -105,7 +102,7 @@ def shared_shift_px(found: list[Flank]) -> float:
         All flanks of a picture that a codec has changed.
     """
     excess = [(_whole(flank) - flank.chance) / flank.gain**2 for flank in found]
-    return float(np.sqrt(max(float(np.mean(excess)), 0.0))) if excess else 0.0
+    return sqrt(max(mean(excess), 0.0)) if excess else 0.0
 
 
 def even_shift_px(found: list[Flank]) -> float:
@@ -118,13 +115,18 @@ def even_shift_px(found: list[Flank]) -> float:
     found : list of Flank
         All flanks of a picture that is not known to have been changed after it was taken.
     """
-    if not found or np.mean([_whole(flank) / flank.chance for flank in found]) < LEAST_WHOLE:
+    if not found or mean([_whole(flank) / flank.chance for flank in found]) < LEAST_WHOLE:
         return 0.0
     even = [_even(flank) for flank in found]
-    if np.mean([power / flank.chance for power, flank in zip(even, found, strict=True)]) < LEAST_EVEN:
+    if mean([power / flank.chance for power, flank in zip(even, found, strict=True)]) < LEAST_EVEN:
         return 0.0
     excess = [(power - flank.chance) / flank.gain**2 for power, flank in zip(even, found, strict=True)]
-    return float(np.sqrt(max(float(np.mean(excess)), 0.0)))
+    return sqrt(max(mean(excess), 0.0))
+
+
+def mean(values: list[float]) -> float:
+    """Arithmetic mean of a few numbers."""
+    return sum(values) / len(values)
 
 
 def _whole(flank: Flank) -> float:

@@ -49,13 +49,13 @@ def wall_limits_px(edges: EdgePoints, displaced_px: Displacement) -> list[float]
     list of float or None
         Largest displacement for the left and for the right finger (pixels).
     """
-    if are_outer_flanks_in_view(edges) or not np.any(edges.lines.weight[:, :INNER] > 0):
+    if are_outer_flanks_in_view(edges) or not (edges.lines.weight[:, :INNER] > 0).any():
         return None
     flanks, tips = squared_blurs(edges)
     more = flanks - tips
     is_both = more.sum() > BOTH_WIDER * tips.sum()
     is_one = more > WIDER * tips
-    if not (is_both or np.any(is_one)):
+    if not (is_both or is_one.any()):
         return None
     u_more = _u_excess(edges, displaced_px)
     if not (is_both and more.sum() > SURE * float(np.hypot(*u_more))) and not np.any(is_one & (more > SURE * u_more)):
@@ -78,7 +78,7 @@ def are_outer_flanks_in_view(edges: EdgePoints) -> bool:
     if not inner.size:
         return False
     is_in_view = is_real[:, INNER:ROWS] & (size[:, INNER:ROWS] > EDGE_SHARE * median(inner))
-    return int(np.count_nonzero(is_in_view, axis=1).min()) >= FEWEST_ROWS
+    return min(int(np.count_nonzero(rows)) for rows in is_in_view) >= FEWEST_ROWS
 
 
 def squared_blurs(edges: EdgePoints) -> tuple[Floats, Floats]:
