@@ -7,7 +7,7 @@ and the MPEG family up to MPEG-4 part 2; for other codecs it is unknown.
 import struct
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import av
 import numpy as np
@@ -29,10 +29,10 @@ H264_UNIT, H264_DOUBLES = 4.0, 6.0
 VP9_LOSSLESS, VP9_FIRST, VP9_GROWTH, VP9_GAIN, VP9_COUNT = 4.0, 8, 1.01975, 8.0, 256
 # ISO/IEC 14496-2, 7.4.4: coefficients are multiples of twice the quantiser, which is what FFmpeg states.
 # Factor by which the range of differences that a codec rounds to zero, relative to its step, exceeds that of H.264. The
-# MPEG family rounds differences below 1.25 steps to zero (H.263's quantiser), H.264 those below 0.6 to 0.8; VP9's range
-# is smaller, and a filter reduces the remaining errors. Measured with `python -m tests.benchmarks.compressed_video
-# --only mpeg4-1-upright vp9-1-upright`.
-MPEG_LEAVES, VP9_LEAVES = 2.0, 0.5
+# MPEG family rounds differences below 1.25 steps to zero (H.263's quantiser), H.264 those below 0.6 to 0.8, and VP9
+# about as H.264. Measured with `python -m tests.benchmarks.compressed_video --only mpeg4-1-upright vp9-1-upright
+# vp9-4-upright`.
+MPEG_LEAVES, VP9_LEAVES = 2.0, 1.0
 # Limits of the quantisation parameter in any codec with 8 to 14 bits; a damaged stream may have values beyond the
 # limits.
 LEAST_PARAMETER, MOST_PARAMETER = -128, 511
@@ -56,8 +56,23 @@ def _vp9_steps() -> NDArray[np.float64]:
 VP9_STEPS = _vp9_steps()
 
 
-def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
-    """Quantiser steps of a decoded picture, on the scale of H.264; None if its codec does not report them.
+class StatedSteps(NamedTuple):
+    """Quantiser steps of one picture, on the scale of H.264.
+
+    Parameters
+    ----------
+    quantiser : Quantiser
+        The steps.
+    kind : int
+        Kind of codec (a value of FFmpeg's AVVideoEncParamsType).
+    """
+
+    quantiser: Quantiser
+    kind: int
+
+
+def stated_steps(picture: av.VideoFrame) -> StatedSteps | None:
+    """Quantiser steps of a decoded picture; None if its codec does not report them.
 
     Parameters
     ----------
@@ -73,14 +88,14 @@ def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
     shape = (-(-picture.height // BLOCK_PX), -(-picture.width // BLOCK_PX))
     if kind == VP9 and not count:  # one step for the whole picture, unless it has segments
         step = VP9_LEAVES * VP9_STEPS[min(max(base, 0), VP9_COUNT - 1)]
-        return Quantiser(np.full(shape, step, dtype=np.float32))
+        return StatedSteps(Quantiser(np.full(shape, step, dtype=np.float32)), kind)
     if not count or kind not in (H264, MPEG):
         return None
     if size < BLOCK_BYTES or blocks_at + count * size > len(data):
         return None
     step = np.empty(shape, dtype=np.float32)
     _fill(data, blocks_at, size, count, base, _steps(kind, picture.format.components[0].bits), step)
-    return Quantiser(step)
+    return StatedSteps(Quantiser(step), kind)
 
 
 @cache
@@ -100,15 +115,22 @@ class StepTrail:
     preceding block (QP_Y,PRED in ITU-T H.264 (2021), 7.4.5). The preceding block is often flat background with a step
     up to four times finer. The content of a skipped block was coded in an earlier picture. The step of every block is
     therefore the largest step since the last key frame, reduced by a factor (`FADES`) for every later picture.
+
+    VP9 states one step for the whole picture, by which its encoder decides for every block whether the difference from
+    the copied block is coded; then no earlier step counts.
     """
 
     last: NDArray[np.float32] | None = None
 
     def of(self, picture: av.VideoFrame) -> Quantiser | None:
         """Quantiser steps of the next picture of the stream; None if its codec does not report them."""
-        found = quantiser_steps(picture)
-        if found is None or picture.key_frame or self.last is None or self.last.shape != found.step.shape:
-            self.last = None if found is None else found.step
+        stated = stated_steps(picture)
+        if stated is None:
+            self.last = None
+            return None
+        found, kind = stated
+        if kind == VP9 or picture.key_frame or self.last is None or self.last.shape != found.step.shape:
+            self.last = found.step
             return found
         self.last = np.maximum(found.step, np.float32(FADES) * self.last)
         return Quantiser(self.last)

@@ -15,7 +15,7 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
 from fingervision.inspection.blocks import BLOCKY, blockiness
-from fingervision.inspection.finding import GOOD_PX
+from fingervision.inspection.finding import GOOD_PX, MOSTLY_REFUSED, POOR_TIMES
 from fingervision.inspection.ground_shift import GroundShift, GroundTracker
 from fingervision.inspection.look import Look
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE
@@ -23,6 +23,7 @@ from fingervision.inspection.response_evidence import ResponseEvidence, response
 from fingervision.measuring.scale import Scale
 from fingervision.vision.binarise import binarise
 from fingervision.vision.denoise import denoise
+from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import SMEARED
 from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.pipeline import Settings, look_closely, measure_frame
@@ -64,6 +65,8 @@ class Sample:
         First refusal of each kind.
     refused_frame : Frame or None
         First picture without a measured gap.
+    refused_fingers : CoarseFingers or None
+        The fingers in this picture to the nearest pixel; None if none were found.
     counts : Counter of Status
         Number of frames with each status.
     track : ndarray, shape (n, 7)
@@ -83,6 +86,7 @@ class Sample:
     looks: tuple[Look, ...]
     refused: dict[Status, NoGap]
     refused_frame: Frame | None
+    refused_fingers: CoarseFingers | None
     counts: Counter[Status]
     track: Floats
     ground: GroundShift
@@ -105,14 +109,24 @@ class Sample:
     def fill(self) -> float:
         """Share of the picture's extent across the fingers that fingers and gap together occupy.
 
-        The share is 1 if fingers and gap extend beyond the picture.
+        The share is 1 if fingers and gap extend beyond the picture. If no frame was measured, the share is that of the
+        fingers found in the first unmeasured picture; it is 0 if none were found.
         """
+        seen = [look.fingers for look in self.looks]
+        if not seen and self.refused_fingers is not None:
+            seen = [self.refused_fingers]
         shares = [0.0]
-        for look in self.looks:
-            found = [finger.outline[:, 0] for finger in (look.fingers.left, look.fingers.right)]
+        for fingers in seen:
+            found = [finger.outline[:, 0] for finger in (fingers.left, fingers.right)]
             extent = max(float(x.max()) for x in found) - min(float(x.min()) for x in found)
-            shares.append(extent / look.fingers.orientation.across_size)
+            shares.append(extent / fingers.orientation.across_size)
         return max(shares)
+
+    @property
+    def is_lost_in_smallness(self) -> bool:
+        """Whether most pictures are unmeasured, and the fingers in them so small that this alone is a poor set-up."""
+        is_small = 0.0 < self.fill < FILLED / POOR_TIMES ** (2.0 / 3.0)
+        return is_small and self.counts[Status.NO_FINGERS] > MOSTLY_REFUSED * self.frames
 
     @property
     def good_px(self) -> float:
@@ -238,7 +252,20 @@ def take_sample(
         settings = replace(settings, response=settings.other_response, other_response=None)
         looks = _looks(kept, settings) or looks
     found = np.array(track, dtype=np.float64).reshape(-1, 7)
-    return Sample(description, settings, scale, looks, refused, refused_frame, counts, found, tracker.shift(), evidence)
+    fingers = None if refused_frame is None else look_closely(refused_frame, settings)[1]
+    return Sample(
+        description,
+        settings,
+        scale,
+        looks,
+        refused,
+        refused_frame,
+        fingers,
+        counts,
+        found,
+        tracker.shift(),
+        evidence,
+    )
 
 
 def _looks(frames: Iterable[Frame], settings: Settings) -> tuple[Look, ...]:

@@ -6,7 +6,7 @@ Only the module `pipeline` determines the order of the steps.
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import hypot, isnan, sqrt
+from math import isnan, sqrt
 
 import cv2
 import numpy as np
@@ -14,21 +14,13 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
 from fingervision.domain.errors import DataError
-from fingervision.domain.frame import Coding, Frame, Pixels
+from fingervision.domain.frame import Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change
-from fingervision.vision.coding_error import (
-    EVEN_SHIFTS,
-    SHARED_SHIFTS,
-    flanks_displaced_px,
-    outline_step,
-    with_coding_error,
-    with_shared_shift,
-)
+from fingervision.vision.coded_picture import CodedPicture, coded_picture
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
@@ -44,7 +36,6 @@ from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.settings import LINEAR, SRGB, Settings
-from fingervision.vision.shared_profile import even_shift_px, flanks, shared_shift_px
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
@@ -86,7 +77,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
         cv2.setNumThreads(1)
     keep_picture_memory()
     grey = _part(to_grey(frame.pixels), settings.region)
-    return _shifted(_attempt(grey, settings, _coded(frame, settings)).outcome, settings.region)
+    return _shifted(_attempt(grey, settings, coded_picture(frame, settings)).outcome, settings.region)
 
 
 def look_closely(
@@ -110,7 +101,7 @@ def look_closely(
     edges : EdgePoints or None
         Sub-pixel outlines of the fingers, in pixels of the measured region; None if not measured.
     """
-    attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, _coded(frame, settings))
+    attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, coded_picture(frame, settings))
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
@@ -131,7 +122,7 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     """
     grey = _part(to_grey(frame.pixels), settings.region)
     denoised = denoise(grey)
-    attempt = _attempt(grey, settings, _coded(frame, settings))
+    attempt = _attempt(grey, settings, coded_picture(frame, settings))
     own = Frame(in_eight_bits(grey), frame.index)
     outcome = attempt.outcome
     words = f"gap {outcome.gap_px:.3f} px" if isinstance(outcome, GapMeasurement) else outcome.words
@@ -152,22 +143,6 @@ def _part(grey: GreyImage, region: Region | None) -> GreyImage:
     return grey[rows, region.x_px : region.x_px + region.width_px]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Coded:
-    """Effects of a codec on the measured region of the picture."""
-
-    coding: Coding
-    quantiser: Quantiser | None
-
-
-def _coded(frame: Frame, settings: Settings) -> _Coded:
-    quantiser, region = frame.quantiser, settings.region
-    if quantiser is not None and region is not None:
-        quantiser = quantiser.seen_from(region.x_px, region.y_px)
-    # If the quantiser is known, the codec's contribution is computed from the quantiser instead of the kind of codec.
-    return _Coded(frame.coding if quantiser is None else Coding.LOSSLESS, quantiser)
-
-
 @dataclass(frozen=True, slots=True)
 class _Scale:
     """Full scale of the light, and the level at which the picture is clipped."""
@@ -186,7 +161,7 @@ class _Attempt:
     edges: EdgePoints | None = None
 
 
-def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
+def _attempt(grey: GreyImage, settings: Settings, coded: CodedPicture) -> _Attempt:
     if min(grey.shape) < SMALLEST_SIDE_PX:
         return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to contain two fingers."))
     top = _top_level(grey, settings)
@@ -228,12 +203,12 @@ def _measured(
     fingers: CoarseFingers,
     light_gap: bool,
     settings: Settings,
-    coded: _Coded,
+    coded: CodedPicture,
     scale: _Scale,
 ) -> _Attempt:
     """Measure a pair of fingers; if they are rough, measure longer flanks too, and keep the more certain result."""
     upright = fingers.orientation.view(grey)
-    how = (settings, scale, light_gap, coded)
+    how = (settings, scale, light_gap, coded.with_traces(grey))
     edges, outcome = _edges_and_gap(upright, fingers, *how)
     if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
         longer = _edges_and_gap(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
@@ -249,7 +224,7 @@ def _measured(
 
 
 def _edges_and_gap(
-    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: _Scale, light_gap: bool, coded: _Coded
+    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: _Scale, light_gap: bool, coded: CodedPicture
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
     """Fit the edges of a pair of fingers, and derive the result."""
     top, levels = scale.top, full_scale(upright) + 1
@@ -260,13 +235,7 @@ def _edges_and_gap(
         edges, apart_px = at_half_way(edges)
 
     def displaced_px(found: EdgePoints) -> tuple[float, float]:
-        if coded.quantiser is not None:
-            step = outline_step(found, fingers.orientation, coded.quantiser)
-            return flanks_displaced_px(found, step, light, top)
-        if coded.coding is Coding.LOSSLESS:
-            return 0.0, 0.0
-        alike_px = SHARED_SHIFTS[coded.coding] * shared_shift_px(flanks(upright, found, light))
-        return alike_px, alike_px
+        return coded.flanks_displaced_px(upright, found, fingers.orientation, light, top)
 
     with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
         edges = with_profile(upright, edges, light, top, settings.is_outline, displaced_px)
@@ -275,14 +244,7 @@ def _edges_and_gap(
     edges = with_stripes(upright, edges, light)
     outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
-        if coded.quantiser is not None:
-            step = outline_step(edges, fingers.orientation, coded.quantiser)
-            outcome = with_coding_error(outcome, step, edges.inside, light, top)
-        elif coded.coding is not Coding.LOSSLESS:
-            outcome = with_shared_shift(outcome, shared_shift_px(flanks(upright, edges, light)), coded.coding)
-        elif not edges.beside:  # a structure beside an edge has its own contribution
-            u_alike = sqrt(2.0) * EVEN_SHIFTS * even_shift_px(flanks(upright, edges, light))
-            outcome = replace(outcome, u_shift_px=hypot(outcome.u_shift_px, u_alike))
+        outcome = coded.less_sure(outcome, upright, edges, fingers.orientation, light, top)
     if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
     return edges, outcome
@@ -294,7 +256,7 @@ def _with_two_tones(
     denoised: GreyImage,
     light_gap: bool,
     settings: Settings,
-    coded: _Coded,
+    coded: CodedPicture,
     scale: _Scale,
 ) -> _Attempt:
     """Return the attempt, or a new attempt with another threshold if a shadow or pad was put into the wrong class."""

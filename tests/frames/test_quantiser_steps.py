@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Frame
 from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 from fingervision.frames import quantiser_steps
-from fingervision.frames.quantiser_steps import FADES, VP9_STEPS, StepTrail
+from fingervision.frames.quantiser_steps import FADES, H264, VP9, VP9_STEPS, StatedSteps, StepTrail
 from fingervision.frames.seeking import seeking
 from fingervision.frames.source import open_source
 
@@ -114,15 +114,26 @@ def test_the_coarsest_block_near_a_place_counts_and_a_part_keeps_its_places() ->
     assert whole.seen_from(16, 32).at(np.array([0.0, -1e6]), np.array([0.0, 0.0])) == 9.0
 
 
-def test_a_block_that_is_copied_keeps_the_step_that_coded_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A skipped block keeps the step of earlier pictures instead of its neighbour's; a key frame resets all steps."""
-    stated = iter([[16.0, 4.0], [2.0, 8.0], [2.0, 2.0], [1.0, 1.0]])
+STATED = [[16.0, 4.0], [2.0, 8.0], [2.0, 2.0], [1.0, 1.0]]
+KEPT = [[16.0, 4.0], [16.0 * FADES, 8.0], [16.0 * FADES**2, 8.0 * FADES], [1.0, 1.0]]
+
+
+@pytest.mark.parametrize(("kind", "expected"), [(H264, KEPT), (VP9, STATED)])
+def test_a_block_that_is_copied_keeps_the_step_that_coded_it(
+    monkeypatch: pytest.MonkeyPatch, kind: int, expected: list[list[float]]
+) -> None:
+    """A skipped block of H.264 keeps the step of earlier pictures instead of its neighbour's, until a key frame; VP9
+    decides by the picture's own step.
+    """
+    stated = iter(STATED)
     monkeypatch.setattr(
-        quantiser_steps, "quantiser_steps", lambda _: Quantiser(np.array([next(stated)], dtype=np.float32))
+        quantiser_steps,
+        "stated_steps",
+        lambda _: StatedSteps(Quantiser(np.array([next(stated)], dtype=np.float32)), kind),
     )
     trail, found = StepTrail(), []
     for is_key in (True, False, False, True):
         quantiser = trail.of(SimpleNamespace(key_frame=is_key))
         assert quantiser is not None
         found.append(quantiser.step[0])
-    assert np.allclose(found, [[16.0, 4.0], [16.0 * FADES, 8.0], [16.0 * FADES**2, 8.0 * FADES], [1.0, 1.0]])
+    assert np.allclose(found, expected)

@@ -68,6 +68,11 @@ def test_good_benches_have_nothing_to_mend() -> None:
         assert not [finding.name for finding in doubts(findings) if finding.name != "gamma"]
 
 
+def test_light_that_is_strongest_in_the_middle_of_the_gap_is_named_before_its_marks() -> None:
+    findings, _, _ = inspected(Bench(ground=0.55, bright=0.45, bright_px=40.0, gap_px=95.0), 3, rng())
+    assert to_mend(findings)[0].name == "light"
+
+
 @pytest.mark.slow
 def test_the_shake_is_measured_on_the_ground_and_on_the_fingers() -> None:
     for texture in (0.03, 0.0):

@@ -17,8 +17,8 @@ from tests.benchmarks.compressed_video import Shot, shots
 # Recordings a class; four pictures of each are measured. Two u hold 95 % of errors: of 16 pictures in four recordings,
 # whose errors go together in a recording, at least 12.
 CLIPS, LEAST_WITHIN = 4, 12
-# A codec may bend an outline by more than any shape explains, and the picture is refused: 13 of 2208 pictures of
-# `python -m tests.benchmarks.compressed_video --clips 12 --seed 740701`.
+# A codec may bend an outline by more than any shape explains, and the picture is refused: 9 of 2208 pictures of
+# `python -m tests.benchmarks.compressed_video --clips 12 --seed 760301`.
 MOST_REFUSED = 1
 
 
@@ -88,4 +88,7 @@ def test_a_region_and_a_turned_camera_see_the_same_quantiser(one: Shot) -> None:
 def test_where_the_stream_says_nothing_the_rows_own_residuals_do(one: Shot) -> None:
     unknown = measured(one, replace(one.frame, quantiser=None))
     assert unknown.u_coding_px > 0.0
-    assert measured(one, replace(one.frame, quantiser=None, coding=Coding.LOSSLESS)).u_coding_px == 0.0
+    saved_again = measured(one, replace(one.frame, quantiser=None, coding=Coding.LOSSLESS))
+    assert saved_again.u_coding_px > 0.0  # the noise that the codec has left differs from block to block
+    never_coded = next(shots("lossless-0-upright", 1, 6))
+    assert measured(never_coded, never_coded.frame).u_coding_px == 0.0

@@ -1,7 +1,7 @@
 """Focus: edges blurred by the optics have a larger uncertainty."""
 
 from fingervision.domain.status import Status
-from fingervision.inspection.finding import Finding, refusing, weighed, without
+from fingervision.inspection.finding import MOSTLY_REFUSED, Finding, Severity, refusing, weighed, without
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX
 from fingervision.inspection.sample import Sample
 
@@ -15,7 +15,7 @@ def find(sample: Sample) -> Finding | None:
     """Compare the blur of the edges, without motion blur, with that of a lens in focus."""
     blurred = (Status.BLURRED, Status.NO_FINGERS) if sample.is_lost_in_blur else (Status.BLURRED,)
     refused = None if sample.is_smeared else refusing(sample, "focus", blurred, REMEDY)
-    if refused is not None or not sample.looks:
+    if not sample.looks or (refused is not None and refused.share_refused > MOSTLY_REFUSED):
         return refused
     if sample.moves:
         words = (
@@ -28,4 +28,6 @@ def find(sample: Sample) -> Finding | None:
         for look in sample.looks
     )
     figure = f"The blur of the edges is {blur_px:.2f} px (standard deviation; {GOOD_BLUR_PX:g} px or less is sharp)."
-    return weighed(sample, "focus", cost_px, figure, REMEDY, FORMULA)
+    found = weighed(sample, "focus", cost_px, figure, REMEDY, FORMULA)
+    # The frames that were measured tell the cost, if it is one; otherwise the refused frames alone are the finding.
+    return refused if refused is not None and found.severity is Severity.GOOD else found

@@ -1,9 +1,12 @@
 """Scale: size of the fingers in the picture, and uncertainty of the conversion to millimetres."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from calib.measured_scale import Calibration
-from fingervision.inspection.finding import Finding, weighed, without
+from fingervision.domain.status import Status
+from fingervision.inspection.finding import Finding, refusing, weighed, without
 from fingervision.inspection.sample import FILLED, Sample
 
 CLOSER = (
@@ -18,6 +21,11 @@ FORMULA = (
 
 def find(sample: Sample) -> Finding | None:
     """Compare the scale with the best possible scale, and compute the uncertainty's part due to the calibration."""
+    # Below a certain size in the picture, the outlines have too few pixels to determine the tip and the edge.
+    refused = refusing(sample, "scale", (Status.NO_FINGERS,), CLOSER) if sample.is_lost_in_smallness else None
+    if refused is not None:
+        filled = f"fingers and gap fill only {100 * sample.fill:.0f} % of the picture across the fingers"
+        return replace(refused, figure=f"{refused.figure.rstrip('.')}; {filled}.")
     if not sample.looks:
         return None
     ratio = min(1.0, sample.fill / FILLED)

@@ -115,7 +115,8 @@ def tilt_deg(sample: Sample) -> float | None:
     distance_px = limits.camera_distance_mm * sample.scale.px_per_mm
     # Across the fingers, lengths in the picture of a tilted plane are proportional to 1 / z^2 (z: distance from the
     # camera), because nearer parts are magnified more and seen less obliquely.
-    sine = 0.5 * abs(middle) * distance_px / float(np.median(apart))
+    # As for the other findings, the part that noise explains is taken off.
+    sine = 0.5 * without(abs(middle), SIGMAS * u_middle) * distance_px / float(np.median(apart))
     return degrees(np.arcsin(sine)) if sine < np.sin(radians(LARGEST_DEG)) else None
 
 

@@ -17,8 +17,9 @@ REMEDY = (
 def find(sample: Sample) -> Finding | None:
     """Count the frames in which no fingers were found."""
     refused = refusing(sample, "view", WITHOUT_FINGERS, REMEDY)
-    # If outlines are lost in noise or blur, the findings "light" and "focus" report this.
-    is_told = sample.is_lost_in_blur or (not sample.looks and sample.is_lost_in_noise)
+    # If outlines are lost in noise or blur, or the fingers are too small, the findings "light", "focus" and "scale"
+    # report this.
+    is_told = sample.is_lost_in_blur or sample.is_lost_in_smallness or (not sample.looks and sample.is_lost_in_noise)
     if refused is not None and not is_told:
         return refused
     measured = f"{sample.counts[Status.OK]} of {sample.frames} frames show two fingers and were measured."
