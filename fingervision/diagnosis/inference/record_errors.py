@@ -1,6 +1,6 @@
 """Uncertainty of estimates from errors of the recorded input, by simulated repetition of the recording."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -56,7 +56,7 @@ def settled_with_records(
     """
     if data.turning is None or not explanation.names:
         best, found = settled(problem, explanation, rng)
-        return with_record_errors(problem, best, list(simulated_errors(data, rng))), found
+        return with_record_errors(problem, best, simulated_errors(data, rng)), found
     errors_mm = list(simulated_errors(data, rng))
     alone = _of_pictures(data, problem, explanation, errors_mm)
     best, found = settled(alone, fit(alone, explanation.names, explanation.values, iterations=MANY_STEPS), rng)
@@ -93,7 +93,7 @@ def _of_pictures(data: Observations, problem: Problem, explanation: Explanation,
 
 
 def with_record_errors(
-    problem: Problem, explanation: Explanation, errors_mm: list[Array], *, assumed_mm: Sequence[Array] = ()
+    problem: Problem, explanation: Explanation, errors_mm: Iterable[Array], *, assumed_mm: Sequence[Array] = ()
 ) -> Explanation:
     """Add the contribution of errors of the recorded input to the covariance of an explanation.
 
@@ -109,13 +109,13 @@ def with_record_errors(
     explanation : Explanation
         Explanation with its covariance. The covariance of a parameter is kept if the parameter is held constant, or if
         the prediction depends on it discontinuously.
-    errors_mm : list of ndarray of float, shape (n,)
+    errors_mm : iterable of ndarray of float, shape (n,)
         Errors of the smoothed input in simulated repetitions of the recording.
     assumed_mm : sequence of ndarray of float, shape (m,)
         Draws of the gap's errors that the likelihood assumes for the input, if the simulated ones are to replace them.
     """
     whitener = problem.whitener
-    if not explanation.names or not errors_mm or not (whitener.input_mm.any() or whitener.passing_mm.any()):
+    if not explanation.names or not (whitener.input_mm.any() or whitener.passing_mm.any()):
         return explanation
     listed = problem.parameters(explanation.names)
     columns = whitener.columns(derivatives(problem, explanation))[0]
@@ -132,6 +132,8 @@ def with_record_errors(
         whitener.one(truth - problem.chain.with_input(input_mm + error_mm).stacked(explanation.values))
         for error_mm in errors_mm
     ]
+    if not away:
+        return explanation
     found = np.array(away) @ estimate.T
     own = np.flatnonzero(smooth[[parameter.run is None for _, parameter in problem.parameters(explanation.names)]])
     covariance = explanation.covariance.copy()
