@@ -1,6 +1,7 @@
 """An encoder whose zero lies anywhere within a step, before a play: offset and play are found in spite of rounding."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.report import Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
-from tests.benchmarks.world.draw import draw_table
+from tests.benchmarks.world.draw import draw_table, drawn
+from tests.benchmarks.world.folder import write_tables
 
 SEED = 811
 """Seed of a development table: table 11 had the verdict `unknown` as long as rounding was treated as structure."""
@@ -32,9 +34,12 @@ def test_an_offset_within_half_a_step_is_told_beside_the_play(tmp_path: Path) ->
     assert hidden == {"input_offset", "backlash"}
     assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
     assert hidden in [set(names) for names in report.alternatives]
+    assert any("the encoder's own zero" in note for note in report.notes)
 
 
-STEP_MM, WIDTH_MM = 0.03, 1.5
+STEP_MM, WIDTH_MM, PLAY_MM = 0.03, 1.5, 0.05
+TABLES = 4
+"""Number of tables over which the error of a play is averaged."""
 
 
 def encoder_problem(folder: Path, play_mm: float, offset_mm: float = 0.0) -> Problem:
@@ -74,3 +79,19 @@ def test_what_only_follows_roundings_is_dropped(tmp_path: Path, offset_mm: float
     problem = encoder_problem(tmp_path, 0.1, offset_mm)
     begin = {"drive_lag": {"delay_s": 0.02}, "input_offset": {"offset_mm": 0.01}, "backlash": {"play_mm": 0.08}}
     assert without_roundings(problem, fit(problem, tuple(begin), begin)).names == left
+
+
+def test_the_rounding_of_a_reversal_does_not_widen_a_play(tmp_path: Path) -> None:
+    # A stage that slows down before it turns has several readings at each reversal rounded to one line of the encoder.
+    errors_mm: dict[bool, list[float]] = {True: [], False: []}
+    for index in range(TABLES):
+        write_tables(drawn("encoder_on_0um", SEED, index, 0), tmp_path)
+        data = prepare(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv"))
+        for uncertain, of_play in errors_mm.items():
+            seen = data if uncertain else replace(data, turning=None)
+            found = fit(problem_of(seen, None), ("backlash",), {"backlash": {"play_mm": PLAY_MM}})
+            found = fit(problem_of(seen, found), ("backlash",), found.values)
+            of_play.append(found.values["backlash"]["play_mm"] - PLAY_MM)
+    with_mm, without_mm = (float(np.sqrt(np.mean(np.square(errors)))) for errors in errors_mm.values())
+    assert with_mm < 0.02 * STEP_MM
+    assert without_mm > 2.0 * with_mm

@@ -9,7 +9,7 @@ import pytest
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.posterior import settled
-from fingervision.diagnosis.inference.record_errors import with_record_errors
+from fingervision.diagnosis.inference.record_errors import simulated_errors, with_record_errors
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.effects.play_operator import play
 from fingervision.storage.measured_table import read_measured_table
@@ -71,7 +71,8 @@ def test_the_record_of_an_encoder_widens_a_play_and_an_exact_one_does_not(tmp_pa
         problem = data.problem(data.stacked_mm - data.chain.stacked({"backlash": {"play_mm": 0.05}}), 1, explained=True)
         best = fit(problem, ("backlash",), {"backlash": {"play_mm": 0.05}}, iterations=5)
         best = replace(best, covariance=np.array([[1e-8]]))
-        found[step_mm] = with_record_errors(data, problem, best, np.random.default_rng(SEED)).covariance[0, 0]
+        errors_mm = list(simulated_errors(data, np.random.default_rng(SEED)))
+        found[step_mm] = with_record_errors(problem, best, errors_mm).covariance[0, 0]
     assert found[0.0] == 1e-8
     # The mean rounding error of a stroke resembles a play: with some ten encoder steps per stroke, it is at most a
     # third of the largest rounding error.

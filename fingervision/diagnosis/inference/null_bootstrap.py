@@ -140,7 +140,7 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
     )
     slope = np.maximum(np.abs(high - low) / (2.0 * reach), 1e-9)
     stays = float(np.exp(-2.0 / max(whitener.input_samples, 0.04)))
-    staying = np.concatenate([_autoregression(stays, run.stop - run.start, rng) for run in history.runs])
+    staying = np.concatenate([autoregression(stays, run.stop - run.start, rng) for run in history.runs])
     error = (whitener.passing_mm * rng.standard_normal(samples) + whitener.input_mm * staying) / slope
     noise = whitener.one(_of_pictures(problem, rng))
     shaken = problem.chain.with_input(history.input_mm + error)
@@ -165,11 +165,11 @@ def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
         for run in problem.chain.history.runs:
             count = run.stop - run.start
             white = noise.white_mm * rng.standard_normal(count)
-            out.append(white + noise.correlated_mm * _autoregression(noise.correlation, count, rng))
+            out.append(white + noise.correlated_mm * autoregression(noise.correlation, count, rng))
     return np.concatenate(out)
 
 
-def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
+def autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
     """First-order autoregression of unit variance; shape (count,)."""
     start = phi * rng.standard_normal(1)
     shocks = np.sqrt(1.0 - phi**2) * rng.standard_normal(count)

@@ -16,10 +16,9 @@ from fingervision.diagnosis.inference.needed_effects import (
 from fingervision.diagnosis.inference.position_map import (
     NAME,
 )
-from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
-from fingervision.diagnosis.inference.record_errors import with_record_errors
+from fingervision.diagnosis.inference.record_errors import settled_with_records
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched, problem_of
 from fingervision.diagnosis.inference.verdict import standing_of
@@ -163,8 +162,7 @@ def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
     """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, without_unneeded_effects(state.data, state.found)
     found = with_simpler_parts(data, without_fits_to_structure(data, found))
-    best, posterior = settled(found.problem, found.best, rng)
-    best = with_record_errors(data, found.problem, best, rng)
+    best, posterior = settled_with_records(data, found.problem, found.best, rng)
     found = _with_best(found, best)
     if data.position_map is not None:
         data = replace(

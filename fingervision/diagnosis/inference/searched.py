@@ -1,12 +1,13 @@
 """Result of a completed search, and the settings of searches."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search import search
 from fingervision.diagnosis.inference.search_state import Findings
@@ -22,9 +23,20 @@ changes any more."""
 
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     """Estimation problem whose noise is estimated from an explanation's residual, or else from the disagreement."""
-    values = {} if explanation is None else explanation.values
-    free = 0 if explanation is None else explanation.free
-    return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)
+    if explanation is None:
+        return data.problem(data.stacked_mm - data.chain.stacked({}), 0, explained=False)
+    values, free = explanation.values, explanation.free
+    residual_mm = data.stacked_mm - data.chain.stacked(values)
+    problem = data.problem(residual_mm, free, explained=True, values=values)
+    turning = data.turning
+    if turning is None:
+        return problem
+    # What the errors at the reversals explain is no noise of the picture.
+    left = problem.measured - problem.whitened(values)
+    beside = replace(explanation, residual=left, sigma_mm=problem.offsets.spread(left)[0])
+    columns_mm = turning.columns_mm(data.chain, values)
+    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], data.behind(turning))
+    return data.problem(residual_mm - columns_mm @ errors, free, explained=True, values=values)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

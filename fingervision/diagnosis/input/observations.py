@@ -1,6 +1,8 @@
 """Prepare the measurement: smooth the input, exclude outliers, estimate the noise, whiten."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from fingervision.diagnosis.input.driven_model import with_dynamics
 from fingervision.diagnosis.input.path import input_path, turning_readings
 from fingervision.diagnosis.input.recorded_input import RecordedInput
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
+from fingervision.diagnosis.input.turning_errors import TurningErrors
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
@@ -36,6 +39,8 @@ real stages differs by 19 to 24 % from place to place (ISO 230-2 tables, among t
 at rest repeat well enough to show this."""
 SHORT = 100
 """Number of samples below which no row is excluded before an effect is found."""
+NOTHING: Mapping[str, Mapping[str, float]] = MappingProxyType({})
+"""The model without effects."""
 OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
 """Outlier limits, in standard deviations, for the residual of the best explanation, and for the residual before any
 effect is found."""
@@ -72,6 +77,8 @@ class Observations:
         Dynamic model, of which `model` is the static response.
     roundings : PositionMap or None
         Errors of the recorded input that repeat at its places because an encoder rounds them alike.
+    turning : TurningErrors or None
+        Errors of an encoder's record at the reversals of the stage.
     """
 
     table: MeasuredTable
@@ -91,6 +98,7 @@ class Observations:
     runs_scatter_mm: float = np.inf
     clock: Array | None = None
     function: FunctionModel | None = None
+    turning: TurningErrors | None = None
 
     @property
     def aim_mm(self) -> Array:
@@ -104,17 +112,26 @@ class Observations:
         return ("gap", *(["midline"] if history.both_edges else []), *(["force"] if history.force else []))
 
     @property
-    def random_effects_mm(self) -> tuple[tuple[object, Array], ...]:
-        """Random effects added to every explanation, each with its columns, in the order used by a problem."""
+    def floors_mm(self) -> list[float]:
+        """Least noise of each channel: the rounding of the last digit, a step over root 12, or the stated one."""
+        floor = resolution(self.table.gap_mm) / float(np.sqrt(12.0))
+        if self.table.u_random_mm is not None:
+            floor = max(floor, float(np.median(self.table.u_random_mm)))
+        return [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
+
+    def random_effects_mm(self, values: Mapping[str, Mapping[str, float]]) -> tuple[tuple[object, Array], ...]:
+        """Random effects beside an explanation, each with its columns, in the order used by a problem."""
         own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains, self.roundings) if one]
+        turning = [] if self.turning is None else [(self.turning, self.turning.columns_mm(self.chain, values))]
         clock = [] if self.clock is None or not self.clock.shape[1] else [("clock", self.clock)]
         drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
-        return (*own, *clock, *drawing)
+        return (*own, *turning, *clock, *drawing)
 
     def behind(self, effect: object) -> int:
         """Number of columns that follow the columns of a given random effect in the problem."""
-        order = [one for one, _ in self.random_effects_mm]
-        return sum(columns.shape[1] for _, columns in self.random_effects_mm[order.index(effect) + 1 :])
+        listed = self.random_effects_mm({})
+        order = [one for one, _ in listed]
+        return sum(columns.shape[1] for _, columns in listed[order.index(effect) + 1 :])
 
     @property
     def stalled(self) -> frozenset[str]:
@@ -122,25 +139,22 @@ class Observations:
         history = self.chain.history
         return stalled_ends(history.input_mm, self.chain.respond({}).gap_mm, self.table.gap_mm)
 
-    def problem(self, residual_mm: Array, degrees: int, *, explained: bool) -> Problem:
-        """Estimate outliers and noise from a residual, and whiten the measurement with them."""
+    def problem(
+        self, residual_mm: Array, degrees: int, *, explained: bool, values: Mapping[str, Mapping[str, float]] = NOTHING
+    ) -> Problem:
+        """Estimate outliers and noise from the residual of an explanation, and whiten the measurement with them."""
         history = self.chain.history
         for nuisance in (self.position_map, self.run_gains, self.roundings):
             residual_mm = residual_mm if nuisance is None else residual_mm - nuisance.fitted_mm
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
-        # The noise is at least the rounding of the last digit: its standard deviation is a step over root 12.
-        floor = resolution(self.table.gap_mm) / float(np.sqrt(12.0))
-        if self.table.u_random_mm is not None:
-            floor = max(floor, float(np.median(self.table.u_random_mm)))
-        floors = [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
         parts = [residual_mm[channel * n : (channel + 1) * n] for channel in range(len(self.channels))]
         aside = [gate(part, history.input_mm, history.runs, timed, sigmas) | self.distrusted for part in parts]
         repeated = self.measured_pure_errors(aside)
         noises = (
-            channel_noises(history, parts, aside, floors, degrees, explained=explained)
+            channel_noises(history, parts, aside, self.floors_mm, degrees, explained=explained)
             if repeated is None
-            else noises_of_repeats(repeated, floors)
+            else noises_of_repeats(repeated, self.floors_mm)
         )
         if history.both_edges:
             aside[0] = aside[1] = aside[0] | aside[1]
@@ -151,7 +165,7 @@ class Observations:
             error = np.zeros_like(error)
         passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
-        beside = [columns for _, columns in self.random_effects_mm]
+        beside = [columns for _, columns in self.random_effects_mm(values)]
         drawing = np.hstack(beside) if beside else None
         whitener = Whitener(
             history,

@@ -15,6 +15,7 @@ from fingervision.diagnosis.input.path import dwell_s, input_path, mostly_at_res
 from fingervision.diagnosis.input.path import recorded as recorded_rows
 from fingervision.diagnosis.input.recorded_input import RecordedInput
 from fingervision.diagnosis.input.row_screening import screened_rows
+from fingervision.diagnosis.input.turning_errors import TurningErrors
 from fingervision.diagnosis.noise.replicates import FEWEST_DEGREES, repeats_in, visits
 from fingervision.domain.effect import REZEROED, Array, History
 from fingervision.domain.errors import DataError
@@ -65,6 +66,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         _visits(table),
         clock=clock_columns(chain, table.u_clock_s),
         function=function,
+        turning=TurningErrors.of(history),
     )
 
 

@@ -45,13 +45,13 @@ def noise_by_spectrum(
         Whether effects have been subtracted.
     """
     slow = min(1.0 / rate_hz, SLOW_EXPLAINED if explained else SLOW)
-    angle = np.concatenate([_angles(run.stop - run.start, slow) for run in runs])
-    powers = [_powers(residual, runs, out, slow) for residual, out in zip(residuals_mm, aside, strict=True)]
-    use = [np.ones(angle.size, dtype=bool) for _ in powers]
+    angle = np.concatenate([angles(run.stop - run.start, slow) for run in runs])
+    found = [powers(residual, runs, out, slow) for residual, out in zip(residuals_mm, aside, strict=True)]
+    use = [np.ones(angle.size, dtype=bool) for _ in found]
     for _ in range(3):
-        variances, share, phi, doubt = _likeliest(angle, powers, use)
-        expected = _shape(angle, share, phi)
-        keep = [power < LINE * variance * expected for power, variance in zip(powers, variances, strict=True)]
+        variances, share, phi, doubt = _likeliest(angle, found, use)
+        expected = shape(angle, share, phi)
+        keep = [power < LINE * variance * expected for power, variance in zip(found, variances, strict=True)]
         if all(np.array_equal(new, old) for new, old in zip(keep, use, strict=True)):
             break
         use = keep
@@ -65,13 +65,14 @@ def _used(count: int, slow: float) -> Flags:
     return np.asarray((frequency > max(slow, 2.5 / count)) & (count >= LEAST_RUN))
 
 
-def _angles(count: int, slow: float) -> Array:
+def angles(count: int, slow: float) -> Array:
+    """Angles per sample of the frequencies of a run of `count` samples that are used; those above `slow`."""
     return np.asarray(2.0 * np.pi * np.fft.rfftfreq(count)[_used(count, slow)])
 
 
-def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float) -> Array:
+def powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float) -> Array:
     """Periodogram of each run after subtraction of a straight line, run after run; outliers are interpolated."""
-    powers = []
+    found = []
     for run in runs:
         values, bad = residual[run].copy(), aside[run]
         count = values.size
@@ -82,11 +83,11 @@ def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float)
             line = np.polynomial.Polynomial.fit(np.arange(count), values, 1)
             taper = np.hanning(count + 2)[1:-1]
             power = np.abs(np.fft.rfft((values - line(np.arange(count))) * taper)) ** 2 / np.sum(taper**2)
-            powers.append(power[_used(count, slow)])
-    return np.concatenate(powers)
+            found.append(power[_used(count, slow)])
+    return np.concatenate(found)
 
 
-def _shape(angle: Array, share: float, phi: float) -> Array:
+def shape(angle: Array, share: float, phi: float) -> Array:
     """Noise spectrum of unit variance, of which a share `share` has the correlation `phi` between neighbouring samples.
 
     The spectrum has shape (m,).
@@ -117,7 +118,7 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
 
     def slowest(share: float, phi: float, form: Array) -> float:
         levels = [np.log(variance(power, kept, form)) for power, kept in zip(powers, use, strict=True)]
-        return float(np.mean(levels)) + float(np.log(_shape(SLOWEST, share, phi)[0]))
+        return float(np.mean(levels)) + float(np.log(shape(SLOWEST, share, phi)[0]))
 
     mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
     found: list[tuple[float, float, float]] = []
@@ -127,7 +128,7 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
     for kind in ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed):
         begin = len(costs)
         for share, phi in kind:
-            form = _shape(angle, share, phi)
+            form = shape(angle, share, phi)
             parts = [
                 kept.sum() * np.log(variance(power, kept, form)) + np.sum(np.log(form[kept]))
                 for power, kept in zip(powers, use, strict=True)
@@ -140,7 +141,7 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
         share, phi = np.average(np.array(kind), axis=0, weights=weight)
         found.append((-own.min() / TAPERED + float(np.log(np.mean(weight))), min(float(share), 1.0), float(phi)))
     _, share, phi = max(found)
-    form = _shape(angle, share, phi)
+    form = shape(angle, share, phi)
     likely = np.array(prior) * np.exp(-(np.array(costs) - min(costs)) / TAPERED)
     order = np.argsort(slow)
     reached = np.cumsum(likely[order]) / likely.sum()

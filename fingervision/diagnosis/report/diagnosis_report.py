@@ -16,6 +16,7 @@ from fingervision.diagnosis.inference.verdict import verdict
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.dead_band_hint import dead_band_hint
+from fingervision.diagnosis.report.encoder_zero import encoder_zero
 from fingervision.diagnosis.report.force_hint import force_hint
 from fingervision.diagnosis.report.left_out_rows import outlier_rows, outliers
 from fingervision.diagnosis.report.open_parameters import draws_of, limited, open_parameters
@@ -103,6 +104,7 @@ def diagnosis_report(
             *beyond_the_search(best, found.problem),
             *rows_beyond_model(data, best),
             *input_dominates(data, found.problem),
+            *encoder_zero(answered),
             *dead_band_hint(data, answered.before_mm, decided),
         ),
         seconds=time.perf_counter() - begin_s,

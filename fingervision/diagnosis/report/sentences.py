@@ -111,7 +111,7 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
     if left_over is not None:
         words += f"; the largest part of it is {left_over}, small compared with the explained part"
     if max(scatter_mm, default=0.0) > 0.0:
-        words += f"; the runs are offset against each other by {scatter_mm[0]:.2g} mm (standard deviation) in the gap"
+        words += f"; the runs have offsets of {scatter_mm[0]:.2g} mm RMS in the gap"
     return words + "."
 
 
