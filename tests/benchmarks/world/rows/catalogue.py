@@ -20,6 +20,7 @@ from tests.benchmarks.world.rows import (
     polymer_creep,
     ripple,
     sparse,
+    strokes,
     wind_up,
     wrong_sign,
 )
@@ -29,6 +30,7 @@ ROWS: dict[str, Callable[[np.random.Generator], Rig]] = {
     "sparse": sparse.draw,
     "missing_directions": missing_directions.draw,
     "free_start": free_start.draw,
+    "strokes": strokes.draw,
     "wind_up": wind_up.draw,
     "error_map": error_map.draw,
     "commands_with_steps": commands_with_steps.draw,
