@@ -62,7 +62,7 @@ def _values(values: Array, rows: NDArray[np.intp], where: Flags | None = None) -
 def _gap(curves: GapCurves, name: str, x: Array, label: str, *, both_ways: bool) -> Chart:
     rows, thinned = _shown(x)
     ways: dict[str, Flags | None] = {"": None}
-    if both_ways:
+    if both_ways and curves.directed:
         found = {"opening": curves.opens, "closing": ~curves.opens}
         ways = {way: where for way, where in found.items() if where.any()}
     series: list[dict[str, object]] = [

@@ -31,6 +31,8 @@ class GapCurves:
         Rows of each run.
     predictions : mapping of str to ndarray of float, shape (n,)
         Predicted gap, by its name in the legend.
+    directed : bool
+        Whether the order of the rows is known, and with it the direction of the motion.
     """
 
     input_mm: Array
@@ -40,6 +42,7 @@ class GapCurves:
     time_s: Array | None
     runs: tuple[slice, ...]
     predictions: Mapping[str, Array]
+    directed: bool = True
 
 
 def gap_curves(data: Observations, noise_mm: float, predictions: Mapping[str, Array]) -> GapCurves:
@@ -65,6 +68,7 @@ def gap_curves(data: Observations, noise_mm: float, predictions: Mapping[str, Ar
         time_s=history.clock_s if history.time_s is not None and history.shared_clock else None,
         runs=history.runs,
         predictions={name: stacked[:n] for name, stacked in predictions.items()},
+        directed=history.time_s is not None,
     )
 
 

@@ -23,10 +23,13 @@ def gap_against_input(curves: GapCurves, title: str) -> Figure:
     with plain_style():
         figure = Figure(figsize=(6.3, 4.2), layout="constrained")
         axes = figure.subplots()
-        for which, marker, face, label in (
+        ways = [
             (curves.opens, "^", MEASURED, "measured, opening"),
             (~curves.opens, "v", "none", "measured, closing"),
-        ):
+        ]
+        if not curves.directed:
+            ways = [(np.ones(curves.gap_mm.size, dtype=bool), "o", "none", "measured")]
+        for which, marker, face, label in ways:
             if which.any():
                 _readings(axes, curves.input_mm[which], curves, which, marker, face, label)
         for (name, gap_mm), (colour, dash) in zip(curves.predictions.items(), LINES, strict=False):
@@ -77,6 +80,8 @@ def _in_order(curves: GapCurves, gap_mm: Array) -> NDArray[np.intp] | None:
     A dashed line that is drawn forth and back over itself looks like a solid line.
     """
     order = np.argsort(curves.input_mm, kind="stable")
+    if not curves.directed:
+        return order
     forth, back = order[curves.opens[order]], order[~curves.opens[order]]
     same_mm = RETRACED * float(np.ptp(gap_mm))
     if forth.size and back.size:

@@ -40,6 +40,7 @@ HEADINGS = {
     Verdict.AMBIGUOUS: "More than one explanation fits",
     Verdict.UNKNOWN: "Something that no effect of the catalogue explains",
 }
+NOWHERE = "<p>Nowhere significantly.</p>"
 SIMULATION, CORRECTED = "simulation", "corrected model"
 
 
@@ -91,7 +92,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement
     ]
     sections = [
         ("Gap against input", f'{gap}<p class="hint">{HINT}</p>'),
-        ("Where they disagree", bullets([place.words for place in report.where])),
+        ("Where they disagree", bullets([place.words for place in report.where]) if report.where else NOWHERE),
         ("Difference before and after", residuals),
         ("At the turning points", frames),
         ("How much", _how_much(report)),
