@@ -58,9 +58,9 @@ def _on_the_log(task: Task, series: GapSeries, clock: Clock) -> list[str]:
     # The error of the input is of interest once it moves the gap visibly.
     if turned and gap_per_input * missed_mm > COVERAGE_FACTOR * float(np.median(series.u_random_mm)):
         notes.append(
-            f"The stage turned {turned} times between two rows of the drive's log, up to {1e3 * missed_mm:.2g} um "
-            "beyond the line between them; the input of the frames is interpolated linearly and is too small there. "
-            "Log the drive at the camera's rate or faster."
+            f"The stage turned between two rows of the drive's log ({turned} time{'s' * (turned > 1)}), up to "
+            f"{1e3 * missed_mm:.2g} um beyond the line between them; the input of the frames is interpolated linearly "
+            "and is too small there. Log the drive several times as fast as the camera."
         )
     return notes
 
