@@ -224,10 +224,10 @@ def _path(
 def _runs(
     inputs: NDArray[np.float64], time: NDArray[np.float64] | None, names: Sequence[str]
 ) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
-    """Order of the rows; runs are sorted by their first time (or smallest input), independently of their names."""
+    """Order of the rows; runs are sorted by their first time (or smallest input), then as they stand in the file."""
     key = inputs if time is None else time
     # Each group is sorted by its key, so that its first row has the smallest key.
-    groups = sorted(_by_run(names, key).items(), key=lambda item: (key[item[1][0]], float(np.sum(inputs[item[1]]))))
+    groups = sorted(_by_run(names, key).items(), key=lambda item: (key[item[1][0]], int(np.min(item[1]))))
     ends = np.cumsum([rows.size for _, rows in groups])
     runs = tuple(slice(int(end) - rows.size, int(end)) for end, (_, rows) in zip(ends, groups, strict=True))
     return np.concatenate([rows for _, rows in groups]), runs, tuple(name for name, _ in groups)
