@@ -223,11 +223,9 @@ class Observations:
         """
         along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
         path = input_path(self.table, self.chain.history, along_mm, commanded=commanded, turns=False)
-        points = 0 if path is None else path.owner.size
-        before = self.chain.history.input_mm.size if self.chain.path is None else self.chain.path.owner.size
-        if before == (points or self.chain.history.input_mm.size):
-            return self
-        return replace(self, chain=replace(self.chain, path=path))
+        rows = self.chain.history.input_mm.size
+        points, fewer = (rows if each is None else each.owner.size for each in (self.chain.path, path))
+        return self if fewer == points else replace(self, chain=replace(self.chain, path=path))
 
     def redrawn(self, problem: Problem, explanation: Explanation) -> "Observations":
         """Refit the drawing's uncertain dimensions for an explanation, and use them in all later predictions."""
