@@ -39,6 +39,9 @@ Student's with three degrees of freedom 31 %, a sinusoid 11 %."""
 SHARES = (0.05, 0.4)
 """Share of values within `NARROW` below which the values form two groups, and share above which most values repeat far
 better than the rest. No single noise distribution named above has such shares."""
+FEW = 0.02
+"""Share of the values that are too few for a mixture of right and wrong rows: 4 of 249 rows before a delayed motion had
+begun made most others seem to agree far better than the rest."""
 STRETCH_SIGMAS = 3.0
 """Significance, in standard deviations of 1 / sqrt(n), of the correlation of neighbouring rows above which rows lie in
 stretches. A servo, for example, repeats far better at rest than in motion; such rows are not wrong."""
@@ -113,7 +116,7 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
         return None
     both = (residual_mm, found.residual[:n][kept])
     between = max(_share_near(values, float(np.mean(values))) for values in both)
-    together = min(_share_near(values, float(np.median(values))) for values in both)
+    together = min(_share_near(values, float(np.median(values))) for values in map(_without_few, both))
     if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
         return None
     count = residual_mm.size
@@ -132,6 +135,12 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
         f"the rows are not one measurement with one noise: {words}; check the rows that differ first.",
         blocks=True,
     )
+
+
+def _without_few(values: Array) -> Array:
+    """Values without the `FEW` farthest from the median, such as the rows before a delayed motion has begun."""
+    apart = np.abs(values - np.median(values))
+    return np.asarray(values[apart <= np.quantile(apart, 1.0 - FEW)])
 
 
 def _in_stretches(values: Array) -> bool:
