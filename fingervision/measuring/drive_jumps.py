@@ -1,14 +1,12 @@
-"""Intervals of a log in which the stage's position is unknown: jumps between rest positions, and reversals."""
+"""Intervals of a log in which the stage jumps between two rest positions, so that its position is unknown."""
 
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.stage_record.encoder import input_sigma
-from fingervision.stage_record.turning_points import turning_points
 
 STANDS = 0.1
 """Change of the log in a neighbouring interval, relative to the jump, below which the stage is at rest there."""
@@ -55,16 +53,3 @@ def within_jump(drive: DriveHistory, time_s: NDArray[np.float64]) -> NDArray[np.
     if drive.time_s.size < 2:
         return np.asarray(inside)
     return np.asarray(inside & jumps(drive)[np.clip(after - 1, 0, drive.time_s.size - 2)])
-
-
-def unseen_turns(drive: DriveHistory) -> tuple[int, float]:
-    """Number of turning points between two rows of the log, and their largest distance from the rows' line (mm)."""
-    runs = [slice(0, drive.input_mm.size)]
-    if drive.run is not None:
-        ends = [0, *(1 + np.flatnonzero(np.array(drive.run[1:]) != np.array(drive.run[:-1]))), len(drive.run)]
-        runs = [slice(begin, end) for begin, end in pairwise(ends)]
-    sigma_mm, _ = input_sigma(drive.input_mm, tuple(runs), drive.time_s)
-    points = turning_points(drive.input_mm, drive.time_s, tuple(runs), sigma_mm)
-    lines_mm = np.interp([point.time_s for point in points], drive.time_s, drive.input_mm)
-    beyond = [abs(point.input_mm - line_mm) for point, line_mm in zip(points, lines_mm, strict=True)]
-    return len(points), float(max(beyond, default=0.0))

@@ -11,11 +11,12 @@ from fingervision.domain.status import Status
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.common_clock import clock_of, refusal, sentence
 from fingervision.measuring.clock.common_clock import in_words as clock_in_words
-from fingervision.measuring.drive_jumps import unseen_turns, within_jump
+from fingervision.measuring.drive_jumps import within_jump
 from fingervision.measuring.frame_loop import Prepared
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.summary import summarise
 from fingervision.measuring.task import Task, in_words
+from fingervision.measuring.unseen_turns import unseen_turns
 from fingervision.measuring.words import COVERAGE_FACTOR
 
 Clock = ClockOffset | NoClockOffset | None

@@ -68,6 +68,7 @@ def test_one_visit_of_nine_places_agrees_only_if_its_noise_is_stated(tmp_path: P
     assert report.pure_error_mm is None
     assert "no position was read twice" in report.sentence
     assert "state u_random_mm" in report.sentence
+    assert report.remaining.endswith("random noise or an error of the model.")
     stated = asked(tmp_path, table | {"u_random_mm": np.full(TARGETS.size, NOISE_MM)})
     assert stated.verdict is Verdict.AGREES
 

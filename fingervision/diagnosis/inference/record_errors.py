@@ -58,7 +58,7 @@ def settled_with_records(
         best, found = settled(problem, explanation, rng)
         return with_record_errors(problem, best, simulated_errors(data, rng)), found
     errors_mm = list(simulated_errors(data, rng))
-    alone = _of_pictures(data, problem, explanation, errors_mm)
+    alone = _with_picture_noise(data, problem, explanation, errors_mm)
     best, found = settled(alone, fit(alone, explanation.names, explanation.values, iterations=MANY_STEPS), rng)
     # A residual above the assumed noise widens the intervals (Birge 1932).
     rows = max(1, int(problem.measured.size - problem.whitener.aside.sum()) - best.free)
@@ -69,7 +69,9 @@ def settled_with_records(
     return replace(best, residual=residual, score=problem.score(best.values), sigma_mm=sigma_mm), found
 
 
-def _of_pictures(data: Observations, problem: Problem, explanation: Explanation, errors_mm: list[Array]) -> Problem:
+def _with_picture_noise(
+    data: Observations, problem: Problem, explanation: Explanation, errors_mm: list[Array]
+) -> Problem:
     """Return the problem with a noise of the gap that does not contain the errors of an encoder's record.
 
     The search takes these errors for an autoregression, so that it does not name effects for them. This noise is too

@@ -235,9 +235,10 @@ def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict
         if not stands.noise_is_known:
             return (
                 Verdict.UNKNOWN,
-                f"{UNDECIDED}: no position was read twice, no u_random_mm is stated, and {stands.rows} rows are too "
-                f"few to distinguish noise from an error of the model; the difference is {1e3 * stands.after_mm:.3g} "
-                "um RMS. Read the positions again, or state u_random_mm",
+                f"{UNDECIDED}: no position was read twice from the same side often enough to show the noise, no "
+                f"u_random_mm is stated, and {stands.rows} rows are too few to distinguish noise from an error of the "
+                f"model; the difference is {1e3 * stands.after_mm:.3g} um RMS. Read the positions again, with times, "
+                "or state u_random_mm",
             )
         return Verdict.AGREES, None
     if not stands.is_little:

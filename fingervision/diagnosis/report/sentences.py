@@ -102,7 +102,8 @@ def detail_lines(
 def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, ...]) -> str:
     """Sentence about the residual that remains."""
     if stands.is_noise:
-        words = f"The remaining difference is {stands.after_mm:.3g} mm RMS: random noise only"
+        what = "random noise only" if stands.noise_is_known else "random noise or an error of the model"
+        words = f"The remaining difference is {stands.after_mm:.3g} mm RMS: {what}"
     else:
         words = (
             f"The remaining difference is {stands.after_mm:.3g} mm RMS, {100.0 * stands.share:.0f} % of the "
