@@ -113,7 +113,7 @@ def measured_rows(
     if count > MOST_RUNS or count == kept.size == on_path.size:
         raise DataError(
             f"{path} must have {bound}, but has {count} runs in {kept.size} rows: does the run column number the rows? "
-            "Leave the run column out, or compare fewer runs at once."
+            f"Leave the run column out{', or compare fewer runs at once' if count > MOST_RUNS else ''}."
         )
     time = column.get("time_s")
     if time is not None and run_cells is None and np.any(np.diff(time) < 0.0):
