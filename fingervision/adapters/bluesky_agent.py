@@ -51,10 +51,13 @@ class NextRunAgent:
         if name == "start":
             self._run += 1
         if name == "event":
-            self._ingest_event(document["time"], document["data"])
+            self._ingest_event(document["data"], document["timestamps"])
         if name == "event_page":
-            for k, at_s in enumerate(document["time"]):
-                self._ingest_event(at_s, {key: values[k] for key, values in document["data"].items()})
+            for k in range(len(document["time"])):
+                data, stamps = (
+                    {key: values[k] for key, values in document[part].items()} for part in ("data", "timestamps")
+                )
+                self._ingest_event(data, stamps)
 
     def report(self) -> Diagnosis:
         """Diagnose all rows received so far."""
@@ -77,11 +80,13 @@ class NextRunAgent:
         steps = [dict(step) for step in proposed.steps]
         return [{"name": proposed.name, "steps": steps, "separates": list(proposed.separates)}]
 
-    def _ingest_event(self, at_s: float, data: Mapping[str, Any]) -> None:
+    def _ingest_event(self, data: Mapping[str, Any], timestamps: Mapping[str, float]) -> None:
         prefix = f"{self._gap}_"
         own = {key.removeprefix(prefix): value for key, value in data.items() if key.startswith(prefix)}
         if own.get("input_mm") is not None:
-            self.ingest([{**own, "run": str(self._run), "time_s": at_s}])
+            # The time of the exposure. The document's own time is that of its writing, which after a flight is the same
+            # for all frames within milliseconds.
+            self.ingest([{**own, "run": str(self._run), "time_s": timestamps[f"{prefix}input_mm"]}])
 
 
 def run_steps(steps: Sequence[Mapping[str, Any]], stage: StageDevice, gap: GapDevice) -> Iterator[Any]:

@@ -172,3 +172,21 @@ def test_rows_without_an_input_and_strange_steps_are_refused(made: Devices, engi
     assert made.gap is not None
     with pytest.raises(DataError, match="pirouette"):
         list(run_steps([{"kind": "pirouette"}], made.stage, made.gap))
+
+
+def test_the_agent_uses_the_times_of_the_exposures(tmp_path: Path) -> None:
+    table = tmp_path / "simulation.csv"
+    table.write_text("input_mm,gap_mm\n-0.5,0.5\n1.5,8.5\n", encoding="utf-8")
+    agent = NextRunAgent(read_model(table))
+    time_s = np.arange(0.0, 12.0, 0.04)
+    input_mm = 0.5 - 0.5 * np.cos(time_s)
+    # A delay of 0.2 s, which only the times can show. A flight's documents are written together, after the flight.
+    gap_mm = 2.5 + 4.0 * (0.5 - 0.5 * np.cos(time_s - 0.2) - 0.5 * (time_s < 0.2) * (1.0 - np.cos(time_s - 0.2)))
+    gap_mm += np.random.default_rng(11).normal(0.0, 0.001, time_s.size)
+    data = {"gap_input_mm": input_mm.tolist(), "gap_gap_mm": gap_mm.tolist()}
+    written_s = (100.0 + 1e-4 * np.arange(time_s.size)).tolist()
+    agent("start", {})
+    agent("event_page", {"time": written_s, "data": data, "timestamps": dict.fromkeys(data, time_s.tolist())})
+    found = agent.report()
+    assert set(found.report.alternatives) == {("drive_lag",), ("camera_latency",)}, found.report.sentence
+    assert found.report.effects[0].parameters["delay_s"].value == pytest.approx(0.2, abs=0.002)

@@ -58,12 +58,15 @@ class VirtualClock:
 
     def wait_until(self, time_s: float) -> None:
         """Let virtual time pass until `time_s`."""
-        self._now_s = max(self._now_s, time_s)
+        if time_s <= self._now_s:
+            return
         if self._pace > 0.0:
             if self._host_began_s is None:
                 self._host_began_s = monotonic() - self._now_s / self._pace
-            left_s = self._host_began_s + self._now_s / self._pace - monotonic()
+            left_s = self._host_began_s + time_s / self._pace - monotonic()
+            # The time is set after the sleep: what another thread reads meanwhile is not ahead of the pace.
             if left_s > 0.0:
                 sleep(left_s)
             elif left_s < -MOST_HURRY_S:
                 self._host_began_s -= left_s
+        self._now_s = max(self._now_s, time_s)
