@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-from fingervision.domain.effect import Array, History
+from fingervision.domain.effect import Array, DriveEffect, Effect, History, PointEffect
 from fingervision.domain.parameter import Parameter
 
 COMMANDED_STARTS = 60
 """Number of delays that are tried with step commands; each is an eighth longer than the preceding delay."""
 FEWEST = 4
 """Smallest number of samples in a run for curved interpolation."""
+
+
+def is_delay(effect: Effect) -> bool:
+    """Whether an effect is a delay, with `delay_s` as its only parameter."""
+    return isinstance(effect, DriveEffect | PointEffect) and effect.act_curved is not None
 
 
 def late(signal: Array, history: History, delay_s: float, *, curved: bool = False) -> Array:

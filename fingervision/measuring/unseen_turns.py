@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
+from fingervision.stage_record.corners import corners
 from fingervision.stage_record.encoder import input_sigma
-from fingervision.stage_record.turning_points import turning_points
 
 
 def unseen_turns(drive: DriveHistory) -> tuple[int, float]:
@@ -16,7 +16,8 @@ def unseen_turns(drive: DriveHistory) -> tuple[int, float]:
         ends = [0, *(1 + np.flatnonzero(np.array(drive.run[1:]) != np.array(drive.run[:-1]))), len(drive.run)]
         runs = [slice(begin, end) for begin, end in pairwise(ends)]
     sigma_mm, _ = input_sigma(drive.input_mm, tuple(runs), drive.time_s)
-    points = turning_points(drive.input_mm, drive.time_s, tuple(runs), sigma_mm)
+    found = corners(drive.input_mm, drive.time_s, tuple(runs), sigma_mm)
+    points = [corner for corner in found if corner.least_mm is not None]
     lines_mm = np.interp([point.time_s for point in points], drive.time_s, drive.input_mm)
     beyond = [abs(point.input_mm - line_mm) for point, line_mm in zip(points, lines_mm, strict=True)]
     return len(points), float(max(beyond, default=0.0))

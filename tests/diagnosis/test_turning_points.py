@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.stage_record.turning_points import turning_points
+from fingervision.stage_record.corners import Corner, corners
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
 PERIOD_S, EVERY_S = 8.0, 0.04
+
+
+def reversals(u: np.ndarray, t: np.ndarray, sigma_mm: float) -> list[Corner]:
+    """Corners at which the stage turned."""
+    return [c for c in corners(u, t, (slice(0, t.size),), sigma_mm) if c.least_mm is not None]
 
 
 def triangle(t: np.ndarray) -> np.ndarray:
@@ -29,7 +34,7 @@ def cosine(t: np.ndarray) -> np.ndarray:
 def test_turning_points_lie_where_the_stage_turned(motion: Callable[[np.ndarray], np.ndarray], phase_s: float) -> None:
     t = np.arange(0.0, 30.0, EVERY_S) + phase_s
     u = motion(t)
-    points = turning_points(u, t, (slice(0, t.size),), 0.0)
+    points = reversals(u, t, 0.0)
     ends = np.array([2.0 * round(point.input_mm / 2.0) for point in points])
     assert len(points) == 7
     np.testing.assert_allclose([point.input_mm for point in points], ends, atol=5e-4)
@@ -39,18 +44,18 @@ def test_turning_points_lie_where_the_stage_turned(motion: Callable[[np.ndarray]
 def test_no_turning_point_at_a_hold_a_noisy_end_or_a_long_pause() -> None:
     t = np.arange(0.0, 30.0, EVERY_S)
     held = np.clip(triangle(t), 0.1, 1.9)
-    assert not turning_points(held, t, (slice(0, t.size),), 0.0)
+    assert not reversals(held, t, 0.0)
     rng = np.random.default_rng(3)
     noisy = cosine(t + 0.013) + 0.002 * rng.standard_normal(t.size)
-    assert len(turning_points(noisy, t, (slice(0, t.size),), 0.002)) <= 1
+    assert len(reversals(noisy, t, 0.002)) <= 1
     turn = np.abs(t % PERIOD_S - 4.0) < 0.3
     paused = t[~turn & (np.abs(t % PERIOD_S - 8.0) > 0.3) & (t % PERIOD_S > 0.3)]
-    assert not turning_points(triangle(paused), paused, (slice(0, paused.size),), 0.0)
+    assert not reversals(triangle(paused), paused, 0.0)
 
 
 def test_two_equal_rows_at_an_end_are_a_stop() -> None:
     strokes = np.concatenate([np.linspace(0.0, 1.0, 80), np.linspace(1.0, 0.0, 80), np.linspace(0.0, 1.0, 80)])
-    assert not turning_points(strokes, EVERY_S * np.arange(strokes.size), (slice(0, strokes.size),), 0.0)
+    assert not reversals(strokes, EVERY_S * np.arange(strokes.size), 0.0)
 
 
 def test_a_play_as_small_as_the_motion_between_two_rows_is_no_delay(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """A hypothesis: a set of effects with fitted parameters, and the statistics by which it is judged."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,6 +90,10 @@ class Problem:
     form_share: float = SMALL_SHARE
     stalled: frozenset[str] = frozenset()
     mapped: float = 0.0
+
+    def judged_by(self, whitener: Whitener, aim_mm: Array) -> "Problem":
+        """Return the problem with another noise or other outliers; `aim_mm` of shape (m,) is the target."""
+        return replace(self, whitener=whitener, measured=whitener.one(aim_mm), offsets=RunOffsets.of(whitener))
 
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
         """Parameters of given effects, with bounds narrowed to the range that the data can show."""

@@ -1,16 +1,19 @@
 """The measuring chain: recorded input, drive effects, the gripper, mechanism effects, camera effects."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fingervision.diagnosis.inference.delayed_path import delayed_path
 from fingervision.domain.effect import Array, DriveEffect, Effect, History, InputPath, PointEffect, Values
 from fingervision.domain.model import Model, PhysicalLaw, PhysicalModel
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
+from fingervision.effects.time_delay import is_delay
 
 Settings = Mapping[str, Values]
 
@@ -85,6 +88,9 @@ class MeasuringChain:
         """
         acting = {**self.fixed, **settings}
         history = self.history if self.path is None else self.path.history
+        for effect in self._delays(acting, self._stages[1]):
+            rows = np.arange(history.input_mm.size) if self.path is None else self.path.rows
+            return self._before(effect, acting, rows).respond(_without(effect, acting))
         points = [effect for effect in self._stages[1] if effect.name in acting]
         response = self.model.respond(self._driven_mm(acting))
         if self.dynamics is not None and self.dynamics[0] is history.time_s:
@@ -117,10 +123,30 @@ class MeasuringChain:
             # A delay commutes with effects that do not depend on time. Delays are applied last, because the jumps of a
             # delayed command lie between the points of the path.
             drives = tuple(sorted(drives, key=lambda effect: effect.delay_s is not None))
+        for effect in self._delays(acting, drives):
+            # A delay commutes with drive effects, none of which depends on the time itself.
+            return self._before(effect, acting, np.arange(input_mm.size)).driven_mm(_without(effect, acting))
         for effect in drives:
             if effect.name in acting:
                 input_mm = effect.act(input_mm, history, acting[effect.name])
         return input_mm
+
+    def _delays(self, acting: Settings, effects: Sequence[Effect]) -> list[Effect]:
+        """Delays among some effects that act beside a drive effect with memory (`delayed_path`).
+
+        None for a command, whose path has points between its rows, and for a model that is computed along the path.
+        """
+        if self.history.commanded or self.history.time_s is None or self.dynamics is not None:
+            return []
+        if not any(e.memory and not is_delay(e) for e in self._stages[0] if e.name in acting):
+            return []
+        return [e for e in effects if e.name in acting and is_delay(e) and acting[e.name]["delay_s"] > 0.0]
+
+    def _before(self, delay: Effect, acting: Settings, rows: NDArray[np.intp]) -> "MeasuringChain":
+        """Return the chain whose rows are some points of the path, earlier by a delay."""
+        history = self.history if self.path is None else self.path.history
+        path = delayed_path(history, rows, acting[delay.name]["delay_s"], curved=self.curved)
+        return replace(self, fixed={}, path=path)
 
     def stacked(self, settings: Settings) -> Array:
         """Stack gap and, if measured, midline and force into one column; shape (channels * n,)."""
@@ -131,6 +157,10 @@ class MeasuringChain:
         if self.history.force and response.force_n is not None:
             parts.append(response.force_n)
         return np.concatenate(parts)
+
+
+def _without(effect: Effect, acting: Settings) -> Settings:
+    return {name: values for name, values in acting.items() if name != effect.name}
 
 
 def own_laws(model: Model) -> Mapping[str, PhysicalLaw]:

@@ -13,7 +13,6 @@ from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.path import recorded
 from fingervision.diagnosis.noise.picture_noise import picture_noise
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 from fingervision.stage_record.window_blending import blended
@@ -90,8 +89,7 @@ def _with_picture_noise(
     noise = picture_noise(
         residual_mm, of_input, history.runs, 1.0 / history.sample_time_s, aside, whitener.noises[0], data.floors_mm[0]
     )
-    whitener = replace(whitener, noises=(noise, *whitener.noises[1:]))
-    return replace(problem, whitener=whitener, measured=whitener.one(data.aim_mm), offsets=RunOffsets.of(whitener))
+    return problem.judged_by(replace(whitener, noises=(noise, *whitener.noises[1:])), data.aim_mm)
 
 
 def with_record_errors(

@@ -20,7 +20,8 @@ from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
 from fingervision.diagnosis.inference.record_errors import settled_with_records
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.inference.searched import Look, Searched, problem_of
+from fingervision.diagnosis.inference.searched import Look, Searched, problem_of, refitted
+from fingervision.diagnosis.inference.turning_places import beside_turns
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
@@ -75,7 +76,7 @@ def refitted_search(
         Called with the share of the work that is done.
     """
     look = Look(rng, forced, progress)
-    state = _at_the_rows(look.again(data), look)
+    state = beside_turns(look.again(data), look)
     likelier = likelier_interpolation(state.data, state.found.problem, state.found.best)
     if likelier is not state.data:
         state = look.again(likelier)
@@ -85,16 +86,6 @@ def refitted_search(
         state = beside_map(state, look)
     state = _common_offset(state, look)
     return _settled(_beside_drawing(state, look), rng)
-
-
-def _at_the_rows(state: Searched, look: Look) -> Searched:
-    """Search with a stage that turned at recorded rows instead of between them, if that clearly fits better."""
-    data = state.data.along_the_rows()
-    if data is state.data:
-        return state
-    found = state.found
-    tried = [found.best, *_with_memory(found)]
-    return look.again(data) if _refitted_score(found, data, tried) < found.best.score - LEAST_GAIN else state
 
 
 def _over_the_ends(state: Searched, look: Look) -> Searched:
@@ -153,9 +144,7 @@ def _beside_drawing(state: Searched, look: Look) -> Searched:
         if straight:
             break
         state = look.again(state.data)
-    found = replace(state.found, problem=problem_of(state.data, state.found.best))
-    refit = fit(found.problem, found.best.names, found.best.values, iterations=20) if found.best.names else found.best
-    return replace(state, found=_with_best(found, refit))
+    return refitted(state)
 
 
 def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
@@ -163,7 +152,7 @@ def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
     data, found = state.data, without_unneeded_effects(state.data, state.found)
     found = with_simpler_parts(data, without_fits_to_structure(data, found))
     best, posterior = settled_with_records(data, found.problem, found.best, rng)
-    found = _with_best(found, best)
+    found = found.with_best(best)
     if data.position_map is not None:
         data = replace(
             data, position_map=data.position_map.refitted(found.problem, best, data.behind(data.position_map))
@@ -175,8 +164,3 @@ def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
         data = data.redrawn(found.problem, best if best.names else found.problem.nothing())
         found = replace(found, problem=problem_of(data, best))
     return Refitted(replace(data, notes=(*data.notes, *state.said)), found, posterior)
-
-
-def _with_best(found: Findings, best: Explanation) -> Findings:
-    others = tuple(best if explanation is found.best else explanation for explanation in found.alternatives)
-    return replace(found, best=best, alternatives=others)

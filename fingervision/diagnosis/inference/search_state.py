@@ -1,7 +1,7 @@
 """State of a search for effects: explanations with one, two and three effects, and the evidence for them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fingervision.diagnosis.inference.explanation_candidates import (
     extended,
@@ -45,6 +45,11 @@ class Findings:
     smallest: dict[str, dict[str, object]]
     distances: dict[tuple[str, ...], float]
     problem: Problem
+
+    def with_best(self, best: Explanation, problem: Problem | None = None) -> "Findings":
+        """Return the findings with the best explanation refitted, and the estimation problem of this refit."""
+        others = tuple(best if explanation is self.best else explanation for explanation in self.alternatives)
+        return replace(self, best=best, alternatives=others, problem=problem or self.problem)
 
 
 def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -> bool:

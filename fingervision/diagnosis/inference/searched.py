@@ -7,6 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search import search
@@ -76,3 +77,10 @@ def _noise_is_too_large(found: Findings) -> bool:
     """
     rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
     return bool(found.best.score < rows - QUIET * rows**0.5)
+
+
+def refitted(state: Searched) -> Searched:
+    """Refit the best explanation with the noise and the random effects that belong to it."""
+    problem, best = problem_of(state.data, state.found.best), state.found.best
+    refit = fit(problem, best.names, best.values, iterations=20) if best.names else best
+    return replace(state, found=state.found.with_best(refit, problem))

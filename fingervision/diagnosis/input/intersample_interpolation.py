@@ -5,8 +5,8 @@ from dataclasses import replace
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.domain.effect import DriveEffect, Effect, PointEffect
 from fingervision.effects import catalogue
+from fingervision.effects.time_delay import is_delay
 
 CLEARLY = 10.0
 """Chi-square by which curves must fit better than straight lines."""
@@ -54,11 +54,6 @@ def _score(problem: Problem, best: Explanation, fixed: bool) -> float:
 def delays() -> tuple[str, ...]:
     """Names of the effects that are a delay, in the catalogue's order."""
     return tuple(name for name, effect in catalogue().items() if is_delay(effect))
-
-
-def is_delay(effect: Effect) -> bool:
-    """Whether an effect is a delay; interpolation by curves matters for delays only."""
-    return isinstance(effect, DriveEffect | PointEffect) and effect.act_curved is not None
 
 
 def _like_delays() -> frozenset[str]:

@@ -17,6 +17,7 @@ from fingervision.diagnosis.input.path import input_path, turning_readings
 from fingervision.diagnosis.input.recorded_input import RecordedInput
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.diagnosis.input.turning_errors import TurningErrors
+from fingervision.diagnosis.input.unseen_turns import NO_TURNS, UnseenTurns
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
@@ -41,6 +42,9 @@ SHORT = 100
 """Number of samples below which no row is excluded before an effect is found."""
 NOTHING: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 """The model without effects."""
+SMALL_TURN = 0.02
+"""Step of the derivative with respect to a turning point's place (`UnseenTurns.short_by`), as a share of its range: the
+play that it shifts is not linear."""
 OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
 """Outlier limits, in standard deviations, for the residual of the best explanation, and for the residual before any
 effect is found."""
@@ -79,6 +83,8 @@ class Observations:
         Errors of the recorded input that repeat at its places because an encoder rounds them alike.
     turning : TurningErrors or None
         Errors of an encoder's record at the reversals of the stage.
+    turns : UnseenTurns
+        Corners of the motion between the rows, and where the stage turned.
     """
 
     table: MeasuredTable
@@ -99,6 +105,7 @@ class Observations:
     clock: Array | None = None
     function: FunctionModel | None = None
     turning: TurningErrors | None = None
+    turns: UnseenTurns = NO_TURNS
 
     @property
     def aim_mm(self) -> Array:
@@ -122,7 +129,11 @@ class Observations:
     def random_effects_mm(self, values: Mapping[str, Mapping[str, float]]) -> tuple[tuple[object, Array], ...]:
         """Random effects beside an explanation, each with its columns, in the order used by a problem."""
         own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains, self.roundings) if one]
-        turning = [] if self.turning is None else [(self.turning, self.turning.columns_mm(self.chain, values))]
+        turning: list[tuple[object, Array]] = (
+            [] if self.turning is None else [(self.turning, self.turning.columns_mm(self.chain, values))]
+        )
+        if self.turns.random and self.turns.uncertain:
+            turning.append((self.turns, self.turn_columns_mm(values) * self.turns.sigmas))
         clock = [] if self.clock is None or not self.clock.shape[1] else [("clock", self.clock)]
         drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
         return (*own, *turning, *clock, *drawing)
@@ -208,24 +219,48 @@ class Observations:
         """
         if not turning_readings(self.table).size:
             return self
-        along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
-        path = input_path(self.table, self.chain.history, along_mm, commanded=commanded, overshoots=True)
         said = (
             f"{turning_readings(self.table).size} readings repeat an outermost target: an overshoot of the stage "
             "beyond this target, as in ISO 230-2, is assumed between them, because it explains the data better."
         )
-        return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
+        return replace(self._along(self.turns, overshoots=True), notes=(*self.notes, said))
 
-    def along_the_rows(self) -> "Observations":
-        """Return the observations with a stage that turned at recorded rows; unchanged if the path has no other turn.
+    def turned(self, short_by: Array) -> "Observations":
+        """Return the observations with other turning points between the rows (`UnseenTurns`); shape (reversals,)."""
+        return self._along(self.turns.turned(short_by))
 
-        The path of the input then has no turning points between the rows.
+    def turn_columns_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
+        """Change of the stacked prediction per unit of each reversal's `short_by`; shape (m, reversals).
+
+        All turning points are moved together: a row depends on the latest one, as long as strokes are longer than what
+        an effect remembers.
         """
-        along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
-        path = input_path(self.table, self.chain.history, along_mm, commanded=commanded, turns=False)
-        rows = self.chain.history.input_mm.size
-        points, fewer = (rows if each is None else each.owner.size for each in (self.chain.path, path))
-        return self if fewer == points else replace(self, chain=replace(self.chain, path=path))
+        count, n = self.turns.uncertain, self.chain.history.input_mm.size
+        columns = np.zeros((self.stacked_mm.size, count))
+        if not (values or self.chain.fixed) or not count:
+            return columns
+        short_by, ranges = np.array(self.turns.short_by), self.turns.ranges
+        step = SMALL_TURN * (ranges[:, 1] - ranges[:, 0]) * np.where(short_by < ranges.mean(axis=1), 1.0, -1.0)
+        change = self.turned(short_by + step).chain.stacked(values) - self.chain.stacked(values)
+        after = np.array([corner.after for corner in self.turns.reversals])
+        rows = np.arange(n) if self.table.path is None else self.table.path.rows
+        latest = np.searchsorted(after, rows, side="left") - 1
+        for begin in range(0, change.size, n):
+            known = np.flatnonzero(latest >= 0)
+            columns[begin + known, latest[known]] = change[begin + known] / step[latest[known]]
+        return columns
+
+    def _along(self, turns: UnseenTurns, *, overshoots: bool = False) -> "Observations":
+        record = self.recorded
+        path = input_path(
+            self.table,
+            self.chain.history,
+            record.along_mm,
+            commanded=record.commanded,
+            turns=turns,
+            overshoots=overshoots,
+        )
+        return replace(self, chain=replace(self.chain, path=path), turns=turns)
 
     def redrawn(self, problem: Problem, explanation: Explanation) -> "Observations":
         """Refit the drawing's uncertain dimensions for an explanation, and use them in all later predictions."""

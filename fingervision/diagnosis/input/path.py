@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.diagnosis.input.unseen_turns import NO_TURNS, UnseenTurns
 from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.measured_table import MeasuredTable
-from fingervision.stage_record.turning_points import turning_points
+from fingervision.stage_record.corners import corners
 
 AT_REST_S = 5.0
 """Shortest time between rows that count as separate readings at rest: in ISO 230-2 a stage rests for some seconds at
@@ -71,6 +72,28 @@ def _revisits(input_mm: Array, runs: tuple[slice, ...]) -> bool:
     return float(np.sum(counts[counts > 1])) > REVISITED_SHARE * visits.size
 
 
+def unseen_turns(table: MeasuredTable, history: History, along_mm: Array, *, commanded: bool) -> UnseenTurns:
+    """Find the corners of a motion between the rows; none of a command, or between readings at rest.
+
+    Parameters
+    ----------
+    table : MeasuredTable
+        The measured table.
+    history : History
+        History of the measured rows.
+    along_mm : ndarray of float, shape (m,)
+        Smoothed input of every recorded row.
+    commanded : bool
+        Whether the input is a command that keeps its value until it jumps.
+    """
+    _, time_s, runs = recorded(table)
+    if time_s is None or commanded:
+        return NO_TURNS
+    rest = readings_at_rest(table)
+    found = corners(along_mm, time_s, runs, history.input_sigma_mm)
+    return UnseenTurns(tuple(corner for corner in found if not rest[corner.after : corner.after + 2].any()))
+
+
 def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
     """Rows of the path that were read at rest at the previous row's input, where the stage reverses.
 
@@ -95,8 +118,8 @@ def input_path(
     along_mm: Array,
     *,
     commanded: bool,
+    turns: UnseenTurns,
     overshoots: bool = False,
-    turns: bool = True,
 ) -> InputPath | None:
     """Build the path on which effects with memory depend.
 
@@ -110,10 +133,10 @@ def input_path(
         Smoothed input of every recorded row.
     commanded : bool
         Whether the input is a command that keeps its value until it jumps.
+    turns : UnseenTurns
+        Corners of the motion between the rows, and where the stage turned.
     overshoots : bool
         Whether the stage went beyond its targets where it reversed between two readings of the same target.
-    turns : bool
-        Whether a stage in motion turned beyond the rows beside its reversal (`turning_points`).
 
     Returns
     -------
@@ -125,9 +148,8 @@ def input_path(
         return None
     rows = np.arange(along_mm.size) if table.path is None else table.path.rows
     rest = readings_at_rest(table)
-    found = turning_points(along_mm, time_s, runs, history.input_sigma_mm) if turns and not commanded else []
-    turned = {point.after: point for point in found if not rest[point.after : point.after + 2].any()}
-    if table.path is None and not commanded and not rest.any() and not turned:
+    between = turns.points
+    if table.path is None and not commanded and not rest.any() and not between:
         return None
     over = set(turning_readings(table).tolist()) if overshoots else set[int]()
     owner_of = np.full(along_mm.size, -1, dtype=np.intp)
@@ -161,9 +183,9 @@ def input_path(
             inputs.append(along_mm[i])
             times.append(time_s[i])
             owners.append(int(owner_of[i]))
-            if i in turned:
-                inputs.append(turned[i].input_mm)
-                times.append(turned[i].time_s)
+            for at_s, at_mm in between.get(i, ()):
+                inputs.append(at_mm)
+                times.append(at_s)
                 owners.append(-1)
         path_runs.append(slice(begin, len(inputs)))
     along = replace(history, input_mm=np.array(inputs), time_s=np.array(times), runs=tuple(path_runs))

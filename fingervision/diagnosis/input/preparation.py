@@ -11,7 +11,7 @@ from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, 
 from fingervision.diagnosis.input.clock_nuisance import clock_columns
 from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.path import dwell_s, input_path, mostly_at_rest
+from fingervision.diagnosis.input.path import dwell_s, input_path, mostly_at_rest, unseen_turns
 from fingervision.diagnosis.input.path import recorded as recorded_rows
 from fingervision.diagnosis.input.recorded_input import RecordedInput
 from fingervision.diagnosis.input.row_screening import screened_rows
@@ -41,7 +41,8 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     _refuse_other_inputs(table.input_mm, model.input_range_mm)
     recorded = RecordedInput.of(table, model)
     history = _history(table, model, recorded)
-    path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded)
+    turns = unseen_turns(table, history, recorded.along_mm, commanded=recorded.commanded)
+    path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded, turns=turns)
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
     chain = MeasuringChain(model.base, history, fixed, path=path)
     if function is not None:
@@ -67,6 +68,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         clock=clock_columns(chain, table.u_clock_s),
         function=function,
         turning=TurningErrors.of(history),
+        turns=turns,
     )
 
 
