@@ -17,7 +17,7 @@ def unseen_turns(drive: DriveHistory) -> tuple[int, float]:
         runs = [slice(begin, end) for begin, end in pairwise(ends)]
     sigma_mm, _ = input_sigma(drive.input_mm, tuple(runs), drive.time_s)
     found = corners(drive.input_mm, drive.time_s, tuple(runs), sigma_mm)
-    points = [corner for corner in found if corner.least_mm is not None]
-    lines_mm = np.interp([point.time_s for point in points], drive.time_s, drive.input_mm)
-    beyond = [abs(point.input_mm - line_mm) for point, line_mm in zip(points, lines_mm, strict=True)]
+    points = [corner.points(corner.short_by[0])[0] for corner in found if corner.least_mm is not None]
+    lines_mm = np.interp([at_s for at_s, _ in points], drive.time_s, drive.input_mm)
+    beyond = [abs(at_mm - line_mm) for (_, at_mm), line_mm in zip(points, lines_mm, strict=True)]
     return len(points), float(max(beyond, default=0.0))

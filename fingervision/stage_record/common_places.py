@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from fingervision.stage_record.corners import Corner
+from fingervision.stage_record.corner import Corner
 
 
-def at_common_places(corners: "Sequence[Corner]", within_mm: float) -> "list[Corner]":
+def at_common_places(corners: Sequence[Corner], within_mm: float) -> list[Corner]:
     """Narrow the places of the reversals by those of the other strokes.
 
     Each reversal lies between the farther row beside it and the place at which the motions before and after it meet. If
@@ -48,7 +46,7 @@ def at_common_places(corners: "Sequence[Corner]", within_mm: float) -> "list[Cor
     return out
 
 
-def _overlapping(turning: list[int], corners: "Sequence[Corner]", way: float) -> list[list[int]]:
+def _overlapping(turning: list[int], corners: Sequence[Corner], way: float) -> list[list[int]]:
     """Group reversals whose ranges overlap, from the lowest to the highest."""
     groups: list[list[int]] = []
     reach = -np.inf
@@ -60,7 +58,7 @@ def _overlapping(turning: list[int], corners: "Sequence[Corner]", way: float) ->
     return groups
 
 
-def _narrowed(corner: "Corner", way: float, least: float, most: float) -> "Corner":
+def _narrowed(corner: Corner, way: float, least: float, most: float) -> Corner:
     farthest = way * corner.input_mm
     width = farthest - way * float(corner.least_mm or 0.0)
     low, high = corner.short_by

@@ -12,6 +12,7 @@ import numpy as np
 
 from fingervision.domain.effect import Array
 from fingervision.stage_record.common_places import at_common_places
+from fingervision.stage_record.corner import Corner
 
 STENCIL = 3
 """Rows on either side that determine the motion up to the corner: position, speed and acceleration."""
@@ -25,59 +26,9 @@ BENT = 0.2
 """Bend, as a share of that at the corner, up to which the motions beside a start or stop are straight; and least
 distance of a row at rest from both continued motions, as a share of the bend there. At a smooth reversal with 25 rows a
 period, a parabola continues the motion to a quarter of the bend."""
-MOST_SHORT = 0.999
-"""Largest share of the way back to the row at which the stage turned: the points of the path keep different times."""
-KNOWN = 0.01
-"""Range of this share below which the turning point is known."""
 FINE = 33
-"""Times between two rows at which both continuations are compared: the corner is then exact to a thousandth of the
-motion between two rows."""
-
-
-@dataclass(frozen=True, slots=True)
-class Corner:
-    """A corner of the motion between two rows.
-
-    Parameters
-    ----------
-    after : int
-        Index of the row before it.
-    time_s, input_mm : float
-        Its time and input.
-    least_mm : float or None
-        At a reversal, input of the farther one of the two rows beside it: a stage that stops for a moment, or slows
-        down, turns anywhere between this row and `input_mm`. None at a start or stop.
-    passed_s : (float, float)
-        Times at which the continued motions before and after a reversal pass `least_mm`.
-    short_by : (float, float)
-        Least and largest share of the way from `input_mm` back to `least_mm` at which the stage can have turned.
-    """
-
-    after: int
-    time_s: float
-    input_mm: float
-    least_mm: float | None = None
-    passed_s: tuple[float, float] = (0.0, 0.0)
-    short_by: tuple[float, float] = (0.0, MOST_SHORT)
-
-    @property
-    def free(self) -> bool:
-        """Whether the place of the reversal is not known from the rows."""
-        return self.least_mm is not None and self.short_by[1] - self.short_by[0] > KNOWN
-
-    def points(self, short_by: float) -> list[tuple[float, float]]:
-        """Time and input of the path's points here.
-
-        Parameters
-        ----------
-        short_by : float
-            At a reversal, share of the way from `input_mm` back to `least_mm` at which the stage stops, until the
-            motion after the reversal passes this place.
-        """
-        if self.least_mm is None or short_by <= 0.0:
-            return [(self.time_s, self.input_mm)]
-        place_mm = self.input_mm + short_by * (self.least_mm - self.input_mm)
-        return [(self.time_s + short_by * (at_s - self.time_s), place_mm) for at_s in self.passed_s]
+"""Times between two rows at which both continuations are compared: the turning point of a smooth reversal is then exact
+to a thousandth of the motion between two rows."""
 
 
 def corners(input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: float) -> list[Corner]:
@@ -190,13 +141,14 @@ class _Rows:
             return None
         at = np.linspace(t[i], t[i + 1], FINE)
         before, after = slice(i - STENCIL + 1, i + 1), slice(i + 1, i + 1 + STENCIL)
-        ahead, behind = _weights(t[before], at), _weights(t[after], at)
         # No farther than at the speeds beside the reversal: a parabola through rows of a bend overestimates it.
-        rising = np.minimum(ahead @ u[before], _line(u, t, i - 1, i, at))
-        falling = np.minimum(behind @ u[after], _line(u, t, i + 2, i + 1, at))
+        rising = np.minimum(_weights(t[before], at) @ u[before], _line(u, t, i - 1, i, at))
+        falling = np.minimum(_weights(t[after], at) @ u[after], _line(u, t, i + 2, i + 1, at))
+        at, rising, falling = _with_crossing(at, rising, falling)
         height = np.minimum(rising, falling)
         top = int(np.argmax(height))
-        gain = float(np.sqrt(max(np.sum(ahead[top] ** 2), np.sum(behind[top] ** 2))))
+        sums = [np.sum(_weights(t[rows], at[top : top + 1]) ** 2) for rows in (before, after)]
+        gain = float(np.sqrt(max(sums)))
         least = max(u[i], u[i + 1])
         if height[top] - least <= SURELY * gain * self.sigma_mm:
             return None
@@ -228,6 +180,19 @@ class _Rows:
         if not t[i] + margin_s < at_s < t[i + 1] - margin_s or beside <= 2.0 * SURELY * self.sigma_mm:
             return None
         return abs(change), Corner(self.first + i, float(at_s), float(place))
+
+
+def _with_crossing(at: Array, rising: Array, falling: Array) -> tuple[Array, Array, Array]:
+    """Add the time at which two continued motions cross, by linear interpolation."""
+    apart = rising - falling
+    crossed = np.flatnonzero((apart[:-1] < 0.0) & (apart[1:] > 0.0))
+    if not crossed.size:
+        return at, rising, falling
+    k = int(crossed[0])
+    share = apart[k] / (apart[k] - apart[k + 1])
+    columns = (np.insert(c, k + 1, c[k] + share * (c[k + 1] - c[k])) for c in (at, rising, falling))
+    at, rising, falling = columns
+    return at, rising, falling
 
 
 def _weights(t: Array, at: Array) -> Array:

@@ -71,9 +71,11 @@ def beside_turns(state: Searched, look: Look) -> Searched:
         if likelier is None:
             break
         state = look.again(likelier.data, likelier.explanation)
+    if not (state.data.turns.uncertain and state.found.best.names):
+        return state
     # What the places leave uncertain belongs to the uncertainty of the effects.
     state = replace(state, data=replace(state.data, turns=replace(state.data.turns, random=True)))
-    return refitted(state) if state.found.best.names else state
+    return refitted(state)
 
 
 def _likelier(data: Observations, found: Findings) -> Turned | None:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from fingervision.domain.effect import Array
-from fingervision.stage_record.corners import Corner
+from fingervision.stage_record.corner import Corner
 
 SIGMA = 0.5
 """Standard deviation of a place before the gap is looked at, as a share of its range."""
