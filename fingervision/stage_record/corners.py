@@ -6,26 +6,22 @@ same as a play on every straight stroke, explains the rows beside a reversal bet
 beside a start or a stop is wrong by up to v dt / 4, which a delayed mechanism shows at a later row.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fingervision.domain.effect import Array
 from fingervision.stage_record.common_places import at_common_places
+from fingervision.stage_record.continued_motion import ROUNDED, STENCIL, SURELY, ContinuedMotion, continued
 from fingervision.stage_record.corner import Corner
 
-STENCIL = 3
-"""Rows on either side that determine the motion up to the corner: position, speed and acceleration."""
 LONGEST_GAP = 5.0
 """Longest time between two rows, in median time steps, over which the motion is continued: a few rows are missing. In
 a longer pause of the record, the stage may have done anything."""
-SURELY = 3.0
-"""Standard uncertainties by which a corner must lie beside the line through the rows, so that noise of the input adds
-none."""
 BENT = 0.2
-"""Bend, as a share of that at the corner, up to which the motions beside a start or stop are straight; and least
-distance of a row at rest from both continued motions, as a share of the bend there. At a smooth reversal with 25 rows a
-period, a parabola continues the motion to a quarter of the bend."""
+"""Least distance of a row at rest from a continued motion that is not straight, as a share of the bend there (second
+difference of the input). At a smooth reversal with 25 rows a period, a parabola continues the motion to a quarter of
+the bend."""
 FINE = 33
 """Times between two rows at which both continuations are compared: the turning point of a smooth reversal is then exact
 to a thousandth of the motion between two rows."""
@@ -34,9 +30,8 @@ to a thousandth of the motion between two rows."""
 def corners(input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: float) -> list[Corner]:
     """Find the corners of a motion between its recorded rows.
 
-    The motions before and after a corner are continued to where they intersect: beside a reversal by parabolas through
-    three rows each, beside a start or stop, where both must be straight, by lines. At a reversal without a corner, both
-    parabolas are the same curve, and its vertex is the turning point.
+    The motions before and after a corner are continued to where they intersect (`continued`); beside a start or stop,
+    both must be straight. At a reversal without a corner, both are the same curve, and its vertex is the turning point.
 
     Parameters
     ----------
@@ -103,25 +98,23 @@ class _Rows:
 
     def _rest_at(self, top: int, way: float) -> list[Corner]:
         """Stop and start beside a row at which the stage rested: the row lies on neither continued motion."""
-        u, t = way * self.u, self.t
         if not self._continued(top - 1, top + 1):
             return []
-        at = np.array([t[top]])
-        before, after = slice(top - STENCIL, top), slice(top + 1, top + 1 + STENCIL)
+        t, at = self.t, np.array([self.t[top]])
+        u = way * self.u
         bend = 2.0 * u[top] - u[top - 1] - u[top + 1]
-        shares = []
-        for rows, one, other in ((before, top - 2, top - 1), (after, top + 2, top + 1)):
-            weights = _weights(t[rows], at)
-            ahead = min(float((weights @ u[rows])[0]), float(_line(u, t, one, other, at)[0]))
-            noise = SURELY * float(np.sqrt(np.sum(weights**2) + 1.0)) * self.sigma_mm
-            if ahead - u[top] <= max(noise, BENT * bend):
+        ends = []
+        for other, side, after in ((top - 1, -1, top - 1), (top + 1, 1, top)):
+            motion = self._beyond_row(other, side, at, way)
+            if motion is None:
                 return []
-            shares.append((u[top] - u[other]) / (ahead - u[other]))
-        ends = [
-            (after, t[other] + share * (t[top] - t[other]))
-            for share, other, after in zip(shares, (top - 1, top + 1), (top - 1, top), strict=True)
-        ]
-        return [Corner(self.first + i, float(at_s), float(self.u[top])) for i, at_s in ends]
+            ahead = float(motion.input_mm[0]) - u[top]
+            bent = ROUNDED if motion.straight else BENT
+            if ahead <= max(SURELY * float(np.hypot(motion.u_mm, self.sigma_mm)), bent * bend):
+                return []
+            share = (u[top] - u[other]) / (ahead + u[top] - u[other])
+            ends.append(Corner(self.first + after, float(t[other] + share * (t[top] - t[other])), float(self.u[top])))
+        return ends
 
     def _still(self, i: int) -> bool:
         """Whether the rows i and i + 1 are at the same place: the stage rests, so that no reversal lies beside them."""
@@ -132,6 +125,19 @@ class _Rows:
         known = i >= STENCIL - 1 and j + STENCIL <= self.u.size
         return known and bool(np.max(np.diff(self.t[i : j + 1])) <= self.longest_s)
 
+    def _beyond_row(self, i: int, side: int, at: Array, way: float) -> ContinuedMotion | None:
+        """Continue the motion beyond a row, upside down if `way` is -1.
+
+        A motion that is not straight goes no farther than at its speed beside the row: a parabola through rows of a
+        corner overestimates it.
+        """
+        u, t = way * self.u, self.t
+        motion = continued(u, t, i, side, at, self.sigma_mm)
+        if motion is None or motion.straight:
+            return motion
+        line = u[i] + (u[i + side] - u[i]) / (t[i + side] - t[i]) * (at - t[i])
+        return replace(motion, input_mm=np.minimum(motion.input_mm, line))
+
     def _beyond(self, i: int, way: float) -> Corner | None:
         """Find the reversal beyond the rows i and i + 1; None if the rows show none."""
         u, t = way * self.u, self.t
@@ -140,46 +146,39 @@ class _Rows:
         if not self._continued(i, i + 1) or u[i] == u[i + 1]:
             return None
         at = np.linspace(t[i], t[i + 1], FINE)
-        before, after = slice(i - STENCIL + 1, i + 1), slice(i + 1, i + 1 + STENCIL)
-        # No farther than at the speeds beside the reversal: a parabola through rows of a bend overestimates it.
-        rising = np.minimum(_weights(t[before], at) @ u[before], _line(u, t, i - 1, i, at))
-        falling = np.minimum(_weights(t[after], at) @ u[after], _line(u, t, i + 2, i + 1, at))
-        at, rising, falling = _with_crossing(at, rising, falling)
+        before, after = self._beyond_row(i, -1, at, way), self._beyond_row(i + 1, 1, at, way)
+        if before is None or after is None:
+            return None
+        at, rising, falling = _with_crossing(at, before.input_mm, after.input_mm)
         height = np.minimum(rising, falling)
-        top = int(np.argmax(height))
-        sums = [np.sum(_weights(t[rows], at[top : top + 1]) ** 2) for rows in (before, after)]
-        gain = float(np.sqrt(max(sums)))
-        least = max(u[i], u[i + 1])
-        if height[top] - least <= SURELY * gain * self.sigma_mm:
+        top, least = int(np.argmax(height)), float(max(u[i], u[i + 1]))
+        if height[top] - least <= SURELY * max(before.u_mm, after.u_mm):
             return None
         # Both rows are passed at their own times, the lower one's motion passes the height of the other in between.
         leave_s = float(np.interp(least, np.maximum.accumulate(rising[: top + 1]), at[: top + 1]))
         return_s = float(np.interp(least, np.maximum.accumulate(falling[top:][::-1]), at[top:][::-1]))
-        return Corner(self.first + i, float(at[top]), way * float(height[top]), way * float(least), (leave_s, return_s))
+        return Corner(self.first + i, float(at[top]), way * float(height[top]), way * least, (leave_s, return_s))
 
     def _bend(self, i: int) -> tuple[float, Corner] | None:
         """Find the corner between straight motions up to row i and from row i + 1, with the change of speed."""
         u, t = self.u, self.t
-        near = slice(max(0, i - 2), i + 4)
-        step_s = np.diff(t[near])
-        speed, noise = np.diff(u[near]) / step_s, SURELY * np.sqrt(2.0) * self.sigma_mm / float(np.min(step_s))
-        gap = i - near.start
-        before, after = speed[:gap], speed[gap + 1 :]
-        before = before[-1:] if self._still(i - 1) else before
-        after = after[:1] if self._still(i + 1) else after
-        change = after[0] - before[-1]
-        bent = max(float(np.ptp(before)), float(np.ptp(after)))
-        if before[-1] * after[0] < 0.0 or np.max(step_s) > self.longest_s or bent > max(BENT * abs(change), noise):
+        if np.max(np.diff(t[i - 1 : i + 3])) > self.longest_s:
             return None
-        if abs(change) <= max(noise, 1e-9 * float(np.max(np.abs(speed)))):
+        at = t[i : i + 2]
+        before, after = (continued(u, t, k, side, at, self.sigma_mm) for k, side in ((i, -1), (i + 1, 1)))
+        if before is None or after is None or not (before.straight and after.straight):
             return None
-        at_s = (u[i + 1] - u[i] - after[0] * t[i + 1] + before[-1] * t[i]) / (before[-1] - after[0])
-        place = u[i] + before[-1] * (at_s - t[i])
-        margin_s = (t[i + 1] - t[i]) / FINE
-        beside = abs(place - float(np.interp(at_s, t[i : i + 2], u[i : i + 2])))
-        if not t[i] + margin_s < at_s < t[i + 1] - margin_s or beside <= 2.0 * SURELY * self.sigma_mm:
+        apart = before.input_mm - after.input_mm
+        speeds = [float(np.diff(motion.input_mm)[0] / (t[i + 1] - t[i])) for motion in (before, after)]
+        if speeds[0] * speeds[1] < 0.0 or apart[0] * apart[1] >= 0.0:
             return None
-        return abs(change), Corner(self.first + i, float(at_s), float(place))
+        share = float(apart[0] / (apart[0] - apart[1]))
+        place = float(before.input_mm[0] + share * np.diff(before.input_mm)[0])
+        beside = abs(place - (u[i] + share * (u[i + 1] - u[i])))
+        noise = SURELY * float(np.hypot(max(before.u_mm, after.u_mm), self.sigma_mm))
+        if not 1.0 / FINE < share < 1.0 - 1.0 / FINE or beside <= max(noise, ROUNDED * abs(u[i + 1] - u[i])):
+            return None
+        return abs(speeds[1] - speeds[0]), Corner(self.first + i, float(t[i] + share * (t[i + 1] - t[i])), place)
 
 
 def _with_crossing(at: Array, rising: Array, falling: Array) -> tuple[Array, Array, Array]:
@@ -193,17 +192,3 @@ def _with_crossing(at: Array, rising: Array, falling: Array) -> tuple[Array, Arr
     columns = (np.insert(c, k + 1, c[k] + share * (c[k + 1] - c[k])) for c in (at, rising, falling))
     at, rising, falling = columns
     return at, rising, falling
-
-
-def _weights(t: Array, at: Array) -> Array:
-    """Weights of three rows in the parabola through them (Lagrange), shape (times, 3)."""
-    columns = []
-    for j in range(STENCIL):
-        others = [k for k in range(STENCIL) if k != j]
-        columns.append(np.prod([(at - t[k]) / (t[j] - t[k]) for k in others], axis=0))
-    return np.stack(columns, axis=1)
-
-
-def _line(u: Array, t: Array, one: int, other: int, at: Array) -> Array:
-    """Continue the straight line through two rows."""
-    return np.asarray(u[other] + (u[other] - u[one]) / (t[other] - t[one]) * (at - t[other]))
