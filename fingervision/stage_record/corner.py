@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 MOST_SHORT = 0.999
-"""Largest share of the way back to the row at which the stage turned: the points of the path keep different times."""
+"""Largest share of the way back to the row at which the stage turned: the points of the path keep different times. For
+the same reason, a stage that turned within a thousandth of the meeting place turned there."""
 KNOWN = 0.01
 """Range of this share below which the turning point is known."""
 
@@ -48,7 +49,7 @@ class Corner:
             At a reversal, share of the way from `input_mm` back to `least_mm` at which the stage stops, until the
             motion after the reversal passes this place.
         """
-        if self.least_mm is None or short_by <= 0.0:
+        if self.least_mm is None or short_by < 1.0 - MOST_SHORT:
             return [(self.time_s, self.input_mm)]
         place_mm = self.input_mm + short_by * (self.least_mm - self.input_mm)
         return [(self.time_s + short_by * (at_s - self.time_s), place_mm) for at_s in self.passed_s]

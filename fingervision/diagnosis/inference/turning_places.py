@@ -157,7 +157,7 @@ def _beside_reversals(data: Observations, explanation: Explanation) -> Problem:
     aside = problem.whitener.aside & ~shows
     elsewhere = ~shows[: residual_mm[0].size]
     noises = tuple(
-        Noise(max(TO_SD * float(np.median(np.abs(part[elsewhere]))) if elsewhere.any() else 0.0, floor, 1e-9), 0.0, 1.0)
+        Noise(max(TO_SD * float(np.median(np.abs(part[elsewhere]))) if elsewhere.any() else 0.0, floor, 1e-9), 0.0, 0.0)
         for part, floor in zip(residual_mm, data.floors_mm, strict=True)
     )
     whitener = replace(problem.whitener, noises=noises, aside=aside)
