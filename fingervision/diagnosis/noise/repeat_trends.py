@@ -64,16 +64,19 @@ def likelier_drift(rest: Array, groups: list[NDArray[np.intp]], time_s: Array) -
         BIC of the drift relative to that of no drift, with the margin that is asked of a wave.
     """
     straight, waved = without_trend(rest, groups, time_s), without_wave(rest, groups, time_s)
-    plain, wave = _cost(rest, straight, TREND_DEGREE), _cost(rest, waved, WAVE_DEGREE) + WAVE_MARGIN
+    plain = _cost(rest, straight, TREND_DEGREE, len(groups))
+    wave = _cost(rest, waved, WAVE_DEGREE, len(groups)) + WAVE_MARGIN
     return (waved, WAVE_DEGREE, wave) if wave < plain else (straight, TREND_DEGREE, plain)
 
 
-def _cost(rest: Array, left: Array, degree: int) -> float:
-    """BIC of a drift with some parameters, relative to that of no drift."""
-    power = max(float(np.sum(rest**2)), 1e-300)
-    return rest.size * float(np.log(max(float(np.sum(left**2)), 1e-12 * power) / power)) + degree * float(
-        np.log(rest.size)
-    )
+def _cost(rest: Array, left: Array, parameters: int, groups: int) -> float:
+    """BIC of a drift with some parameters, relative to that of no drift.
+
+    Each group's mean was subtracted from its readings, which leaves one independent value less per group.
+    """
+    power, independent = max(float(np.sum(rest**2)), 1e-300), rest.size - groups
+    gained = independent * float(np.log(max(float(np.sum(left**2)), 1e-12 * power) / power))
+    return gained + parameters * float(np.log(rest.size))
 
 
 def without_wave(rest: Array, groups: list[NDArray[np.intp]], time_s: Array) -> Array:
