@@ -15,7 +15,8 @@ WINDOW, ONE_WAY = 9, 0.8
 """Number of samples over which a mean speed is computed, and fraction of the travelled distance that the net
 displacement over these samples must reach."""
 JUMP_RANGE = 0.01
-"""Lowest speed limit that is searched with step commands, relative to the fastest commanded speed."""
+"""Lowest speed limit that is searched with step commands, relative to the fastest commanded speed, unless the record is
+so long that a slower stage still crosses the range of the input."""
 APART = 1.5
 """Ratio of fastest to slowest motion above which a speed limit between the two speeds can be distinguished from a
 record of a single speed with errors."""
@@ -55,6 +56,16 @@ def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
     return np.asarray((net / (time_s[WINDOW:] - time_s[:-WINDOW]))[one_way])
 
 
+def _slowest(history: History, fastest_mm_s: float) -> float:
+    """Lowest speed limit to be searched with step commands: a slower stage would not cross the range in any run.
+
+    The speed that a jump demands is its height over one sample time, so that a fixed share of it would depend on the
+    sample rate.
+    """
+    longest_s = max(float(np.ptp(history.times[run])) for run in history.runs)
+    return min(JUMP_RANGE * fastest_mm_s, history.input_span_mm / longest_s)
+
+
 def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of the parameters to what the given data can show."""
     if history.dwell_s > 0.0:
@@ -72,7 +83,9 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     if not steady.size and not asked.size:
         return "the input never moves between two samples"
     fastest = float(np.max(np.concatenate([steady, asked])))
-    slowest, fast = np.quantile(steady, (SLOWEST_SHARE, FASTEST_SHARE)) if steady.size else (JUMP_RANGE * fastest, 0.0)
+    slowest, fast = _slowest(history, fastest), 0.0
+    if steady.size:
+        slowest, fast = np.quantile(steady, (SLOWEST_SHARE, FASTEST_SHARE))
     if max(float(fast), float(np.max(asked, initial=0.0))) < APART * slowest:
         return (
             f"the input moves at one speed only, about {fastest:.3g} mm/s: a stage with a lower limit could follow no "

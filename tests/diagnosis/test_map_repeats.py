@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
-from fingervision.diagnosis.inference.position_map import likeliest_map
+from fingervision.diagnosis.inference.position_map import likeliest_map, why_no_map
 from fingervision.diagnosis.input.preparation import prepare
+from fingervision.domain.effect import History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
@@ -51,3 +52,13 @@ def test_runs_of_different_gain_and_reach_are_no_map() -> None:
     repeats, gain = mapped(input_mm, parts, 2.0 * gains * input_mm, noise_mm)
     assert gain > 10.0, "the curve gains more than its price, and must be refused for another reason"
     assert not repeats
+
+
+@pytest.mark.parametrize(("times", "words"), [(1, "commanded only once"), (2, None)])
+def test_set_points_commanded_once_show_no_map(times: int, words: str | None) -> None:
+    set_points = np.tile(np.random.default_rng(6).permutation(12).astype(float), times)
+    input_mm = np.repeat(set_points, 20)
+    time_s = 0.1 * np.arange(input_mm.size)
+    history = History(input_mm, time_s, (slice(0, input_mm.size),), 1.0, 12.0, commanded=True)
+    reason = why_no_map(history, None)
+    assert reason is None if words is None else words in str(reason)

@@ -55,6 +55,15 @@ def test_a_drift_from_cycle_to_cycle_is_told_and_taken_out(drift: object) -> Non
     assert sd == pytest.approx(SCATTER_MM, rel=2 * KNOWN)
 
 
+def test_a_wave_of_the_room_is_no_scatter() -> None:
+    path, rows = cycles(0.5)
+    t = np.arange(rows.size)
+    values = 0.02 * np.sin(2.0 * np.pi * t / 31.0) + SCATTER_MM * np.random.default_rng(11).standard_normal(rows.size)
+    sd, trend = estimated(values, path, rows)
+    assert trend > 10.0
+    assert sd == pytest.approx(SCATTER_MM, rel=2 * KNOWN)
+
+
 @pytest.mark.parametrize("drifting", ["places", "sides"])
 def test_places_or_sides_that_drift_apart_are_no_scatter(drifting: str) -> None:
     path, rows = cycles(0.5)

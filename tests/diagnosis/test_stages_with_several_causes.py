@@ -105,3 +105,17 @@ def test_a_map_that_was_read_from_one_side_is_no_friction(tmp_path: Path) -> Non
     found = report_of(tmp_path, gap, position, read, TARGETS_MM + 103.0).report
     assert all("position_error_map" in names for names in found.alternatives)
     assert found.verdict is not Verdict.AGREES
+
+
+def test_a_play_beside_an_offset_in_sixty_rows_is_no_correlated_noise(tmp_path: Path) -> None:
+    there_and_back = 0.5 - 0.5 * np.cos(np.linspace(0.0, 4.0 * np.pi, 60, endpoint=False))
+    rising = np.diff(there_and_back, prepend=-1.0) > 0.0
+    gap = 2.05 + 6.0 * (there_and_back + np.where(rising, -0.005, 0.005))
+    gap += np.random.default_rng(7).normal(0.0, 0.004, gap.size)
+    rows = [f"{0.1 * k:.1f},{x},{y}" for k, (x, y) in enumerate(zip(there_and_back, gap, strict=True))]
+    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
+    (tmp_path / "simulation.csv").write_text("input_mm,gap_mm\n-0.5,-1\n1.5,11\n")
+    found = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv")).report
+    assert found.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    assert all({"backlash", "friction_hysteresis"} & set(names) for names in found.alternatives)
+    assert found.disagreement.after_rms_mm < 0.006

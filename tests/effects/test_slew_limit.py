@@ -29,3 +29,8 @@ def test_beside_ramps_the_stage_went_as_fast_as_they_do() -> None:
     # The slowest twentieth of the stretches include rest at an end of the ramp.
     assert 0.2 * 0.04 * RATE_HZ < lowest <= 0.04 * RATE_HZ
     assert highest == pytest.approx(4.0 * RATE_HZ)
+
+
+def test_a_stage_that_crosses_the_range_within_the_record_is_slow_enough_at_any_sample_rate() -> None:
+    lowest, _ = searched(np.repeat([0.0, 4.0, 0.0, 4.0], 250))
+    assert lowest <= 4.0 / (999 / RATE_HZ)

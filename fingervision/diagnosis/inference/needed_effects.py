@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from scipy.stats import f as fisher
 
-from fingervision.diagnosis.inference.hypothesis import Explanation
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
 from fingervision.diagnosis.inference.search_state import Findings
@@ -18,6 +18,8 @@ kept."""
 AS_MUCH = 2.0**0.5
 """Factor by which a straight line may leave more residual (RMS) than a curve if there is unknown structure: twice the
 power, because a richer formula also fits part of that structure."""
+LINE = ("rest_gap_error", "lever_ratio_error")
+"""Offset and ratio that together are any straight line over the input."""
 BY_STRUCTURE = LACK_OF_FIT
 """Probability (p-value) above which an effect is dropped: the probability that remaining structure alone reduces the
 residual as much as this effect does."""
@@ -77,21 +79,28 @@ def with_simpler_parts(data: Observations, found: Findings) -> Findings:
 
 
 def _with_a_line(found: Findings) -> list[Explanation]:
-    """Explanations in which a straight line over the input replaces one curved effect of the best explanation."""
+    """Explanations in which a straight line over the input replaces one curved effect of the best explanation.
+
+    The line is one effect or, for a curved effect with several parameters, an offset together with a ratio.
+    """
     best, problem = found.best, found.problem
     curved = [n for n, s in zip(best.names, own_shapes(problem, best), strict=True) if not is_a_line(problem, s)]
+    simple = [(n,) for n in problem.effects if n not in best.names and _is_linear(problem, n)]
     out = []
     for name in curved:
         kept = {other: best.values[other] for other in best.names if other != name}
-        for other in set(problem.effects) - set(best.names):
-            listed = problem.parameters((other,))
-            if len(listed) != 1 or listed[0][1].starts != 1:
-                continue
-            fitted = fit(problem, (*kept, other), {**kept, other: {}}, iterations=20)
+        both = [LINE] if len(best.values[name]) > len(LINE) and all((n,) in simple for n in LINE) else []
+        for line in (*simple, *both):
+            fitted = fit(problem, (*kept, *line), {**kept, **{other: {} for other in line}}, iterations=20)
             shapes = dict(zip(fitted.names, own_shapes(problem, fitted), strict=True))
-            if is_a_line(problem, shapes[other]):
+            if all(is_a_line(problem, shapes[other]) for other in line):
                 out.append(fitted)
     return out
+
+
+def _is_linear(problem: Problem, name: str) -> bool:
+    listed = problem.parameters((name,))
+    return len(listed) == 1 and listed[0][1].starts == 1
 
 
 def _independent_values(data: Observations, explanation: Explanation) -> float:

@@ -9,7 +9,7 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
-from fingervision.domain.effect import Array, DriveEffect
+from fingervision.domain.effect import Array, DriveEffect, Flags
 from fingervision.effects.play_operator import play
 
 LEAST_CORRELATION = 0.5
@@ -107,14 +107,16 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     """
     n = data.chain.history.input_mm.size
     kept = ~problem.whitener.aside[:n]
-    residual_mm = (data.stacked_mm - data.chain.stacked(found.values))[:n][kept]
+    # A run that was zeroed anew differs by a constant, which is no second level of noise.
+    left_mm, whitened = (data.stacked_mm - data.chain.stacked(found.values))[:n], found.residual[:n]
+    residual_mm = _about_each_run(left_mm, data, kept)
     if residual_mm.size < FEWEST_VALUES or data.position_map is not None or data.run_gains is not None:
         return None
     sigma = float(np.std(residual_mm))
     # If the digits of the readings are coarser than the band, either all values or none lie in it.
     if NARROW * sigma < resolution(data.table.gap_mm):
         return None
-    both = (residual_mm, found.residual[:n][kept])
+    both = (residual_mm, _about_each_run(whitened, data, kept))
     between = max(_share_near(values, float(np.mean(values))) for values in both)
     together = min(_share_near(values, float(np.median(values))) for values in map(_without_few, both))
     if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
@@ -135,6 +137,15 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
         f"the rows are not one measurement with one noise: {words}; check the rows that differ first.",
         blocks=True,
     )
+
+
+def _about_each_run(values: Array, data: Observations, kept: Flags) -> Array:
+    """Kept values, shape (n,), minus the mean of each run."""
+    out = values.copy()
+    for run in data.chain.history.runs:
+        inside = values[run][kept[run]]
+        out[run] -= inside.mean() if inside.size else 0.0
+    return out[kept]
 
 
 def _without_few(values: Array) -> Array:

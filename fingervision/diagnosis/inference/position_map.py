@@ -106,6 +106,11 @@ def why_no_map(history: History, path: InputPath | None) -> str | None:
         return narrowed
     if history.time_s is None:
         return "the table has no time_s, so that it is unknown how often each position was passed"
+    if history.commanded:
+        # A commanded stage is seen where it rests: what lies between two set-points is passed, but hardly read.
+        holds = sum(1 + int(np.count_nonzero(np.diff(history.input_mm[run]))) for run in history.runs)
+        if holds < PASSES * np.unique(history.input_mm).size:
+            return "most set-points were commanded only once, so that the repeatability of their errors is unknown"
     travel = sum(float(np.sum(np.abs(np.diff(history.input_mm[run])))) for run in history.runs)
     if travel < PASSES * history.input_span_mm:
         return "each position was passed only once, so that the repeatability of its error is unknown"

@@ -116,13 +116,14 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     n, both, runs = history.input_mm.size, history.both_edges, history.runs
     aside = isolated(after_mm[:n], problem.whitener.aside[:n], runs)
     noises = [noise.total_mm for noise in problem.whitener.noises]
+    errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
     if history.commanded:
         # The motion of the stage after each jump is not noise, but would count as noise in the spectrum.
         parts = np.split(after_mm, len(data.channels))
         digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
         settled = [max(scatter_in_holds(history, part), digits) for part in parts]
         noises = [min(noise, scatter or noise) for noise, scatter in zip(noises, settled, strict=True)]
-    elif history.time_s is not None and data.repeats is None:
+    elif history.time_s is not None and errors is None:
         # Slow structure could count as correlated noise; true correlated noise is also visible in the changes from
         # sample to sample.
         parts = np.split(after_mm, len(data.channels))
@@ -143,7 +144,6 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         midline = _without_scatter(residual[n : 2 * n], history.runs)[~aside]
         return float(np.sqrt(np.mean(0.25 * gap**2 + (midline - midline.mean()) ** 2)))
 
-    errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
     degrees = None if errors is None else min(error.degrees for error in errors)
     half_digit_mm = 0.5 * resolution(data.table.gap_mm)
     rounding_mm = half_digit_mm if data.repeats is not None else 0.0

@@ -9,6 +9,7 @@ from fingervision.diagnosis.noise.repeat_trends import (
     TREND_DEGREE,
     TREND_SIGMAS,
     drift_sigmas,
+    likelier_drift,
     trend_sigmas,
     wandering,
     without_trend,
@@ -150,18 +151,18 @@ def pure_error(
     pooled = float(rest @ rest) / degrees
     trend = trend_sigmas([values[group] for group in groups], pooled)
     rows = np.concatenate(groups)
-    straight, taken = without_trend(rest, groups, time_s), TREND_DEGREE
+    straight, taken, cost = likelier_drift(rest, groups, time_s)
     if place_mm is not None and degrees - 3 * TREND_DEGREE >= FEWEST_DEGREES:
         ends = np.cumsum([group.size for group in groups])[:-1]
-        left = float(straight @ straight) / (degrees - TREND_DEGREE)
+        left = float(straight @ straight) / (degrees - taken)
         if trend_sigmas(np.split(straight, ends), left) > TREND_SIGMAS:
             # Positions may drift differently (a change of gain), or sides of approach (a play that runs in).
             centred = (place_mm - place_mm.mean()) / max(float(np.ptp(place_mm)), 1e-300)
             apart = without_trend(rest, groups, time_s, centred, np.where(label % 2, 0.5, -0.5))
             if float(apart @ apart) / (degrees - 3 * TREND_DEGREE) < APART * left:
                 straight, taken = apart, 3 * TREND_DEGREE
-    if trend <= TREND_SIGMAS and degrees - TREND_DEGREE >= FEWEST_DEGREES:
-        trend = max(trend, drift_sigmas(rest, straight, rows))
+    if trend <= TREND_SIGMAS and degrees - taken >= FEWEST_DEGREES:
+        trend = max(trend, drift_sigmas(rest, cost, rows))
     if trend <= TREND_SIGMAS or degrees - taken < FEWEST_DEGREES:
         return PureError(_without_gross_errors(rest, degrees), degrees, trend, wandering(rest, rows))
     sd_mm = _without_gross_errors(straight, degrees - taken)

@@ -44,14 +44,26 @@ def most_noise(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...], dig
 def _scatter_between_passes(residual_mm: Array, input_mm: Array, runs: tuple[slice, ...]) -> float | None:
     """Standard deviation of a reading, from differences of successive passes over a position; None without passes.
 
-    A rough map of position errors looks like noise over time, but the return motion repeats it. The mean difference of
-    two passes may be hysteresis and is removed. A value that is interpolated between two readings has at least half the
-    variance of one reading, so that the result is not too small for noise that is independent between the passes.
+    A rough map of position errors looks like noise over time, but the return motion repeats it; stick-slip and other
+    errors that depend on the direction are repeated by the next pass in the same direction. The smaller scatter is
+    used. The mean difference of two passes may be hysteresis or drift and is removed. A value that is interpolated
+    between two readings has at least half the variance of one reading, so that the result is not too small for noise
+    that is independent between the passes.
     """
+    ways = [[part + run.start for part in _passes(input_mm[run])] for run in runs]
+    returns = [pair for one in ways for pair in pairwise(one)]
+    same_way = [pair for one in ways for pair in zip(one, one[2:], strict=False)]
+    found = [_scatter_of_pairs(residual_mm, input_mm, pairs) for pairs in (returns, same_way)]
+    return min((scatter for scatter in found if scatter is not None), default=None)
+
+
+def _scatter_of_pairs(
+    residual_mm: Array, input_mm: Array, pairs: list[tuple[NDArray[np.int64], NDArray[np.int64]]]
+) -> float | None:
+    """Standard deviation of a reading from the differences of pairs of passes; None if the pairs share few readings."""
     found = []
-    for run in runs:
-        ways = [part + run.start for part in _passes(input_mm[run])]
-        for there, back in pairwise(ways):
+    for there, back in pairs:
+        if there.size and back.size:
             order = np.argsort(input_mm[back])
             low, high = input_mm[back[order[0]]], input_mm[back[order[-1]]]
             within = there[(input_mm[there] >= low) & (input_mm[there] <= high)]
