@@ -31,7 +31,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     path : Path
         Path of the `.fmu` file.
     names : mapping of str to str
-        Names of the FMU's variables for `input` and `gap`, where stated.
+        Names of the FMU's variables for `input` and `gap`, and their units `input_unit` and `gap_unit`, where stated.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     ------
     ValueError
         If FMPy is missing, the file is no FMU for this system, or it cannot be decided which variables are input and
-        gap.
+        gap, or which units they have.
     """
     try:
         from fmpy import extract, read_model_description, supported_platforms
@@ -68,10 +68,13 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
         kind = "CoSimulation"
     chosen = _choose(description.modelVariables, "input", names.get("input"), INPUTS)
     outputs = _outputs(description.modelVariables, names)
+    scales = {"input": _mm("input", chosen, names.get("input_unit"))}
+    for name, variable in outputs.items():
+        scales[name] = 1.0 if name == "force_n" else _mm("gap", variable, names.get("gap_unit"))
     unpacked = extract(str(path))
 
     def function(time_s: Array, input_mm: Array) -> dict[str, Array]:
-        return _run(unpacked, description, kind, chosen, outputs, time_s, input_mm)
+        return _run(unpacked, description, kind, chosen, outputs, scales, time_s, input_mm)
 
     return function
 
@@ -82,6 +85,7 @@ def _run(
     kind: str,
     chosen: Any,
     outputs: Mapping[str, Any],
+    scales: Mapping[str, float],
     time_s: Array,
     input_mm: Array,
 ) -> dict[str, Array]:
@@ -96,8 +100,8 @@ def _run(
     ahead_s = 0.5 * step_s if kind == "CoSimulation" else 0.0
     signal = np.empty(time_s.size + 1, dtype=[("time", "f8"), (chosen.name, "f8")])
     signal["time"] = np.concatenate([time_s[:1] - time_s[0] - step_s, time_s - time_s[0] - ahead_s])
-    signal[chosen.name] = np.concatenate([input_mm[:1], input_mm]) / _mm(chosen)
-    start = {chosen.name: float(input_mm[0]) / _mm(chosen)}
+    signal[chosen.name] = np.concatenate([input_mm[:1], input_mm]) / scales["input"]
+    start = {chosen.name: float(input_mm[0]) / scales["input"]}
     try:
         found = simulate_fmu(
             unpacked,
@@ -119,8 +123,7 @@ def _run(
     out = {}
     for name, variable in outputs.items():
         values = np.asarray(found[variable.name], dtype=np.float64)[::-1][kept]
-        factor = 1.0 if name == "force_n" else _mm(variable)
-        out[name] = np.interp(time_s - time_s[0], at_s, values) * factor
+        out[name] = np.interp(time_s - time_s[0], at_s, values) * scales[name]
     return out
 
 
@@ -186,12 +189,16 @@ def _listed(variables: list[Any]) -> str:
     return ", ".join(one.name for one in variables[:8]) or "none"
 
 
-def _mm(variable: Any) -> float:
-    """Millimetres per unit of a variable: from its declared unit, else from the suffix of its name, else 1."""
-    unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+def _mm(role: str, variable: Any, stated: str | None) -> float:
+    """Millimetres per unit of a variable: from the stated unit, its declared unit, or the suffix of its name."""
+    unit = stated or variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+    if unit is None and (ending := re.search(r"_(m|cm|mm|um|nm)$", variable.name)) is not None:
+        unit = ending.group(1)
     if unit is None:
-        ending = re.search(r"_(m|cm|mm|um|nm)$", variable.name)
-        unit = ending.group(1) if ending else "mm"
+        raise ValueError(
+            f"does not state the unit of {variable.name} ({role}), and simulation programs use metres as well as "
+            f'millimetres: state it in a model.toml with base = "the.fmu" and {role}_unit = "m".'
+        )
     if unit not in UNITS_MM:
         raise ValueError(
             f"must have lengths as input and gap, but {variable.name} is in {unit}: choose another variable."
