@@ -50,8 +50,8 @@ def test_feedthrough_gives_its_continuous_input_among_others_of_other_kinds(tmp_
     (tmp_path / "model.toml").write_text(f'schema = 1\nbase = "Feedthrough.fmu"\n{UNITS}')
     model = read_model(tmp_path / "model.toml").base
     (answer,) = model.simulate([(TIME_S, INPUT_MM)])
-    # A co-simulation keeps its input constant for a quarter of a sample, 2.5 ms at 2 mm/s.
-    assert np.max(np.abs(answer.gap_mm - INPUT_MM)) < (1e-6 if kind == "me" else 0.006)
+    # A co-simulation that shows its input at once must not lag by half a step (2.5 um here).
+    assert np.max(np.abs(answer.gap_mm - INPUT_MM)) < 1e-6
 
 
 @pytest.mark.slow
