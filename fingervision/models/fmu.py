@@ -15,8 +15,8 @@ INPUTS = ("input_mm", "input", "u_in", "u", "position", "displacement", "stroke"
 GAPS = ("gap_mm", "gap", "opening", "y", "out", "output")
 OTHERS = ("left_mm", "right_mm", "force_n")
 FINER = 4
-"""Number of co-simulation steps between two given times. The FMU keeps its input constant during a step: at the value in
-the middle of the step, by which a state comes out right, or later, if its output follows the input at once."""
+"""Number of co-simulation steps between two given times. The FMU keeps its input constant during a step: at the value
+in the middle of the step, by which a state comes out right, or later, if its output follows the input at once."""
 FOLLOWS_AT_ONCE = 0.5
 """Lag of the output of an FMU without states, in steps: it shows the input of the middle of the step at its end."""
 MOST_STEPS = 200_000
