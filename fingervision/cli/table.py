@@ -27,7 +27,7 @@ Keys of --set and of columns.toml:
   columns.ROLE  name or number of the column: time, input, gap, left, right, force, run, target, position, ...
   units.ROLE    unit of the column, or what one count is worth: mm, um, ms, '0.1 um'
   separator , ; tab | blank     decimal . ,       encoding    header_line (0: none)      part (sheet, group, variable)
-  runs restart|one              date_order dmy|mdy|ymd        accept (doubts that you checked)
+  runs restart|one              date_order dmy|mdy|ymd        missing (such as -9999)      accept (checked doubts)
 
 \b
 Exit codes: 0 interpreted, and columns.toml is written; 1 ambiguous: the message names the key of --set that decides.

@@ -201,7 +201,9 @@ def compare(
     seed = whole_number("seed", seed, 0)
     table = measured_given(measured, columns)
     models = models_given(model, kind, columns)
-    files = {"measured table": table.path, **{f"model {name}": given.path for name, given in models.items()}}
+    files = table.files("measured table", columns)
+    for name, given in models.items():
+        files |= given.files(f"model {name}", columns)
     made = provenance(files, call)
     found = {name: compare_one(table.value, given.value, seed=seed) for name, given in models.items()}
     return Comparison(found, table.path, made)

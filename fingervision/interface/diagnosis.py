@@ -219,7 +219,7 @@ def diagnose(
             )
         table = measured_given(measured, columns)
         given = model_given(model, kind, columns)
-        made = provenance({"measured table": table.path, "model": given.path}, call)
+        made = provenance({**table.files("measured table", columns), **given.files("model", columns)}, call)
         told: dict[str, Any] = {} if progress is None else {"progress": progress}
         found = diagnose_table(table.value, given.value, seed=seed, forced=forced, without=without, **told)
     return Diagnosis(found, given.value, table.path, made, own)

@@ -102,13 +102,15 @@ def measuring_task(
             raise UsageError(f"--bits must be {BITS[0]} to {BITS[1]}, but is {depth}.")
     if not isinstance(response, str | os.PathLike | CameraResponse):
         raise ArgumentTypeError("response", "be a word or the name of a file", f"is {what_it_is(response)}")
+    log, rests = (None, 0) if drive is None else _drive(drive, columns)
     return Task(
         scale=scale[0],
         scale_file=scale[1],
         below_tip_mm=number("below_tip_mm", below_tip_mm),
         direction=None if tips == "auto" else Direction(tips),
         region=roi,
-        drive=None if drive is None else _drive(drive, columns),
+        drive=log,
+        drive_rests=rests,
         drive_offset_s=None if drive_offset_s is None else number("drive_offset_s", drive_offset_s),
         overlay=overlay,
         steps_frame=steps_frame,
@@ -160,7 +162,14 @@ def _gauges(gauges: Any) -> tuple[Gauge, ...]:
     return tuple(gauges)
 
 
-def _drive(drive: Any, columns: Path | None) -> DriveHistory:
+def _drive(drive: Any, columns: Path | None) -> tuple[DriveHistory, int]:
+    """Read the log; a log with rows only on change gets rows in its rests, whose number is returned, too."""
+    from fingervision.stage_record.on_change import with_rests  # needed with a drive only
+
+    return with_rests(_log(drive, columns))
+
+
+def _log(drive: Any, columns: Path | None) -> DriveHistory:
     if isinstance(drive, DriveHistory):
         return drive
     if isinstance(drive, str | os.PathLike):

@@ -21,6 +21,7 @@ from fingervision.models.corrected import CorrectedModel
 from fingervision.models.kinds import kinds
 from fingervision.models.table import TableModel
 from fingervision.tables import read as tables
+from fingervision.tables.mapping import NAME, entry_for
 
 TABLES = ("measured", "drive", "simulation")
 IN_MEMORY = Path("in memory")
@@ -138,6 +139,18 @@ class Given:
 
     value: Any
     path: Path
+
+    def files(self, role: str, columns: Any = None) -> dict[str, Path]:
+        """Files on which the numbers depend, by role: the file, the base of a corrected model, and the columns.toml."""
+        found = {role: self.path}
+        base = getattr(self.value, "base_path", "")
+        if base and Path(base).resolve() != self.path.resolve():
+            found[f"{role}, base"] = Path(base)
+        chosen = None if columns is None else Path(columns)
+        for path in tuple(found.values()):
+            if path.suffix not in (".toml", ".py", ".fmu") and not entry_for(path, None, chosen).says_nothing:
+                found[f"{role}, columns"] = chosen or path.parent / NAME
+        return found
 
 
 def measured_given(measured: Any, columns: Any = None) -> Given:

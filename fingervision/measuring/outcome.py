@@ -52,6 +52,11 @@ def _on_the_log(task: Task, series: GapSeries, clock: Clock) -> list[str]:
             f"{unknown} frames lie within jumps of the drive's log, so that the position of the stage is unknown; the "
             "input of these frames is empty."
         )
+    if task.drive_rests:
+        notes.append(
+            f"The drive's log has rows only where the position changes: in {task.drive_rests} rest"
+            f"{'s' * (task.drive_rests > 1)}, the stage is taken to stand until shortly before the next row."
+        )
     if task.drive is None or not series.gap_mm.size:
         return notes
     turned, missed_mm = unseen_turns(task.drive)

@@ -35,6 +35,8 @@ class Task:
         The part of the frame that is measured; None for the whole frame.
     drive : DriveHistory or None
         The recorded input.
+    drive_rests : int
+        Number of rests into which rows were inserted, because the log has rows on change only (`on_change.with_rests`).
     drive_offset_s : float or None
         Offset that is added to the drive's times to give times of the recording; None finds it from the motion.
     overlay : bool
@@ -61,6 +63,7 @@ class Task:
     direction: Direction | None = None
     region: Region | None = None
     drive: DriveHistory | None = None
+    drive_rests: int = 0
     drive_offset_s: float | None = None
     overlay: bool = False
     steps_frame: int | None = None

@@ -15,8 +15,10 @@ INPUTS = ("input_mm", "input", "u_in", "u", "position", "displacement", "stroke"
 GAPS = ("gap_mm", "gap", "opening", "y", "out", "output")
 OTHERS = ("left_mm", "right_mm", "force_n")
 FINER = 4
-"""Number of co-simulation steps between two given times. The FMU keeps its input constant during a step, at the value
-in the middle of the step."""
+"""Number of co-simulation steps between two given times. The FMU keeps its input constant during a step: at the value
+in the middle of the step, by which a state comes out right, or later, if its output follows the input at once."""
+FOLLOWS_AT_ONCE = 0.5
+"""Lag of the output of an FMU without states, in steps: it shows the input of the middle of the step at its end."""
 MOST_STEPS = 200_000
 LONGEST_STEP_S = 0.01
 """Longest co-simulation step, however far apart the given times are: a vibration at 10 Hz is then still sampled ten
@@ -31,7 +33,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     path : Path
         Path of the `.fmu` file.
     names : mapping of str to str
-        Names of the FMU's variables for `input` and `gap`, where stated.
+        Names of the FMU's variables for `input` and `gap`, and their units `input_unit` and `gap_unit`, where stated.
 
     Returns
     -------
@@ -42,7 +44,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     ------
     ValueError
         If FMPy is missing, the file is no FMU for this system, or it cannot be decided which variables are input and
-        gap.
+        gap, or which units they have.
     """
     try:
         from fmpy import extract, read_model_description, supported_platforms
@@ -68,10 +70,13 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
         kind = "CoSimulation"
     chosen = _choose(description.modelVariables, "input", names.get("input"), INPUTS)
     outputs = _outputs(description.modelVariables, names)
+    scales = {"input": _mm("input", chosen, names.get("input_unit"))}
+    for name, variable in outputs.items():
+        scales[name] = 1.0 if name == "force_n" else _mm("gap", variable, names.get("gap_unit"))
     unpacked = extract(str(path))
 
     def function(time_s: Array, input_mm: Array) -> dict[str, Array]:
-        return _run(unpacked, description, kind, chosen, outputs, time_s, input_mm)
+        return _run(unpacked, description, kind, chosen, outputs, scales, time_s, input_mm)
 
     return function
 
@@ -82,22 +87,65 @@ def _run(
     kind: str,
     chosen: Any,
     outputs: Mapping[str, Any],
+    scales: Mapping[str, float],
     time_s: Array,
     input_mm: Array,
 ) -> dict[str, Array]:
     """Simulate one run and return its outputs at the run's times."""
-    from fmpy import simulate_fmu
-
     _drive_between_steps()
     span_s = float(time_s[-1] - time_s[0])
     step_s = min(float(np.median(np.diff(time_s))) / FINER, LONGEST_STEP_S)
     steps = int(np.ceil(min(span_s / step_s, MOST_STEPS)))
+
+    def run(steps: int, ahead: float) -> dict[str, Array]:
+        """Simulate with a number of steps, each with the input at a part of the step."""
+        return _stepped(unpacked, description, kind, chosen, outputs, scales, time_s, input_mm, steps, ahead)
+
+    if kind != "CoSimulation":
+        return run(steps, 0.0)
+    coarse, fine = run(steps, 0.5), run(2 * steps, 0.5)
+    lag = max(_lag_in_steps(coarse[name], fine[name], time_s, span_s / steps) for name in outputs if name != "force_n")
+    return fine if lag == 0.0 else run(2 * steps, 0.5 + lag)
+
+
+def _lag_in_steps(coarse: Array, fine: Array, time_s: Array, step_s: float) -> float:
+    """Lag of the output of a co-simulation, in steps, from two simulations with steps of `step_s` and half of it.
+
+    To first order, an output that lags by a part of a step differs between the two by half of that part, times the step
+    and the output's speed (Richardson). The result is 0 for an FMU whose output is a state.
+    """
+    if time_s.size < 3:
+        return 0.0
+    speed = np.gradient(fine, time_s)
+    squares = float(speed @ speed)
+    if squares == 0.0:
+        return 0.0
+    lag = -2.0 * float((coarse - fine) @ speed) / (step_s * squares)
+    return float(np.clip(lag, 0.0, FOLLOWS_AT_ONCE))
+
+
+def _stepped(
+    unpacked: str,
+    description: Any,
+    kind: str,
+    chosen: Any,
+    outputs: Mapping[str, Any],
+    scales: Mapping[str, float],
+    time_s: Array,
+    input_mm: Array,
+    steps: int,
+    ahead: float,
+) -> dict[str, Array]:
+    """Simulate one run with a number of steps; `ahead` is the part of a step at whose end the input is read."""
+    from fmpy import simulate_fmu
+
+    span_s = float(time_s[-1] - time_s[0])
     step_s = span_s / steps
-    ahead_s = 0.5 * step_s if kind == "CoSimulation" else 0.0
+    ahead_s = ahead * step_s
     signal = np.empty(time_s.size + 1, dtype=[("time", "f8"), (chosen.name, "f8")])
     signal["time"] = np.concatenate([time_s[:1] - time_s[0] - step_s, time_s - time_s[0] - ahead_s])
-    signal[chosen.name] = np.concatenate([input_mm[:1], input_mm]) / _mm(chosen)
-    start = {chosen.name: float(input_mm[0]) / _mm(chosen)}
+    signal[chosen.name] = np.concatenate([input_mm[:1], input_mm]) / scales["input"]
+    start = {chosen.name: float(input_mm[0]) / scales["input"]}
     try:
         found = simulate_fmu(
             unpacked,
@@ -119,8 +167,7 @@ def _run(
     out = {}
     for name, variable in outputs.items():
         values = np.asarray(found[variable.name], dtype=np.float64)[::-1][kept]
-        factor = 1.0 if name == "force_n" else _mm(variable)
-        out[name] = np.interp(time_s - time_s[0], at_s, values) * factor
+        out[name] = np.interp(time_s - time_s[0], at_s, values) * scales[name]
     return out
 
 
@@ -186,12 +233,16 @@ def _listed(variables: list[Any]) -> str:
     return ", ".join(one.name for one in variables[:8]) or "none"
 
 
-def _mm(variable: Any) -> float:
-    """Millimetres per unit of a variable: from its declared unit, else from the suffix of its name, else 1."""
-    unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+def _mm(role: str, variable: Any, stated: str | None) -> float:
+    """Millimetres per unit of a variable: from the stated unit, its declared unit, or the suffix of its name."""
+    unit = stated or variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+    if unit is None and (ending := re.search(r"_(m|cm|mm|um|nm)$", variable.name)) is not None:
+        unit = ending.group(1)
     if unit is None:
-        ending = re.search(r"_(m|cm|mm|um|nm)$", variable.name)
-        unit = ending.group(1) if ending else "mm"
+        raise ValueError(
+            f"does not state the unit of {variable.name} ({role}), and simulation programs use metres as well as "
+            f'millimetres: state it in a model.toml with base = "the.fmu" and {role}_unit = "m".'
+        )
     if unit not in UNITS_MM:
         raise ValueError(
             f"must have lengths as input and gap, but {variable.name} is in {unit}: choose another variable."

@@ -4,6 +4,7 @@ import json
 import os
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -26,6 +27,8 @@ from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 from fingervision.storage.plain_file import in_utf8, text_of, why
 from fingervision.storage.simulation_table import read_simulation_table
 
+FMU_KEYS = ("input", "gap", "input_unit", "gap_unit")
+"""Keys of an FMU: names of its input and gap, and their units where the FMU declares none."""
 POINTS = "points"
 """Key of the curve of a position error map: pairs of input and error, in mm."""
 # A fitted value at a bound may exceed the bound by a rounding error.
@@ -84,9 +87,9 @@ def read_model(
     if not (isinstance(named, str) and named.strip() and "\0" not in named):
         raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: correct it.")
     base = read_model(path.parent / named, kind, (*inside, place), table)
-    names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
+    names: dict[str, str] = {key: str(document[key]) for key in FMU_KEYS if key in document}
     if names and isinstance(base.base, FunctionModel):
-        base = _function(base.base.path, names)
+        base = replace(base, base=FunctionModel(base.base.path, {**base.base.names, **names}))
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
     origins: dict[str, str] = {}
     entries = document.get("effect", [])
@@ -186,9 +189,13 @@ def _gripper(path: Path, kind: str) -> CorrectedModel:
 
 
 def write_model(
-    path: Path, base_path: Path, effects: Mapping[str, Mapping[str, Estimate]], kind: str | None = None
+    path: Path,
+    base_path: Path,
+    effects: Mapping[str, Mapping[str, Estimate]],
+    kind: str | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> None:
-    """Write a corrected model; the base model's path is relative to the file.
+    """Write a corrected model; the base model's path is relative to the file, and `names` are the keys of an FMU.
 
     Raises
     ------
@@ -197,6 +204,7 @@ def write_model(
     """
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
     lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
+    lines += [f"{key} = {json.dumps(name, ensure_ascii=False)}" for key, name in (names or {}).items()]
     for name, parameters in effects.items():
         effect, place, end = split_key(name)
         lines += ["", "[[effect]]", f'name = "{effect}"']

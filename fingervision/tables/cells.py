@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
-from fingervision.tables.dialect import GROUPED, MINUS, MISSING
+from fingervision.tables.dialect import GROUPED, MINUS, MISSING, THOUSANDS
 
-SPACES = dict.fromkeys(map(ord, "' \u00a0\u202f"))
+SPACES = dict.fromkeys(map(ord, "'\u2019 \u00a0\u2007\u2009\u202f"))
 
 
 def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.intp]]:
@@ -30,8 +30,11 @@ def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.
         Rows whose cell is neither a number nor a usual word for a missing value.
     """
     try:
-        if decimal == "," and any("," in cell for cell in cells):
-            if any("." in cell for cell in cells):
+        dotted = [cell for cell in cells if "." in cell] if decimal == "," else []
+        # Beside decimal commas in other columns, `1.000` is a thousand; a column with `0.500` has decimal points.
+        grouped = bool(dotted) and all(THOUSANDS["."].fullmatch(cell) for cell in dotted)
+        if decimal == "," and (grouped or any("," in cell for cell in cells)):
+            if dotted:
                 raise ValueError  # noqa: TRY301 - points would be read as decimal points: the cells are read one by one
             value = np.array([float(cell.replace(",", ".")) for cell in cells], dtype=np.float64)
         else:

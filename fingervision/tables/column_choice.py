@@ -14,6 +14,7 @@ from fingervision.tables.questions import Question
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
 from fingervision.tables.units import factor, spelled
+from fingervision.tables.words import tokens
 
 NEEDED = {"measured": ("input", "gap"), "drive": ("time", "input"), "simulation": ("input", "gap")}
 """Roles that a table of each kind must have; left and right together can replace the gap."""
@@ -22,6 +23,27 @@ WANTED = {
     "drive": ("run", "force"),
     "simulation": ("left", "right", "force"),
 }
+ACTUAL = frozenset(
+    [
+        "actual",
+        "act",
+        "ist",
+        "istwert",
+        "iststellung",
+        "feedback",
+        "current",
+        "readback",
+        "reached",
+        "value",
+        "axis",
+        "1",
+        "2",
+        "3",
+        "x",
+        "y",
+        "z",
+    ]
+)
 UNIT = {"length": "mm", "time": "s", "force": "n"}
 CANONICAL = {role: f"{role}_{UNIT[dimension]}" for role, dimension in DIMENSION.items()}
 """Names of the columns in fingervision's own tables, by role."""
@@ -61,6 +83,9 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             continue
         # A target without a direction is a commanded position.
         roles.setdefault("input" if role == "target" else role, []).append(place)
+    if "input" in roles and "gap" in roles and all(names[k].role == "target" for k in roles["input"]):
+        # A column `Actual` beside a column `Commanded` is the position that was reached.
+        roles["input"] += [k for k, name in enumerate(names) if k not in fixed and _is_actual(raw.columns[k], name)]
     sources = [k for k, name in enumerate(names) if name.source == kind and k not in fixed]
     if "gap" not in roles and sources:
         roles["gap"] = sources
@@ -114,6 +139,13 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     return chosen
 
 
+def _is_actual(column: RawColumn, name: ColumnName) -> bool:
+    """Whether a column of lengths is called `actual`, `feedback` or `Istwert` only."""
+    words = tokens(name.base)
+    unit = spelled(column.unit) or name.unit
+    return ACTUAL.issuperset(words) and words != () and unit != "" and factor(unit, "length") is not None
+
+
 def _lone_u(
     raw: RawTable, names: Sequence[ColumnName], roles: dict[str, list[int]], fixed: set[int], about: Findings
 ) -> None:
@@ -157,7 +189,7 @@ def _one_clock(
 def _clock_by_unit(
     raw: RawTable, names: Sequence[ColumnName], taken: set[int], decimal: str, about: Findings
 ) -> list[int]:
-    """Take the only column with a unit of time and an unknown name for the time, if it increases steadily."""
+    """Take the only column with a unit of time, or with dates, whose name does not denote the time."""
     found = [
         k
         for k, (column, name) in enumerate(zip(raw.columns, names, strict=True))
@@ -169,7 +201,22 @@ def _clock_by_unit(
             f"'{raw.columns[found[0]].name}' is taken for the time: it has a unit of time, and increases."
         )
         return found
+    dated = [
+        k
+        for k, (column, name) in enumerate(zip(raw.columns, names, strict=True))
+        if k not in taken and name.role is None and _is_dated(column) and _varies(column)
+    ]
+    if len(dated) == 1 and not found:
+        about.notes.append(
+            f"Column {dated[0] + 1}, '{raw.columns[dated[0]].name}', is taken for the time: it holds times."
+        )
+        return dated
     return []
+
+
+def _varies(column: RawColumn) -> bool:
+    """Whether a column holds more than one time (a column of dates often holds a single one)."""
+    return isinstance(column.content, Numbers) or len(set(column.content)) > 1
 
 
 def _alike(columns: Sequence[RawColumn]) -> bool:

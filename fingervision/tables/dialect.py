@@ -16,15 +16,20 @@ MISSING = frozenset(
     ["", "nan", "na", "n/a", "null", "none", "-", "--", "---", "#n/a", "#nv", "#na", "1.#qnan", "-1.#ind", "1.#ind"]
 )
 """Texts that programs write for a missing number, in lower case."""
+NO_NUMBER = 9.9e37
+"""Smallest number that means infinity (9.9e37) or not a number (9.91e37) in the output of an instrument (SCPI 1999,
+section 7.2.1)."""
 NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
 GROUPED = {
-    ".": re.compile(r"[+-]?\d{1,3}([,' \u00a0\u202f]\d{3})+(\.\d+)?"),
-    ",": re.compile(r"[+-]?\d{1,3}([.' \u00a0\u202f]\d{3})+(,\d+)?"),
+    ".": re.compile(r"[+-]?\d{1,3}([,'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(\.\d+)?"),
+    ",": re.compile(r"[+-]?\d{1,3}([.'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(,\d+)?"),
 }
 """Patterns of numbers with thousands separators, by decimal mark."""
+UNIT_BEHIND = re.compile(r"(?<=\d)\s?(?:[mµμun]?m|[mµμun]?s|[mk]?N)$")
+"""A unit behind a number in the same cell: `0.61 mm`, `100ms`."""
 THOUSANDS = {",": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+"), ".": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")}
 """Patterns of numbers whose mark may be either a thousands separator or a decimal mark."""
 DATE_LIKE = re.compile(r"[\d./\-]+([T ]\d.*)?|\d{1,2}:\d{2}(:\d{2}([.,]\d*)?)?( ?[AaPp][Mm])?Z?")
@@ -73,15 +78,23 @@ def split(line: str, separator: str | None) -> list[str]:
     return [cell.strip() for cell in line.split(separator)]
 
 
+BORDER = re.compile(r"\s*[+|=:\-]*--[+|=:\-\s]*|\s*={3,}[=\s]*|\s*_{3,}[_\s]*")
+"""A ruled line, as of a printed table (`+-----+-----+`)."""
+
+
 def is_comment(line: str) -> bool:
-    """Whether a line is marked as a comment."""
-    return line.lstrip().startswith(COMMENT_MARKS)
+    """Whether a line is marked as a comment, or is a ruled line."""
+    return line.lstrip().startswith(COMMENT_MARKS) or BORDER.fullmatch(line) is not None
 
 
 def is_number(cell: str, decimal: str) -> bool:
     """Whether a cell is a number with the given decimal mark."""
     cell = cell.translate(MINUS)
-    return NUMBER[decimal].fullmatch(cell) is not None or GROUPED[decimal].fullmatch(cell) is not None
+    if NUMBER[decimal].fullmatch(cell) is not None or GROUPED[decimal].fullmatch(cell) is not None:
+        return True
+    return (unit := UNIT_BEHIND.search(cell)) is not None and NUMBER[decimal].fullmatch(
+        cell[: unit.start()]
+    ) is not None
 
 
 def is_value(cell: str, decimal: str) -> bool:

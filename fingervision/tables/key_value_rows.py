@@ -4,7 +4,9 @@ import re
 from collections.abc import Sequence
 
 from fingervision.tables.dialect import is_comment
+from fingervision.tables.times import looks_like_time
 from fingervision.tables.units import known_unit
+from fingervision.tables.words import role_of
 
 PAIR = re.compile(r"([^\W\d]\w*)\s*[=:]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*([^\W\d_]+)(?!\w*\s*[=:]))?")
 """A name, a number, and a unit, which is not the name of the next number."""
@@ -23,13 +25,27 @@ def rows_of_pairs(lines: Sequence[str]) -> list[str] | None:
     if first is None or len(told) < FEWEST_LINES:
         return None
     names = [(name, unit if known_unit(unit) else "") for name, _, unit in first]
+    # The serial monitor of the Arduino IDE writes the time of day before each line: `13:24:07.123 -> x=0.61`.
+    stamped = "time" not in [role_of(name) for name, _ in names] and all(
+        _stamp(line) for line in told if len(PAIR.findall(line)) == len(names)
+    )
     out: list[str] = []
     rows = 0
     for line in lines:
         found = [] if is_comment(line) else PAIR.findall(line)
         same = [(name, unit if known_unit(unit) else "") for name, _, unit in found] == names
         rows += same
-        out.append("\t".join(value for _, value, _ in found) if same else f"# {line}" if line.strip() else "")
+        values = [*([_stamp(line)] if stamped else []), *(value for _, value, _ in found)]
+        out.append("\t".join(values) if same else f"# {line}" if line.strip() else "")
     if rows < FEWEST_LINES or len(told) - rows > max(1.0, MOST_OTHER * len(told)):
         return None
+    if stamped:
+        names = [("time", ""), *names]
     return ["\t".join(f"{name} [{unit}]" if unit else name for name, unit in names), *out]
+
+
+def _stamp(line: str) -> str:
+    """Date or time of day before the first pair of a line; empty if there is none."""
+    first = PAIR.search(line)
+    before = line[: first.start()].strip(" \t[](){}<>|;,-=") if first is not None else ""
+    return before if before and looks_like_time([before]) else ""

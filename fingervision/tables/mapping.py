@@ -25,7 +25,8 @@ WORDS = {
     "date_order": ("dmy", "mdy", "ymd"),
 }
 """Keys whose value must be one of a few words."""
-TEXTS = ("encoding", "part")
+TEXTS = ("encoding", "part", "missing")
+"""Keys whose value is any text: an encoding, a part of the file, the number that means no value."""
 ACCEPTED = ("constant_input", "backward_time", "repeated_time", "sizes", "speed", "overlap", "unreadable_cells")
 KEYS = ("file", "as", "columns", "units", *WORDS, *TEXTS, "header_line", "accept")
 

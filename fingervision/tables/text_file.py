@@ -7,6 +7,8 @@ from fingervision.tables.encoding import decode
 
 MOST_BYTES = 1_000_000_000
 """Largest size of a file, because cells as text need about ten times the size of the file in memory."""
+HEAD_LINES, MOST_IN_CELL = 40, 12
+"""Number of lines in which a header with line ends in its cells is looked for, and the most lines of such a header."""
 LONGEST_LINE = 1_000_000
 """Longest line in characters; only a file without line ends, not a table, has longer lines."""
 
@@ -49,10 +51,31 @@ def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
                 f"{path} must be a text table, or a file of a supported format (.xlsx, .mat, .parquet, .tdms, .lvm), "
                 f"but holds zero bytes (the first is character {text.index(chr(0))}): export it again."
             )
-    lines = text.splitlines()
+    lines = with_whole_cells(text.splitlines())
     if lines and max(map(len, lines)) > LONGEST_LINE:
         raise _too_long(path)
     return lines, name
+
+
+def with_whole_cells(lines: list[str]) -> list[str]:
+    """Join the lines of a header cell in quotes that contains line ends, as spreadsheets write it.
+
+    The lines that were joined become blank, so that all others keep their numbers.
+
+    Examples
+    --------
+    >>> with_whole_cells(['"Time', '[s]","Gap', '[mm]"', "0,1"])
+    ['"Time [s]","Gap [mm]"', '', '', '0,1']
+    """
+    for at in range(min(len(lines), HEAD_LINES)):
+        line = lines[at]
+        if '"' not in line or line.count('"') % 2 == 0:
+            continue
+        for end in range(at + 1, min(len(lines), at + 1 + MOST_IN_CELL)):
+            line = f"{line} {lines[end].strip()}"
+            if line.count('"') % 2 == 0 and '"' in lines[end]:
+                return [*lines[:at], line, *[""] * (end - at), *with_whole_cells(lines[end + 1 :])]
+    return lines
 
 
 def _too_long(path: Path) -> FingervisionError:

@@ -2,6 +2,8 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 from fingervision.domain.errors import DataError
 from fingervision.tables.column_names import column_name
@@ -13,6 +15,8 @@ from fingervision.tables.words import role_of
 
 HEADER_LINES = 6
 """Number of lines above the numbers that are searched for names and units."""
+SETTINGS_LINES = 60
+"""Number of lines in which settings with as many cells as a row may stand above the column names."""
 LAST_REMARK = frozenset({"", "comment", "comments", "kommentar", "bemerkung", "commentaire", "comentario", "commento"})
 """Names of a last column that may be missing in rows."""
 
@@ -67,6 +71,26 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
     return len(lines) if poor is None else poor
 
 
+def header_below_values(lines: Sequence[str], dialect: Dialect) -> int | None:
+    """Number of the line with the column names, from 1, if lines above it look like rows of numbers.
+
+    Programs write settings above the names (`Sample rate,1000,Hz`); only where nothing above the first row is a known
+    name are the names looked for further down.
+    """
+    first = first_row(lines, dialect, Entry())
+    if any(column_name(name).role is not None for name in find_header(lines, first, dialect, Entry()).names):
+        return None
+    for at in range(first + 1, min(len(lines) - 1, first + SETTINGS_LINES)):
+        if not lines[at].strip() or is_comment(lines[at]):
+            continue
+        names = names_in(lines[at], dialect)
+        if names is None or any(name and is_value(name, dialect.decimal) for name in names):
+            continue
+        if sum(column_name(name).role is not None for name in names) > 1:
+            return at + 1
+    return None
+
+
 def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry) -> Header:
     """Find column names and units above the first row."""
     if given.header_line == 0:
@@ -115,10 +139,25 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
         # `a,b` could mean ares and bits, but names are more probable above numbers than a line of rare units.
         return Header(units, (), units_at)
     if not found:
-        return Header((), units or (), -1)
+        return _names_beside_index(lines, first, dialect) or Header((), units or (), -1)
     # The line with the most known words is chosen; among equal lines, the line nearest to the numbers.
     _, at, names = max(found, key=lambda item: (item[0], item[1]))
     return Header(names, units or (), at)
+
+
+def _names_beside_index(lines: Sequence[str], first: int, dialect: Dialect) -> Header | None:
+    """Names above all columns but the first, which numbers the rows: as R and pandas print a table."""
+    if dialect.wide < 3:
+        return None
+    for at in range(first - 1, max(-1, first - 1 - HEADER_LINES), -1):
+        names = names_in(lines[at], replace(dialect, wide=dialect.wide - 1)) if lines[at].strip() else None
+        if names is None or sum(column_name(name).role is not None for name in names) < 2:
+            continue
+        index = [split(line, dialect.separator)[0].strip('"') for line in lines[first : first + 3] if line.strip()]
+        if len(index) > 1 and all(cell.isdecimal() for cell in index):
+            steps = {int(b) - int(a) for a, b in pairwise(index)}
+            return Header(("", *(name.strip('"') for name in names)), (), at) if steps == {1} else None
+    return None
 
 
 def _labelled(line: str, dialect: Dialect) -> tuple[str, tuple[str, ...]]:

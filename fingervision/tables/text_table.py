@@ -24,9 +24,10 @@ from fingervision.tables.exchanged_rows import exchanged
 from fingervision.tables.header_pairs import Header
 from fingervision.tables.key_value_rows import rows_of_pairs
 from fingervision.tables.mapping import Entry
+from fingervision.tables.other_rows import is_other_header, other_header, statistics_below
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
-from fingervision.tables.text_header import HEADER_LINES, find_header, first_row, names_in
+from fingervision.tables.text_header import HEADER_LINES, find_header, first_row, header_below_values, names_in
 
 NUMBER_BEGINS = frozenset("0123456789+-., \t")
 BETWEEN = re.compile(r"[\s,;|]+")
@@ -74,8 +75,9 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
         note = "Each line holds a column, with its name first: rows and columns are exchanged."
         return replace(whole, lines=(), notes=(note, *whole.notes))
     check_columns(path, dialect.wide)
-    first = first_row(lines, dialect, given)
-    header = find_header(lines, first, dialect, given)
+    at = given if given.header_line is not None else replace(given, header_line=header_below_values(lines, dialect))
+    first = first_row(lines, dialect, at)
+    header = find_header(lines, first, dialect, at)
     if not header.names:
         _check_commas(path, lines, first, dialect)
     if dialect.either_way:
@@ -87,7 +89,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
             f"decimal={mark} or decimal={other} states the decimal sign"
         )
         raise OpenQuestionError(path, "table", [Question(words, f"decimal={mark}")])
-    rows = _Rows(path, dialect, header, first)
+    rows = _Rows(path, dialect, header, first, is_part=given.header_line is not None)
     columns, numbers, left_out, restarts = rows.read(lines)
     notes = () if header.names else (f"The file has no column names: its columns are named 1 to {len(columns)}.",)
     return RawTable(
@@ -135,8 +137,8 @@ def _marked(lines: Sequence[str], dialect: Dialect) -> str:
 class _Rows:
     """Reads the lines below the header."""
 
-    def __init__(self, path: Path, dialect: Dialect, header: Header, first: int) -> None:
-        self._path, self._dialect, self._header, self._first = path, dialect, header, first
+    def __init__(self, path: Path, dialect: Dialect, header: Header, first: int, *, is_part: bool) -> None:
+        self._path, self._dialect, self._header, self._first, self._is_part = path, dialect, header, first, is_part
         self._names = header.names or tuple(str(k + 1) for k in range(dialect.wide))
         self._units = header.units or ("",) * dialect.wide
 
@@ -167,6 +169,7 @@ class _Rows:
         rows: list[list[str]] = []
         numbers: list[int] = []
         restarts: list[int] = []
+        other: int | None = None
         comments: list[int] = []
         headers: list[int] = []
         odd: list[tuple[int, int]] = []
@@ -176,10 +179,14 @@ class _Rows:
         for line, text in enumerate(body, start=self._first + 1):
             cells = text.split(separator) if plain else split(text, separator)
             if len(cells) == wide and text[0] not in "#%/!'" and any(cells):
-                if text[0] not in NUMBER_BEGINS and self._is_header(cells, names, units):
-                    headers.append(line)
-                    restarts.append(len(rows))
-                    continue
+                if text[0] not in NUMBER_BEGINS and not is_number(cells[0].strip(), self._dialect.decimal):
+                    if self._is_header(cells, names, units):
+                        headers.append(line)
+                        restarts.append(len(rows))
+                        continue
+                    if self._header.names and is_other_header(cells, names, units, self._dialect.decimal):
+                        other = line
+                        break
                 rows.append(cells)
                 numbers.append(line)
             elif not text.strip():
@@ -193,6 +200,10 @@ class _Rows:
                 restarts.append(len(rows))
             else:
                 odd.append((line, len(cells)))
+        if other is not None and not self._is_part:
+            raise OpenQuestionError(self._path, "table", [other_header(self._header.line + 1, other)])
+        statistics = statistics_below(rows)
+        del rows[len(rows) - statistics :], numbers[len(numbers) - statistics :]
         if len(odd) > max(1.0, MOST_ODD * len(rows)):
             told = [text for text in body if text.strip() and not is_comment(text)]
             prose = sum(_is_prose(text, self._dialect.decimal) for text in told)
@@ -211,6 +222,10 @@ class _Rows:
             left_out.append(f"{_count(len(comments), 'line')} of comment (the first is line {comments[0]})")
         if headers:
             left_out.append(f"{_count(len(headers), 'repeated header line')} (the first is line {headers[0]})")
+        if statistics:
+            left_out.append(f"{_count(statistics, 'row')} of statistics below the values")
+        if other is not None:
+            left_out.append(f"everything from line {other} on, where other column names begin")
         if odd:
             left_out.append(
                 f"{_count(len(odd), 'line')} with another number of cells (line {odd[0][0]} has {odd[0][1]}, not "
@@ -227,6 +242,8 @@ class _Rows:
         cells = [cell.strip() for cell in cells]
         if cells in (names, units):
             return True
+        if is_other_header(cells, names, units, self._dialect.decimal):
+            return False
         same = sum(a.lower() == b.lower() for a, b in zip(cells, names, strict=True))
         return same > len(cells) // 2 and not any(is_number(cell, self._dialect.decimal) for cell in cells)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.dialect import MISSING
+from fingervision.tables.written_dates import days_and_clock, rewritten
 
 CLOCK = re.compile(r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d+))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?")
 DAY = re.compile(r"(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{1,4})")
@@ -21,6 +22,7 @@ USUAL = re.compile(r"(\d[\d./-]*)[T ](\d{1,2}):(\d\d):(\d\d)(?:[.,](\d+))?")
 ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
 DAY_S = 86400.0
 HALF_DAY_S = 43200.0
+TEN_HOURS_S = 36000.0
 ORDERS = ("dmy", "mdy")
 DAY_NUMBERS = (36526.0, 58500.0)
 """Days since 1899-12-30 of the years 2000 to 2060: a date as a spreadsheet stores it."""
@@ -57,7 +59,14 @@ class Seconds:
 def looks_like_time(cells: Sequence[str]) -> bool:
     """Whether a column's first values are dates or times of day."""
     some = [cell for cell in cells[:50] if cell.strip().lower() not in MISSING]
-    return bool(some) and all(STAMP.match(cell) or CLOCK.fullmatch(ZONE.sub("", cell).strip()) for cell in some)
+    return bool(some) and all(
+        STAMP.match(cell) or CLOCK.fullmatch(ZONE.sub("", cell).strip()) or _is_written_out(cell) for cell in some
+    )
+
+
+def _is_written_out(cell: str) -> bool:
+    """Whether a cell is a date with a word, a compact date, or a duration with days."""
+    return rewritten(cell.strip()) != cell.strip() or days_and_clock(cell.strip()) is not None
 
 
 def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
@@ -83,6 +92,9 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
     notes = []
     if not words:
         known = np.flatnonzero(present)
+        if _counts_to_twelve(cells, value[known]):
+            value[known[1:]] += HALF_DAY_S * np.cumsum(np.diff(value[known]) < -TEN_HOURS_S)
+            notes.append("The times of day count to twelve, without AM or PM: twelve hours were added after 12:59.")
         falls = np.diff(value[known]) < -HALF_DAY_S
         if falls.any():
             value[known[1:]] += DAY_S * np.cumsum(falls)
@@ -95,6 +107,19 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
         tuple(notes),
         len(usable) > 1 and bool(np.any(usable[0] != usable[1])),
         unread,
+    )
+
+
+def _counts_to_twelve(cells: Sequence[str], value: NDArray[np.float64]) -> bool:
+    """Whether times of day without AM or PM go from 12:59 to 1:00, and lie in the hours from 1 to 12."""
+    steps = np.diff(value)
+    back = steps < 0.0
+    return bool(
+        back.any()
+        and not any(cell.strip()[-1:] in "mM." for cell in cells[:1])
+        and np.all((steps[back] <= -TEN_HOURS_S) & (steps[back] >= -HALF_DAY_S))
+        and np.all((value >= 3600.0) & (value < 13.0 * 3600.0))
+        and np.all(value[:-1][back] >= HALF_DAY_S)
     )
 
 
@@ -121,6 +146,11 @@ def _taken_apart(
 
 def _one(text: str) -> tuple[str, float | None]:
     """Split a cell into date ('' for none) and seconds of the day; None if the cell contains no time."""
+    if (duration := days_and_clock(text)) is not None:
+        days, text = duration
+        seconds = _clock(text)
+        return "", None if seconds is None else days * DAY_S + seconds
+    text = rewritten(text)
     offset = 0.0
     if (zone := ZONE.search(text)) is not None and ":" in text[: zone.start()]:
         offset = _offset(zone[0])

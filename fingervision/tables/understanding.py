@@ -13,12 +13,15 @@ from fingervision.tables.cell_units import with_units_of_cells
 from fingervision.tables.cells import to_numbers
 from fingervision.tables.column_choice import NEEDED, Findings, choose
 from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
+from fingervision.tables.dialect import NO_NUMBER
 from fingervision.tables.doubts import doubts
+from fingervision.tables.filler_values import filler_value, without_filler
+from fingervision.tables.likely_unit import likely_unit
 from fingervision.tables.long_table import refuse_long_table
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable
-from fingervision.tables.times import counts_days, is_day_number, is_epoch, looks_like_time, seconds_of
+from fingervision.tables.times import is_day_number, is_epoch, looks_like_time, seconds_of
 from fingervision.tables.units import factor, known_unit, spelled
 
 DATE = "date"
@@ -26,6 +29,9 @@ DATE = "date"
 MOST_UNREAD = 0.05
 """Largest fraction of a column's cells that may not be numbers (such as ERR of a logger) without a question to the
 user."""
+
+OTHER_VALUES = frozenset({"left", "right", "force", "u_gap", "u_random"})
+"""Roles whose columns may hold something else (pixels, volts) in a table that also has the values needed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,11 +147,19 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
         if unit is None:
             continue
         size = factor(unit, DIMENSION[role])
+        if size is None and role in OTHER_VALUES and role not in given.columns and _is_dispensable(role, kind, chosen):
+            about.notes.append(f"'{column.name}' ({role}) is not used: its unit, {unit}, is no {DIMENSION[role]}.")
+            taken.pop()
+            continue
         if size is None:
             about.questions.append(_wrong_unit(column, role, unit))
             continue
         if role == "time":
             values = _from_epoch(values, column, unit, about)
+        elif "missing" in given.words:
+            values = without_filler(values, given.words["missing"])
+        elif "sizes" not in given.accept and (filler := filler_value(values)) is not None:
+            about.questions.append(_filler(column.name, values, filler))
         columns[role] = values if size == 1.0 else Numbers(values.value * size, values.present)
         if column.since and role == "time":
             taken[-1] = Taken(column.name, role, DATE)
@@ -164,6 +178,11 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
         raw, kind, tuple(taken), columns, run_cells, tuple(about.notes), tuple(about.left_out),
         tuple(about.questions), channels,
     )  # fmt: skip
+
+
+def _is_dispensable(role: str, kind: str, chosen: Mapping[str, int]) -> bool:
+    """Whether a table can be read without a column: without the sides if there is a gap."""
+    return role not in NEEDED[kind] and (role not in ("left", "right") or "gap" in chosen)
 
 
 def _unit(
@@ -186,18 +205,25 @@ def _unit(
             f"{column.name} has no unit and is not used; state its unit as units.{role} in columns.toml."
         )
         return None
-    example = {
-        "length": "mm",
-        "time": "d" if role == "time" and counts_days(values.value[values.present]) else "s",
-        "force": "N",
-    }[DIMENSION[role]]
+    example = likely_unit(DIMENSION[role], values.value[values.present])
     about.questions.append(Question(f"the unit of '{column.name}' ({role}) is not stated", f"units.{role}={example}"))
     return None
 
 
+def _filler(name: str, values: Numbers, filler: float) -> Question:
+    rows = int(np.count_nonzero(values.present & (values.value == filler)))
+    return Question(
+        f"{rows} of {values.value.size} rows of '{name}' hold {filler:.12g}, far from all others, which may mean no "
+        "value (if the number was measured, set accept=sizes)",
+        f"missing={filler:.12g}",
+    )
+
+
 def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
     dimension = DIMENSION[role]
-    example = {"length": "0.1 um", "time": "ms", "force": "mN"}[dimension]
+    # A micro sign that was lost on the way is often a question mark.
+    micro = known_unit(unit.replace("?", "µ").replace("\N{REPLACEMENT CHARACTER}", "µ"))
+    example = micro or {"length": "0.1 um", "time": "ms", "force": "mN"}[dimension]
     return Question(
         f"'{column.name}' ({role}) must be a {dimension}, but its unit is '{unit}': state what one unit is worth",
         f"units.{role}={example}",
@@ -207,8 +233,9 @@ def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
 def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about: Findings) -> Numbers:
     """Read a column's cells as numbers; cells that are not numbers are reported."""
     if isinstance(column.content, Numbers):
-        return column.content
+        return _without_overflow(column.content)
     values, odd = to_numbers(column.content, decimal)
+    values = _without_overflow(values)
     if odd.size:
         at = int(odd[0])
         words = (
@@ -219,6 +246,12 @@ def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about
             about.questions.append(Question(words, "accept=unreadable_cells"))
         about.left_out.append(words)
     return values
+
+
+def _without_overflow(values: Numbers) -> Numbers:
+    """Mark an instrument's 9.91E37 (not a number) and 9.9E37 (overflow) as missing."""
+    usable = np.abs(values.value) < NO_NUMBER
+    return values if usable.all() else Numbers(np.where(usable, values.value, 0.0), values.present & usable)
 
 
 def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findings) -> Numbers | None:

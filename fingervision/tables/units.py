@@ -1,5 +1,6 @@
 """Units as written in tables, and their factors to mm, s and N."""
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,14 @@ WRITTEN = {
 }
 """Units, each with the words and symbols that denote it, in lower case."""
 BY_WORD = {word: unit for unit, words in WRITTEN.items() for word in words.split()}
-CASE_TELLS = {"Mm": None, "MN": None}
+BY_PREFIX = re.compile(r"(?:[fdck]|da)?m|(?:[kc]|da)?N|[fpn]s|Å|angstroms?|ft|foot|feet|yd|dyne?|pond")
+"""Other units, by the symbols of the units library. The library knows many more, and so reads a camera's `px` as 1/96
+inch, `a` as a year, and the `?m` of a lost micro sign as a metre; these are no units of such tables."""
+POWER = re.compile(
+    r"(?:10\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d{1,2})|[eE](?P<e>[+-]\d{1,2})|1\s*/\s*(?P<part>[1-9]\d*))\s*"
+)
+"""A power of ten or a fraction before a unit: `10^-3 mm`, `e-6 m`, `1/100 mm`."""
+CASE_TELLS = {"Mm": None, "MN": None, "Nm": None}
 """Spellings whose meaning differs from that of their lower case; the user is asked about their meaning."""
 NO_UNIT = frozenset({"", "-", "1", "[-]", "\u2013", "none", "n/a"})
 
@@ -85,21 +93,34 @@ def factor(text: str, dimension: str) -> float | None:
         raise InstallationError(
             "Units of a foreign table need the library pint, which is not installed: pip install pint."
         ) from error
-    words = spelled(text)
-    amount, _, rest = words.partition(" ")
-    try:
-        size = float(amount)
-    except ValueError:
-        size, rest = 1.0, words
+    size, rest = _multiple(spelled(text))
     unit = known_unit(rest)
-    if unit is None and spelled(rest) in CASE_TELLS:
+    if unit is None and (spelled(rest) in CASE_TELLS or BY_PREFIX.fullmatch(spelled(rest)) is None):
         return None
     try:
-        quantity = units.Quantity(size, unit or spelled(rest).replace("µ", "u"))
+        quantity = units.Quantity(size, unit or spelled(rest))
         found = float(quantity.to(CANONICAL[dimension]).magnitude)
     except Exception:
         return None
     return found if found > 0.0 else None
+
+
+def _multiple(words: str) -> tuple[float, str]:
+    """Split `0.1 um` or `10^-3 mm` into a number and a unit.
+
+    Examples
+    --------
+    >>> _multiple("0.1 um"), _multiple("10^-3 mm"), _multiple("1/100 mm"), _multiple("mm")
+    ((0.1, 'um'), (0.001, 'mm'), (0.01, 'mm'), (1.0, 'mm'))
+    """
+    if (scale := POWER.match(words)) is not None and scale.end() < len(words):
+        rest = words[scale.end() :]
+        return (1.0 / float(scale["part"]) if scale["part"] else 10.0 ** int(scale["power"] or scale["e"])), rest
+    amount, _, rest = words.partition(" ")
+    try:
+        return float(amount), rest
+    except ValueError:
+        return 1.0, words
 
 
 @cache

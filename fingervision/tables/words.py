@@ -7,7 +7,7 @@ from functools import lru_cache
 ROLES = {
     "time": "time t zeit zeitachse temps tempo tiempo uhrzeit timestamp timestamps zeitstempel horodatage elapsed "
     "clock tijd tijdstip hora heure ora orario zeitpunkt instant prufzeit messzeit messdauer tid czas время cas "
-    "zaman aika ido timp час 時間 時刻 経過時間 时间 時間軸 시간",
+    "zaman aika ido timp laufzeit час χρονος الزمن זמן 時間 時刻 経過時間 时间 時間軸 시간",
     "date": "date datum fecha data datetime",
     "input": "input inputs eingang eingabe entree entrees entrada ingresso uin xin x position positions pos stage "
     "displacement displacements disp displ encoder drive travel stroke weg stellweg wege hub verschiebung verfahrweg "
@@ -16,6 +16,7 @@ ROLES = {
     "positie posities verplaatsing slag aandrijving posicao posicoes deslocamento deslocamentos traversenweg crosshead "
     "konum sijainti asema siirtyma pozicio elmozdulas pozitie положення forskydning forskjutning polozenie "
     "przemieszczenie posuv poloha "
+    "vandring plassering θεση μετατοπιση الموضع מיקום "
     "положение перемещение позиция 変位 位置 変位量 "
     "ストローク 位移 行程 변위 위치",
     "gap": "gap gaps opening openings abstand abstande oeffnung offnung offnungsweite oeffnungsweite spalt spaltweite "
@@ -23,6 +24,7 @@ ROLES = {
     "ecartement espacement apertura abertura hueco separacion separazione fessura luce "
     "spleet spleetbreedte vingerafstand afstand abertura aberturas separacao entrefer avstand szczelina odstep "
     "rozwarcie mezera aciklik aralik rako hezag deschidere "
+    "oppning abning apning spalte διακενο ανοιγμα الفجوة מרווח abst "
     "зазор раскрытие 隙間 すき間 間隙 間隔 ギャップ 開口 间隙 间距 開度 开口 간격 틈새",
     "left": "left links linke linker linkes gauche izquierda izquierdo sinistra sinistro esquerda esquerdo",
     "right": "right rechts rechte rechter rechtes droite droit derecha derecho destra destro direita direito",
@@ -44,6 +46,7 @@ BESIDE = (
     "dedos dita dito entre tra fra machine between jaw jaws backen messung data daten donnees datos dati x y z 0 1 "
     "2 3 4 prescribed imposed applied vorgegebene vorgegebener vorgegebenes aufgebrachte imposee impose impuesto "
     "impuesta imposto imposta imposti feedback vib vibrometer fiber fibre width weite breite largeur ancho larghezza "
+    "axial axiale mech utc local "
     "sensor sonde probe capacitive confocal inductive optical act akt 測定 計測 測定値 测量 측정"
 )
 FILLERS = frozenset(unicodedata.normalize("NFKD", BESIDE).split())

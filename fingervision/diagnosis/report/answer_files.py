@@ -16,6 +16,7 @@ from fingervision.domain.effect import effect_key
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
+from fingervision.models.function_model import FunctionModel
 from fingervision.storage.model_toml import write_model
 from fingervision.storage.provenance import Provenance
 from fingervision.storage.recipe_toml import write_recipe
@@ -41,7 +42,8 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
         Path of the measured table, next to which its recording is searched.
     """
     report = done.report
-    write_model(out / MODEL, Path(model.base_path), corrected(done, model).effects, model.kind)
+    names = model.base.names if isinstance(model.base, FunctionModel) else None
+    write_model(out / MODEL, Path(model.base_path), corrected(done, model).effects, model.kind, names)
     if report.next_run is None:
         (out / NEXT_RUN).unlink(missing_ok=True)
     else:

@@ -13,6 +13,7 @@ from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
 from fingervision.measuring.clock.rivals import RunnerUp
 from fingervision.measuring.clock.set_points import Jumps
+from fingervision.measuring.clock.stamp_resolution import stamp_resolution_s
 
 FOLLOWED = 0.95
 """Share of the gap's variance explained by the log below which a note says that something else also moves the gap."""
@@ -64,6 +65,8 @@ def stated(
     variance = covariance[0, 0] + 2.0 * away_s * covariance[0, 1] + away_s**2 * covariance[1, 1]
     row_s = float(np.median(np.diff(motion.path.rows.time_s)))
     variance += (SYSTEMATIC * np.hypot(frame_s, row_s)) ** 2
+    # A program may round its times or cut them off, so that all rows are early by up to the resolution.
+    variance += stamp_resolution_s(motion.path.rows.time_s) ** 2 / 12.0
     # Frames show at which time between two rows the stage jumped, but the log does not. A program that moves and logs
     # in one cycle jumps at the same phase of each cycle, so that the error does not average out over jumps.
     if jumps is not None:

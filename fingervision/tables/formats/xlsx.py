@@ -11,8 +11,10 @@ import numpy as np
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import column_name
+from fingervision.tables.formats._text_numbers import decimal_of_texts, is_number_text
 from fingervision.tables.mapping import Entry
 from fingervision.tables.needed_library import needed_library
+from fingervision.tables.other_rows import statistics_below
 from fingervision.tables.parts import chosen_part
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.units import is_unit
@@ -24,6 +26,8 @@ archive is not a measured table but perhaps an archive bomb."""
 MOST_SHARED_BYTES = 100_000_000
 """Largest total size of the texts of cells, all of which are kept in memory."""
 HEADER_ROWS = 60
+MOST_STATISTICS = 30
+"""Number of last rows that are searched for statistics."""
 EPOCH = datetime(1900, 1, 1)
 
 
@@ -92,8 +96,12 @@ def _is_value(cell: object) -> bool:
 
 
 def _first_row(rows: Sequence[tuple[Any, ...]]) -> int | None:
-    """Find the first row with at least two values."""
-    return next((at for at, row in enumerate(rows) if sum(map(_is_value, row)) >= 2), None)
+    """Find the first row with at least two values, or with two texts that are numbers if no row has values."""
+    for kind in (_is_value, is_number_text):
+        found = next((at for at, row in enumerate(rows) if sum(map(kind, row)) >= 2), None)
+        if found is not None:
+            return found
+    return None
 
 
 def _best_names(rows: Sequence[tuple[Any, ...]]) -> list[str]:
@@ -104,7 +112,7 @@ def _best_names(rows: Sequence[tuple[Any, ...]]) -> list[str]:
     above = [[str(cell).strip() for cell in row if cell is not None] for row in rows[:first]]
     named = [row for row in above if len(row) >= 2]
     if not named:
-        return [str(k + 1) for k, cell in enumerate(rows[first]) if _is_value(cell)]
+        return [str(k + 1) for k, cell in enumerate(rows[first]) if _is_value(cell) or is_number_text(cell)]
     return max(named, key=lambda row: sum(column_name(cell).role is not None for cell in row))
 
 
@@ -170,6 +178,10 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
         else:
             body.append(cells)
             lines.append(at + 1)
+    last = [["" if cell is None else str(cell) for cell in row] for row in body[-MOST_STATISTICS:]]
+    statistics = statistics_below(last)
+    del body[len(body) - statistics :], lines[len(lines) - statistics :]
+    decimal = decimal_of_texts(path, body, given)
     columns = []
     for at, k in enumerate(places):
         cells = [row[at] for row in body]
@@ -179,8 +191,12 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
                 f"The cell in row {lines[empty[0]]}, column {k + 1} of sheet '{title}' of {path} holds a formula whose "
                 "value was never calculated: open the workbook in Excel or LibreOffice, save it, and read it again."
             )
-        columns.append(_column(names[k] if k < len(names) else str(k + 1), units[k] if k < len(units) else "", cells))
+        columns.append(
+            _column(names[k] if k < len(names) else str(k + 1), units[k] if k < len(units) else "", cells, decimal)
+        )
     left_out = [f"{len(headers)} repeated header lines (the first is row {headers[0]})"] if headers else []
+    if statistics:
+        left_out.append(f"{statistics} row{'s' * (statistics > 1)} of statistics below the values")
     return RawTable(
         path,
         f"Excel workbook, sheet '{title}'" + (", without its macros" if path.suffix.lower() == ".xlsm" else ""),
@@ -188,7 +204,7 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
         lines,
         tuple(left_out),
         () if names else ("The sheet has no column names: its columns are named by their numbers.",),
-        settings={"part": title},
+        settings={"part": title, **({"decimal": decimal} if decimal != "." else {})},
         named=bool(names),
     )
 
@@ -216,7 +232,7 @@ def _header(rows: Sequence[tuple[Any, ...]], first: int, given: Entry) -> tuple[
     return named[at], units, at + 1
 
 
-def _column(name: str, unit: str, cells: Sequence[Any]) -> RawColumn:
+def _column(name: str, unit: str, cells: Sequence[Any], decimal: str) -> RawColumn:
     """Convert the cells of a column: numbers stay numbers, dates and times become seconds, others become text."""
     kinds = {type(cell) for cell in cells if cell is not None and cell != ""}
     present = np.array([cell is not None and cell != "" for cell in cells], dtype=np.bool_)
@@ -224,13 +240,20 @@ def _column(name: str, unit: str, cells: Sequence[Any]) -> RawColumn:
         value = np.array([float(cell) if there else 0.0 for cell, there in zip(cells, present, strict=True)])
         usable = np.isfinite(value)
         return RawColumn(name, Numbers(np.where(usable, value, 0.0), present & usable), unit)
+    if kinds == {time}:  # as text, so that a midnight among them is found as in any other table
+        return RawColumn(name, [cell.isoformat() if there else "" for cell, there in zip(cells, present, strict=True)])
     if kinds and kinds <= {datetime, date, time, timedelta}:
         seconds = [_seconds(cell) if there else 0.0 for cell, there in zip(cells, present, strict=True)]
         first = next(cell for cell in cells if cell is not None and cell != "")
         start = _seconds(first) if isinstance(first, date) else 0.0
         value = np.where(present, np.array(seconds) - start, 0.0)
         return RawColumn(name, Numbers(value, present), "s", str(first) if start or isinstance(first, date) else "")
-    return RawColumn(name, ["" if cell is None else str(cell) for cell in cells], unit)
+    texts = ("" if cell is None else str(cell).strip() for cell in cells)
+    if decimal == ",":
+        texts = (
+            text.replace(".", ",") if isinstance(cell, float) else text for cell, text in zip(cells, texts, strict=True)
+        )
+    return RawColumn(name, list(texts), unit)
 
 
 def _seconds(cell: datetime | date | time | timedelta) -> float:

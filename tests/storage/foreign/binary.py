@@ -78,6 +78,38 @@ def excel_merged_title(folder: Path) -> Path:
     return path
 
 
+def excel_numbers_as_text(folder: Path) -> Path:
+    """Values that were pasted as text, with decimal commas."""
+    rows = [[str(cell).replace(".", ",") for cell in row] for row in rows_of(TIME_S, INPUT_MM, GAP_MM)]
+    return workbook(folder / "text.xlsx", [["Zeit (s)", "Weg (mm)", "Abstand (mm)"]], rows)
+
+
+def excel_midnight_and_statistics(folder: Path) -> Path:
+    start = dt.datetime(2024, 5, 3, 23, 59, 59)
+    clock = [(start + dt.timedelta(seconds=float(s))).time() for s in TIME_S]
+    rows = [*rows_of(clock, INPUT_MM, GAP_MM), [], ["Mean", 0.7, 7.9], ["Std. dev.", 0.1, 0.9]]
+    return workbook(folder / "clock.xlsx", [["Time", "Position (mm)", "Gap (mm)"]], rows)
+
+
+def modelica_result(folder: Path) -> Path:
+    """Lay data out as Dymola and OpenModelica do: names and descriptions by columns, values by rows."""
+    from scipy.io import savemat
+
+    def characters(words: list[str]) -> np.ndarray:
+        return np.array([list(word.ljust(max(map(len, words)))) for word in words])
+
+    content = {
+        "Aclass": characters(["Atrajectory", "1.1", "", "binTrans"]),
+        "name": np.ascontiguousarray(characters(["time", "stiffness", "stage.position", "finger.gap"]).T),
+        "description": np.ascontiguousarray(characters(["Time in [s]", "[N/m]", "Drive [m|mm]", "Opening [m|mm]"]).T),
+        "dataInfo": np.array([[0, 1, 0, -1], [1, 2, 0, 0], [2, 2, 0, -1], [2, -3, 0, -1]], dtype=np.int32).T,
+        "data_1": np.array([[0.0, 2.3], [1e4, 1e4]]),
+        "data_2": np.stack([TIME_S, INPUT_MM * 1e-3, -GAP_MM * 1e-3]),
+    }
+    savemat(folder / "modelica.mat", content, format="4")
+    return folder / "modelica.mat"
+
+
 def matlab_struct(folder: Path) -> Path:
     from scipy.io import savemat
 
@@ -181,7 +213,7 @@ def tdms_waveforms(folder: Path) -> Path:
 
 
 READ: tuple[Callable[[Path], Path], ...] = (
-    excel_plain, excel_title_and_units_row, excel_offset_columns, excel_dates, excel_notes_beside, excel_merged_title,
+    excel_numbers_as_text, excel_midnight_and_statistics, modelica_result, excel_plain, excel_title_and_units_row, excel_offset_columns, excel_dates, excel_notes_beside, excel_merged_title,
     matlab_struct, matlab_vectors_beside_others, matlab_4, matlab_73, matlab_73_struct, parquet_units_in_names,
     parquet_stamps_and_metadata, tdms_channels, tdms_waveforms,
 )  # fmt: skip

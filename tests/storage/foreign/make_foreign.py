@@ -1,4 +1,4 @@
-"""Write the collection of foreign tables, each with its truth; `python tests/storage/foreign/make_foreign.py`.
+"""Write the collection of foreign tables, each with its truth; `python -m tests.storage.foreign.make_foreign`.
 
 Truth is calculated in decimal fractions from the numbers as they are printed, by code that shares nothing with the
 product. `NAME.truth.csv` begins with `# kind:` and, where a decision is needed, `# asks:` (the key that the refusal must
@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
+
+from tests.storage.foreign.make_habits import tried
 
 HERE = Path(__file__).parent
 MM = {"mm": Decimal(1), "um": Decimal("0.001"), "m": Decimal(1000), "in": Decimal("25.4"), "mil": Decimal("0.0254"),
@@ -99,7 +101,7 @@ def cases() -> list[Case]:
         plain("no_separator_but_tabs_and_blanks", "time_s   input_um \tgap_um", " \t ", ("s", "um", "um"), (3, 1, 1)),
     ]  # fmt: skip
     made += simulations() + drives() + dates() + rows_left_out() + questions() + iso230() + instruments() + habits()
-    return made
+    return made + tried(Case)
 
 
 def instruments() -> list[Case]:
