@@ -32,6 +32,7 @@ from fingervision.vision.profile_lines import INNER, ROWS
 from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STEP, WALL, ProfileFit
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 from fingervision.vision.symmetric_spread import symmetric_squares
+from fingervision.vision.trail import with_trail
 from fingervision.vision.wall_width import (
     WIDER,
     are_broader_together,
@@ -118,8 +119,16 @@ def with_profile(
         return edges  # the models do not describe a flank that is clipped at the end of the scale
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
         return sharp
-    weight = 1.0 / edges.noise_flat**2
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
+    # Lines along the picture's border do not cross a flank.
+    outer: list[MeanProfile | None] = [None, None]
+    if are_in_view := are_outer_flanks_in_view(edges):
+        outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
+    if are_in_view and is_unlike_tip:
+        trailed = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur)
+        if trailed is not None:
+            return trailed
+    weight = 1.0 / edges.noise_flat**2
     profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
     fits = FlankFits(profiles)
     bins, steps, left = fits.bins, fits.of(STEP), fits.squares
@@ -138,10 +147,6 @@ def with_profile(
         if are_of_size(glare, 1.0):
             moved = moved_edges(edges, glare, U_GLARE, all_around, "glare")
             return without_additions(upright, moved, light, GLARE, glare)
-    # Lines along the picture's border do not cross a flank.
-    outer: list[MeanProfile | None] = [None, None]
-    if are_outer_flanks_in_view(edges):
-        outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         wall = fits.of(WALL)
         is_wall = not is_step and fits.explains(WALL) and are_of_size(wall, -1.0)
