@@ -50,7 +50,7 @@ UNEXPLAINED = 1.2
 # Ratios above which flanks without a common profile are not steps, but pads or shadows as wide as the window: residuals
 # to the noise of the picture's flat parts, and squared blur of the flanks to that of the tips. Motion causes a ratio of
 # residuals below 2, and texture does not change the blur.
-NO_STEP, NO_EDGE = 3.0, 4.0
+NO_STEP, NO_EDGE, NO_MOTION = 3.0, 4.0, 2.0
 # Largest integral of the squared residual of a Gaussian step, in units of contrast^2 times blur, that symmetric optics
 # can cause: a disc of defocus causes at most 0.0017 (a box 0.0038). A larger residual means two steps, or a line
 # between them, even if it is symmetric.
@@ -114,6 +114,9 @@ def with_profile(
     if inner[0] is None or inner[1] is None:
         flanks, tips = squared_blurs(edges)
         is_none = edges.noise > NO_STEP * edges.noise_flat and bool(np.any(flanks > NO_EDGE * tips))
+        # A shadow on one side only, so wide that some rows follow its far edge and others the finger's.
+        is_wider = flanks.max() > flanks.min() + max(ONE_SIDED * flanks.min(), ONE_SIDED_PX**2)
+        is_none |= edges.noise > NO_MOTION * edges.noise_flat and bool(is_wider)
         return replace(edges, beside=STRIP) if is_none else _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # the models do not describe a flank that is clipped at the end of the scale
