@@ -51,6 +51,9 @@ UNEXPLAINED = 1.2
 # to the noise of the picture's flat parts, and squared blur of the flanks to that of the tips. Motion causes a ratio of
 # residuals below 2, and texture does not change the blur.
 NO_STEP, NO_EDGE, NO_MOTION = 3.0, 4.0, 2.0
+# Difference between the levels inside the two fingers' edges, as a share of the contrast, above which one of them is
+# not a finger's: fingers of one gripper are alike, and uneven light changes both levels by less.
+UNLIKE_TONES = 0.25
 # Largest integral of the squared residual of a Gaussian step, in units of contrast^2 times blur, that symmetric optics
 # can cause: a disc of defocus causes at most 0.0017 (a box 0.0038). A larger residual means two steps, or a line
 # between them, even if it is symmetric.
@@ -117,6 +120,9 @@ def with_profile(
         # A shadow on one side only, so wide that some rows follow its far edge and others the finger's.
         is_wider = flanks.max() > flanks.min() + max(ONE_SIDED * flanks.min(), ONE_SIDED_PX**2)
         is_none |= edges.noise > NO_MOTION * edges.noise_flat and bool(is_wider)
+        # A dark shadow with sharp borders was taken for the finger: what lies inside the edges differs.
+        apart = abs(edges.inside[0] - edges.inside[1]) / np.abs(edges.contrast[:, :INNER]).max()
+        is_none |= edges.noise > NO_STEP * edges.noise_flat and bool(apart > UNLIKE_TONES)
         return replace(edges, beside=STRIP) if is_none else _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # the models do not describe a flank that is clipped at the end of the scale
