@@ -44,6 +44,9 @@ BESIDE = {
     "shorter exposure reduces the motion.",
     "sharpening": "the camera sharpens its pictures; the shift of the edges is corrected, and u_shift_px includes the "
     "uncertainty of the correction. Switch sharpening off in the camera's settings.",
+    "trail": "a trail follows the moving fingers, as from temporal noise reduction in the camera, which mixes earlier "
+    "pictures into each picture; u_shift_px includes the distance by which the edges may lag. Switch noise reduction "
+    "off in the camera's settings, or move more slowly.",
     "roughness": "the edges deviate from a mean line by more than their noise (roughness, printing, texture, or a "
     "lossy codec); the mean line is measured, and the uncertainty includes the scatter. A rough finger makes contact "
     "by its peaks, which lie farther outside.",

@@ -83,8 +83,8 @@ class EdgePoints:
     noise_flat : float
         Standard deviation of the light in the flat parts beside the edges; 0 if no flat part is in view.
     beside : str
-        Disturbance found beside the edges: wall, shadow, glare, motion, sharpening, or a strip of a third tone (which
-        is not measured); empty if none was found.
+        Disturbance found beside the edges: wall, shadow, glare, motion, trail, sharpening, or a strip of a third tone
+        (which is not measured); empty if none was found.
     """
 
     lines: ProfileLines

@@ -23,7 +23,6 @@ from fingervision.vision.local_outline import FLATTEST, local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
-from fingervision.vision.polygonal_outline import polygonal_measuring_point
 from fingervision.vision.profile_lines import INNER, PLACES, ROWS
 from fingervision.vision.residuals import (
     SHARED_POINTS,
@@ -38,6 +37,7 @@ from fingervision.vision.residuals import (
 from fingervision.vision.rough_corner import with_corner_doubt
 from fingervision.vision.roughness import best_linear, roughness, with_roughness
 from fingervision.vision.third_tone import THIRD_TONE
+from fingervision.vision.unlike_fingers import NO_CHAINS, chain_of_one, explains_roughness, polygonal
 
 Floats = NDArray[np.float64]
 
@@ -117,11 +117,12 @@ def measure_gap(
     rough = roughness(points, (fits[0], fits[1]))
     is_untold = rough is not None and not rough.is_told
     rough = None if is_untold else rough
-    chains: list[MeasuringPoint] = []
+    chains, are_corners = None, False
     if rough is not None:
         # Corners that are not part of the three-sided shape cause residuals like those of roughness.
-        chains = _polygonal(points, below_tip_px, noise_shared)
-        rough = None if chains else rough
+        chains = polygonal(points, below_tip_px, noise_shared)
+        are_corners = explains_roughness(chains, points, (fits[0], fits[1]), rough.deviation_px)
+        chains, rough = (chains, None) if are_corners else (None, rough)
     if rough is not None:
         bare = points
         points = (with_roughness(points[0], rough, fits[0]), with_roughness(points[1], rough, fits[1]))
@@ -153,17 +154,24 @@ def measure_gap(
     ]
     cuts_px = [corner_aside_px(*one, below_tip_px) for one in zip(points, (left, right), fitted, strict=True)]
     are_cut = all(cuts_px)
-    if not chains and (not all(holds) or any(aside) or are_cut):
-        chains = _polygonal(points, below_tip_px, noise_shared)
+    if chains is None and (not all(holds) or any(aside) or any(cuts_px)):
+        chains = polygonal(points, below_tip_px, noise_shared)
     if are_cut:  # the corners are not fillets, so that the edge lies between the fitted shape and the rejected points
         aside = [beyond + 2.0 / 3.0 * cut_px**2 for beyond, cut_px in zip(aside, cuts_px, strict=True)]
-    if chains and all(holds):  # what knows its points better
+    measured = [] if chains is None else [chain for chain in chains if chain is not None]
+    if len(measured) == len(fitted) and all(holds):  # what knows its points better
         variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]
-        chains = chains if sum(own.covariance[1, 1] for own in chains) < sum(variances) else []
-    measured = list(chains)
-    if not measured:
-        for p, end, found, does_hold, beyond in zip(points, (left, right), fitted, holds, aside, strict=True):
-            own = None if all(holds) else local_measuring_point(p, below_tip_px, noise_shared)
+        measured = measured if sum(own.covariance[1, 1] for own in measured) < sum(variances) else []
+    if len(measured) < len(fitted):
+        own_chains = chains or NO_CHAINS
+        if not are_corners or len(measured) != 1:
+            own_chains = chain_of_one(own_chains, (left, right), holds, cuts_px)
+        are_known = all(does_hold or chain is not None for does_hold, chain in zip(holds, own_chains, strict=True))
+        measured = []
+        for p, end, found, does_hold, beyond, chain in zip(
+            points, (left, right), fitted, holds, aside, own_chains, strict=True
+        ):
+            own = chain if are_known else local_measuring_point(p, below_tip_px, noise_shared)
             # If there is no other description of the outline, residuals that common errors of neighbouring points may
             # cause do not reject the shape.
             if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, noise_shared)):
@@ -177,10 +185,11 @@ def measure_gap(
             if own is None:
                 return NoGap(Status.NO_FINGERS, BROKEN_BY[coding])
             measured.append(own)
+    is_straight = chains is not None and None not in chains
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
     largest_variance = least_px**2 * SHARED_POINTS[coding]
-    roughness_px = nan if is_untold and not chains else 0.0  # fitting straight sides have no roughness
+    roughness_px = nan if is_untold and not is_straight else 0.0  # fitting straight sides have no roughness
     roughness_px = roughness_px if rough is None else rough.deviation_px
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
     if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
@@ -201,16 +210,6 @@ def measure_gap(
     if isinstance(outcome, NoGap):
         return replace(outcome, held=held) if held is not None else outcome
     return outcome
-
-
-def _polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> list[MeasuringPoint]:
-    """Measuring points of both fingers from straight sides with corners; empty if a finger has another shape.
-
-    Both fingers are measured by the same method, so that their systematic errors are equal.
-    """
-    left = polygonal_measuring_point(points[0], below_tip_px, shared)
-    right = None if left is None else polygonal_measuring_point(points[1], below_tip_px, shared)
-    return [] if left is None or right is None else [left, right]
 
 
 def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:

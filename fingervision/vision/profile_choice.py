@@ -32,6 +32,7 @@ from fingervision.vision.profile_lines import INNER, ROWS
 from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STEP, WALL, ProfileFit
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 from fingervision.vision.symmetric_spread import symmetric_squares
+from fingervision.vision.trail import with_trail
 from fingervision.vision.wall_width import (
     WIDER,
     are_broader_together,
@@ -49,7 +50,10 @@ UNEXPLAINED = 1.2
 # Ratios above which flanks without a common profile are not steps, but pads or shadows as wide as the window: residuals
 # to the noise of the picture's flat parts, and squared blur of the flanks to that of the tips. Motion causes a ratio of
 # residuals below 2, and texture does not change the blur.
-NO_STEP, NO_EDGE = 3.0, 4.0
+NO_STEP, NO_EDGE, NO_MOTION = 3.0, 4.0, 2.0
+# Difference between the levels inside the two fingers' edges, as a share of the contrast, above which one of them is
+# not a finger's: fingers of one gripper are alike, and uneven light changes both levels by less.
+UNLIKE_TONES = 0.25
 # Largest integral of the squared residual of a Gaussian step, in units of contrast^2 times blur, that symmetric optics
 # can cause: a disc of defocus causes at most 0.0017 (a box 0.0038). A larger residual means two steps, or a line
 # between them, even if it is symmetric.
@@ -113,13 +117,27 @@ def with_profile(
     if inner[0] is None or inner[1] is None:
         flanks, tips = squared_blurs(edges)
         is_none = edges.noise > NO_STEP * edges.noise_flat and bool(np.any(flanks > NO_EDGE * tips))
+        # A shadow on one side only, so wide that some rows follow its far edge and others the finger's.
+        is_wider = flanks.max() > flanks.min() + max(ONE_SIDED * flanks.min(), ONE_SIDED_PX**2)
+        is_none |= edges.noise > NO_MOTION * edges.noise_flat and bool(is_wider)
+        # A dark shadow with sharp borders was taken for the finger: what lies inside the edges differs.
+        apart = abs(edges.inside[0] - edges.inside[1]) / np.abs(edges.contrast[:, :INNER]).max()
+        is_none |= edges.noise > NO_STEP * edges.noise_flat and bool(apart > UNLIKE_TONES)
         return replace(edges, beside=STRIP) if is_none else _unsure_of_width(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # the models do not describe a flank that is clipped at the end of the scale
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
         return sharp
-    weight = 1.0 / edges.noise_flat**2
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
+    # Lines along the picture's border do not cross a flank.
+    outer: list[MeanProfile | None] = [None, None]
+    if are_in_view := are_outer_flanks_in_view(edges):
+        outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
+    if are_in_view and is_unlike_tip:
+        trailed = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur)
+        if trailed is not None:
+            return trailed
+    weight = 1.0 / edges.noise_flat**2
     profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
     fits = FlankFits(profiles)
     bins, steps, left = fits.bins, fits.of(STEP), fits.squares
@@ -138,10 +156,6 @@ def with_profile(
         if are_of_size(glare, 1.0):
             moved = moved_edges(edges, glare, U_GLARE, all_around, "glare")
             return without_additions(upright, moved, light, GLARE, glare)
-    # Lines along the picture's border do not cross a flank.
-    outer: list[MeanProfile | None] = [None, None]
-    if are_outer_flanks_in_view(edges):
-        outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         wall = fits.of(WALL)
         is_wall = not is_step and fits.explains(WALL) and are_of_size(wall, -1.0)

@@ -10,7 +10,7 @@ mean over all tried values, weighted by their likelihood, because a few waves do
 well.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -77,14 +77,14 @@ class Roughness:
         return float((2.0 * self.covariance.sum() - self.covariance[0]) / self.covariance[0])
 
 
-def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd]) -> Roughness | None:
-    """Estimate the roughness from the flanks of both fingers; None if the flanks are smooth.
+def roughness(points: Sequence[OutlinePoints], ends: Sequence[FingerEnd]) -> Roughness | None:
+    """Estimate the roughness from the flanks of the fingers; None if the flanks are smooth.
 
     Parameters
     ----------
-    points : (OutlinePoints, OutlinePoints)
-        Sub-pixel outlines of the left and of the right finger.
-    ends : (FingerEnd, FingerEnd)
+    points : sequence of OutlinePoints
+        Sub-pixel outlines of the fingers.
+    ends : sequence of FingerEnd
         Shapes fitted to the outlines.
     """
     if max(end.misfit for end in ends) < SUSPECT:

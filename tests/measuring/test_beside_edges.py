@@ -26,7 +26,7 @@ def test_plain_edges_need_no_words() -> None:
     assert about_edges(series_of(PLAIN, PLAIN)) == []
 
 
-@pytest.mark.parametrize("beside", ["wall", "shadow", "glare", "motion", "sharpening"])
+@pytest.mark.parametrize("beside", ["wall", "shadow", "glare", "motion", "trail", "sharpening"])
 def test_each_kind_has_its_remedy(beside: str) -> None:
     (words,) = about_edges(series_of(replace(PLAIN, beside=beside), PLAIN))
     assert words == f"In 1 frame {BESIDE[beside]}"

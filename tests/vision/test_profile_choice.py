@@ -67,6 +67,21 @@ def test_motion_across_is_no_blur_of_round_tips() -> None:
     assert abs(found.gap_px - true_gap(left, right, BELOW_PX)) < 0.5 * taken_for_focus_px
 
 
+@pytest.mark.parametrize("towards_gap_px", [2.5, -2.5])
+def test_a_trail_of_earlier_pictures_is_stated(towards_gap_px: float) -> None:
+    """A camera that mixes each picture with those before it shows moving fingers where they were."""
+    rng, light, share = np.random.default_rng(2), 0.0, 0.45
+    for ago in range(6):
+        by_px = towards_gap_px * ago
+        left, right = Finger(90.3 - by_px, 98.2, 100.0, 20.0), Finger(340.7 + by_px, 99.1, 100.0, 20.0)
+        light = light + share**ago * (1.0 - share) * light_on_sensor((left, right), Surface(), 1.0, SIZE_PX, rng)
+    noise = 1.5 / 255.0 * rng.standard_normal(np.shape(light))
+    truth_px = true_gap(Finger(90.3, 98.2, 100.0, 20.0), Finger(340.7, 99.1, 100.0, 20.0), BELOW_PX)
+    found = measured(Shot(stored(light + noise), truth_px))
+    assert found.beside == "trail"
+    assert abs(found.gap_px - truth_px) < 2.0 * np.hypot(found.u_gap_px, found.u_shift_px)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("breadth_px", [1.4, 0.0])
 def test_a_narrow_wall_is_stated_where_no_outer_flank_is_in_view(breadth_px: float) -> None:

@@ -3,6 +3,7 @@
 """
 
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,6 +100,21 @@ def test_a_cut_that_ends_at_the_measuring_height_is_no_fillet() -> None:
         shot = scene.done()
         found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, other_response=None))
         assert isinstance(found, NoGap) or not is_wrong(shot, found)
+
+
+def test_a_cut_finger_beside_a_round_one() -> None:
+    """Each finger is measured by its own shape: a fillet in place of the cut is wrong by up to 1.3 px."""
+    values = 0
+    for seed in range(6):
+        scene = Scene(np.random.default_rng([seed, 96]), is_cut=True, inner_corner_px=14.0, outer_corner_px=9.5)
+        cut, own = scene.pair
+        scene.pair = cut, replace(own, is_cut=False, inner_corner_px=18.0, outer_corner_px=18.0)
+        scene.paint()
+        shot = scene.done()
+        found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, other_response=None))
+        assert isinstance(found, NoGap) or not is_wrong(shot, found)
+        values += isinstance(found, GapMeasurement)
+    assert values >= 4
 
 
 @pytest.mark.parametrize(
