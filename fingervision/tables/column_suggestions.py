@@ -17,6 +17,8 @@ LOOKED_AT = 200
 BY_NAME, BY_UNIT, BY_CLOCK, BY_READING = 4, 3, 3, 1
 """Points for a word of the role in the name, a unit of its dimension, times that increase, and a word that
 distinguishes a reading from a command. A suggestion is only an example in a question; the user decides."""
+NEVER = -100
+"""Points of a column without numbers, which is not suggested."""
 READINGS = frozenset(
     [
         "actual",
@@ -65,17 +67,38 @@ def likeliest(
 
 
 def _points(column: RawColumn, name: ColumnName, role: str, decimal: str) -> int:
+    if role in DIMENSION and not _has_values(column, decimal):
+        return NEVER
     found = mentions(name.base)
+    constant = _is_constant(column)
     points = BY_NAME if role in found else -BY_NAME if found else 0
     unit = spelled(column.unit) or name.unit
     if known_unit(unit) is not None:
         points += BY_UNIT if factor(unit, DIMENSION.get(role, "length")) is not None else -2 * BY_UNIT
     points += BY_READING * (role == "input" and bool(READINGS & set(tokens(name.base))))
-    points -= BY_READING * (role == "input" and "target" in found)
+    points -= BY_READING * (role == "input" and "target" in found) + BY_READING * constant
     is_clock = increases(column, decimal)
     if role == "time":
         return points + (BY_CLOCK if is_clock else -2 * BY_CLOCK)
     return points - (BY_READING if is_clock else 0)
+
+
+def _has_values(column: RawColumn, decimal: str) -> bool:
+    """Whether most of a column's first cells are numbers or times; names of channels and remarks are neither."""
+    content = column.content
+    if isinstance(content, Numbers):
+        return bool(content.present.any())
+    if looks_like_time(content):
+        return True
+    numbers, odd = to_numbers(content[:LOOKED_AT], decimal)
+    return int(np.count_nonzero(numbers.present)) > odd.size
+
+
+def _is_constant(column: RawColumn) -> bool:
+    content = column.content
+    if isinstance(content, Numbers):
+        return bool(np.ptp(content.value[:LOOKED_AT]) == 0.0) if content.value.size else True
+    return len(set(content[:LOOKED_AT])) < 2
 
 
 def increases(column: RawColumn, decimal: str) -> bool:

@@ -8,8 +8,10 @@ from fingervision.tables.times import looks_like_time
 from fingervision.tables.units import known_unit
 from fingervision.tables.words import role_of
 
-PAIR = re.compile(r"([^\W\d]\w*)\s*[=:]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*([^\W\d_]+)(?!\w*\s*[=:]))?")
-"""A name, a number, and a unit, which is not the name of the next number."""
+PAIR = re.compile(
+    r"(?<!\d{4}-\d\d-\d\d)([^\W\d]\w*)\s*[=:]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*([^\W\d_]+)(?!\w*\s*[=:]))?"
+)
+"""A name, a number, and a unit, which is not the name of the next number. `T13:24` of a date and time is no pair."""
 MOST_OTHER = 0.05
 """Largest share of lines without these names: a start-up message, and a line that was cut off."""
 FEWEST_LINES = 3

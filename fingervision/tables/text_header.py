@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from fingervision.domain.errors import DataError
 from fingervision.tables.column_names import column_name
-from fingervision.tables.dialect import Dialect, is_comment, is_number, is_value, split
+from fingervision.tables.dialect import UNIT_BEHIND, Dialect, is_comment, is_number, is_value, split
 from fingervision.tables.header_pairs import Header, labelled_pairs
 from fingervision.tables.mapping import Entry
 from fingervision.tables.units import is_unit, known_unit
@@ -48,6 +48,17 @@ def _is_label(cells: Sequence[str], below: Sequence[str], dialect: Dialect) -> b
     return split(following, dialect.separator)[:1] != cells[:1]
 
 
+def _is_quantities(cells: Sequence[str], below: Sequence[str], dialect: Dialect) -> bool:
+    """Whether columns are named by quantities (`5 mm`, `10 mm`), so that the cells below them have no units."""
+    following = split(next((line for line in below if line.strip()), ""), dialect.separator)
+    if len(following) != len(cells):
+        return False
+    return any(
+        UNIT_BEHIND.search(cell) is not None and is_number(number, dialect.decimal) and not UNIT_BEHIND.search(number)
+        for cell, number in zip(cells, following, strict=True)
+    )
+
+
 def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
     """Find the line number, from 0, of the first row of numbers."""
     start = 0 if given.header_line is None else min(given.header_line, len(lines))
@@ -57,7 +68,8 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
         if is_comment(lines[at]) or not lines[at].strip():
             continue
         cells = split(lines[at], dialect.separator)
-        if not _is_row(cells, dialect) or _is_label(cells, lines[at + 1 :], dialect):
+        below = lines[at + 1 :]
+        if not _is_row(cells, dialect) or _is_label(cells, below, dialect) or _is_quantities(cells, below, dialect):
             continue
         # Numbers in column names are not values: the header `Position 1, Position 2` contains no value.
         values = sum(is_value(cell, dialect.decimal) for cell in cells)

@@ -11,6 +11,8 @@ from fingervision.measuring.clock.set_points import ARRIVED, Jumps
 
 FEWEST_FRAMES, FEWEST_ROWS = 12, 3
 """Least number of frames with a gap, and of log rows: the fit has eight parameters."""
+SAME_PERIOD = 0.1
+"""Deviation of offsets from whole periods, as a share of the period, up to which the motion is called periodic."""
 LEAST_GAIN = 40.0
 """Least reduction of chi-square by the motion, compared with a constant gap. By chance, 20 is exceeded in one of 10^4
 recordings (four parameters); the limit is doubled because the best of many offsets was chosen.
@@ -92,12 +94,15 @@ def explained(motion: Motion, found: Fit) -> float:
 
 
 def ambiguous(offsets_s: list[float]) -> NoClockOffset:
-    """Refuse a periodic motion, and list the offsets that fit equally well."""
+    """Refuse a motion that fits equally well at several offsets, such as a periodic one, and list them."""
     nearest = np.unique(np.round(offsets_s, 4))
     said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
-    apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""
+    steps_s = np.diff(nearest)
+    periods = steps_s / np.min(steps_s, initial=np.inf)
+    even = steps_s.size > 1 and bool(np.all(np.abs(periods - np.round(periods)) < SAME_PERIOD))
+    periodic, apart = ("is periodic and ", f", {np.median(steps_s):.3g} s apart,") if even else ("", "")
     return NoClockOffset(
-        f"the motion is periodic and fits equally well at {nearest.size} offsets{apart} ({said} s): give "
+        f"the motion {periodic}fits equally well at {nearest.size} offsets{apart} ({said} s): give "
         "--drive-offset-s, or record a run with a start, a stop or a reversal that is not repeated.",
         tuple(float(one) for one in nearest),
     )

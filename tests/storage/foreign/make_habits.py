@@ -61,5 +61,6 @@ def tried(case: Callable[..., object]) -> list[object]:
         dated("durations_with_days", "elapsed", "0 days 00:00:S000"),
         one("clock_of_twelve_hours", ["time,position (mm),gap (mm)", *lines(",", [f"{half[k // 10]}.{k % 10}00" for k in ROWS], X, GAP)]),
         one("printed_frame", ["+---+---+---+", "| time_s | input_mm | gap_mm |", "+---+---+---+", *lines("", T, X, GAP, shape="| {} | {} | {} |"), "+---+---+---+", "24 rows in set"]),
+        one("named_by_quantity", ["time (s),5 mm,position (mm)", *lines(",", T, GAP, X)], asks="columns.gap", states=("columns.gap=5 mm", "units.gap=mm")),
         one("commanded_and_actual", ["time (s),Commanded (mm),Actual (mm),Opening (mm)", *lines(",", T, [f"{x}1" for x in X], X, GAP)], asks="columns.input", states=("columns.input=Actual (mm)",)),
     ]  # fmt: skip
