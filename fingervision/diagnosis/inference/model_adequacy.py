@@ -87,7 +87,8 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
 
     Three effects can fit almost any shape, and must therefore explain the data much better than generic shapes do. One
     or two effects count as imitations only if generic shapes fit much better, by more than the inexactness of the
-    effects' formulas.
+    effects' formulas. An offset and a ratio beside one other effect do not count: a straight line fits no arbitrary
+    shape.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
         Explanations with fewer effects, to which one or two shapes are added, each with a penalty for its amplitude and
         for the choice among all shapes (`choices`).
     """
-    several = len(found.names) > 2
+    several = len(found.names) > 2 and _curved(problem, found) > 1
     columns, rows = shapes.columns, int(problem.measured.size)
     basis = _Basis.of(problem, columns)
     # If the noise is known from repeats, a probe can also represent a play in readings at rest, including the
@@ -122,6 +123,13 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
             if cost < least and not _differs_by_rounding(problem, found, base, np.stack(added, axis=1)):
                 least, best = cost, " and ".join(words)
     return best
+
+
+def _curved(problem: Problem, found: Explanation) -> int:
+    """Number of effects that are no straight line over the input: a line fits no arbitrary shape."""
+    bare = problem.whitened({})
+    alone = [problem.whitened({name: values}) - bare for name, values in found.values.items()]
+    return sum(not is_a_line(problem, shape) for shape in alone)
 
 
 def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation, shapes: Array) -> bool:

@@ -23,7 +23,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
 )
 from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.model_adequacy import imitated, is_a_line, remaining_structure
+from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure
 from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, completes, noise_known
 from fingervision.diagnosis.inference.significance import Evidence
 
@@ -160,7 +160,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     if not (large or completes(state, state.best, triples[0])) or not state.speaks_for(triples, state.best):
         return state
     imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
-    if imitation is not None and not _is_straighter(state, triples[0]):
+    if imitation is not None:
         # If the third effect changes little, the structure that it imitates remains in the residual, and the probes
         # will report it.
         return replace(state, imitation=imitation) if large else state
@@ -168,18 +168,6 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     again = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
     triples = beyond_the_input(problem, state.best, again) or triples
     return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST], state.values), peers=triples)
-
-
-def _is_straighter(state: SearchState, triple: Explanation) -> bool:
-    """Whether straight lines over the input replace a curved effect of the best pair, and are more probable.
-
-    An offset and a ratio fit no arbitrary shape. For example, a creep of a thousandth of the opening imitated both.
-    """
-    bare = state.problem.whitened({})
-    curved = {
-        n for n in triple.names if not is_a_line(state.problem, state.problem.whitened({n: triple.values[n]}) - bare)
-    }
-    return curved < set(state.best.names) and triple.bic(state.values) < state.best.bic(state.values)
 
 
 def _beyond_roundings(state: SearchState) -> SearchState:

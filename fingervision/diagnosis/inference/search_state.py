@@ -66,8 +66,8 @@ def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -
     joins = set(smaller.names) <= set(larger.names)
     noise_alone = not joins and larger.score - rows < NOISY * rows**0.5
     share = state.problem.form_share if joins else FORM_SHARE if noise_alone else SMALL_SHARE
-    # Where noise alone is left, any clear excess over it in the smaller explanation is structure.
-    visible = NOISY * rows**0.5 if noise_alone else float(rows)
+    # Where three effects leave noise alone, any clear excess over it in the pair that they replace is structure.
+    visible = NOISY * rows**0.5 if noise_alone and len(larger.names) > 2 else float(rows)
     plain = max(visible, share**2 * (state.nothing.score - smaller.score))
     return stands > plain and (noise_alone or larger.score - rows < COMPLETE * stands)
 

@@ -31,10 +31,10 @@ def likelier_interpolation(data: Observations, problem: Problem, best: Explanati
     Returns
     -------
     Observations
-        `data` itself if there is no delay or straight lines fit as well.
+        `data` itself if there is no delay, if straight lines fit as well, or if the input is a command, which jumps.
     """
     fixed = any(name in data.chain.fixed for name in delays())
-    if data.chain.curved or not (fixed or _like_delays() & set(best.names)):
+    if data.chain.curved or data.chain.history.commanded or not (fixed or _like_delays() & set(best.names)):
         return data
     curved = replace(data.chain, curved=True)
     straight, along = (_score(replace(problem, chain=chain), best, fixed) for chain in (data.chain, curved))

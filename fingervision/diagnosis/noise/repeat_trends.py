@@ -24,7 +24,7 @@ REFINED = 9
 """Frequencies tried between two neighbouring trial frequencies, so that the phase is right to a few degrees."""
 
 
-def drift_sigmas(rest: Array, drift_cost: float, rows: NDArray[np.intp]) -> float:
+def drift_sigmas(rest: Array, drift_cost: float, rows: NDArray[np.intp], degrees: int) -> float:
     """Significance, in standard deviations, of a drift in successive readings; 0 if correlated noise is more probable.
 
     A drift (a smooth curve in time) and correlated reading noise both make successive readings similar, whatever their
@@ -40,11 +40,13 @@ def drift_sigmas(rest: Array, drift_cost: float, rows: NDArray[np.intp]) -> floa
         BIC of the drift relative to that of no drift (`likelier_drift`).
     rows : ndarray of int, shape (m,)
         Row of each residual.
+    degrees : int
+        Number of independent residuals: one less than the readings of each group.
     """
     share, sigmas = follows_sigmas(rest, rows)
     if sigmas <= TREND_SIGMAS:
         return 0.0
-    pairs, parameter = int(np.sum(np.diff(np.sort(rows)) == 1)), float(np.log(rest.size))
+    pairs, parameter = np.sum(np.diff(np.sort(rows)) == 1) * degrees / rest.size, float(np.log(rest.size))
     wanders = pairs * float(np.log1p(-(min(share, MOST_WANDERING) ** 2))) + parameter
     return sigmas if drift_cost < wanders else 0.0
 

@@ -162,7 +162,7 @@ def pure_error(
             if float(apart @ apart) / (degrees - 3 * TREND_DEGREE) < APART * left:
                 straight, taken = apart, 3 * TREND_DEGREE
     if trend <= TREND_SIGMAS and degrees - taken >= FEWEST_DEGREES:
-        trend = max(trend, drift_sigmas(rest, cost, rows))
+        trend = max(trend, drift_sigmas(rest, cost, rows, rows.size - len(groups)))
     if trend <= TREND_SIGMAS or degrees - taken < FEWEST_DEGREES:
         return PureError(_without_gross_errors(rest, degrees), degrees, trend, wandering(rest, rows))
     sd_mm = _without_gross_errors(straight, degrees - taken)
