@@ -152,7 +152,8 @@ class _Rows:
         at, rising, falling = _with_crossing(at, before.input_mm, after.input_mm)
         height = np.minimum(rising, falling)
         top, least = int(np.argmax(height)), float(max(u[i], u[i + 1]))
-        if height[top] - least <= SURELY * max(before.u_mm, after.u_mm):
+        beyond = height[top] - least
+        if beyond <= max(SURELY * max(before.u_mm, after.u_mm), ROUNDED * abs(u[i + 1] - u[i])):
             return None
         # Both rows are passed at their own times, the lower one's motion passes the height of the other in between.
         leave_s = float(np.interp(least, np.maximum.accumulate(rising[: top + 1]), at[: top + 1]))
