@@ -6,6 +6,8 @@ though: the shape with fillets would be wrong by pixels, and what it leaves look
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from fingervision.vision.finger_end import FingerEnd
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
@@ -15,6 +17,8 @@ from fingervision.vision.roughness import SUSPECT, roughness
 Chains = tuple[MeasuringPoint | None, MeasuringPoint | None]
 
 NO_CHAINS: Chains = (None, None)
+# Share of a finger's points that its fillets may leave aside as dust; with more, its outline has another shape as well.
+MOST_ASIDE = 0.1
 
 
 def polygonal(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, shared: float) -> Chains:
@@ -75,7 +79,9 @@ def chain_of_one(
     cuts_px : sequence of float
         Distance of the corner's rejected points from this shape (pixels); 0 if only a few were rejected.
     """
-    left, right = (
-        chains[k] if chains[1 - k] is None and holds[1 - k] and ends[1 - k].misfit < SUSPECT else None for k in range(2)
-    )
+    is_filleted = [
+        does_hold and end.misfit < SUSPECT and np.mean(end.robust <= 0.0) < MOST_ASIDE
+        for does_hold, end in zip(holds, ends, strict=True)
+    ]
+    left, right = (chains[k] if chains[1 - k] is None and is_filleted[1 - k] else None for k in range(2))
     return left if not holds[0] or cuts_px[0] else None, right if not holds[1] or cuts_px[1] else None
