@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom
 
-from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
@@ -113,6 +113,10 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     if residual_mm.size < FEWEST_VALUES or data.position_map is not None or data.run_gains is not None:
         return None
     sigma = float(np.std(residual_mm))
+    explained_mm = float(np.std((data.chain.stacked(found.values) - data.chain.stacked({}))[:n]))
+    # What a formula typically misses is larger while the stage moves than while it rests.
+    if sigma < FORM_SHARE * explained_mm:
+        return None
     # If the digits of the readings are coarser than the band, either all values or none lie in it.
     if NARROW * sigma < resolution(data.table.gap_mm):
         return None
