@@ -131,10 +131,10 @@ def with_profile(
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
     # Lines along the picture's border do not cross a flank.
     outer: list[MeanProfile | None] = [None, None]
-    if are_in_view := are_outer_flanks_in_view(edges):
+    if are_outer_flanks_in_view(edges):
         outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
-    if are_in_view and is_unlike_tip:
-        trailed = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur)
+    if is_unlike_tip:
+        trailed = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur, each_flank=True)
         if trailed is not None:
             return trailed
     weight = 1.0 / edges.noise_flat**2
@@ -210,6 +210,11 @@ def with_profile(
         walled = with_narrow_wall(edges, profiles, [p for p in outer if p], fits.enough, is_outline, displaced_px)
         if walled is not None:
             return walled
+    if is_unlike_tip:
+        # What no wall and no shadow explains needs less evidence.
+        trailed = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur, each_flank=False)
+        if trailed is not None:
+            return trailed
     flanks, tips = squared_blurs(edges)
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
     if np.any(widened):

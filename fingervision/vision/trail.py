@@ -36,7 +36,9 @@ PARAMETERS = 6
 SURE_OF_ONE, SURE_OF_BOTH, LEAST_SHARE = 9.0, 11.8, 0.1
 
 
-def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur: list[float]) -> EdgePoints | None:
+def with_trail(
+    edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur: list[float], *, each_flank: bool
+) -> EdgePoints | None:
     """Edges with the uncertainty that a trail behind the fingers means; None if there is no trail.
 
     The fitted step is at the mean position over the mixed pictures, and the edge of the last picture is one mean length
@@ -52,6 +54,9 @@ def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur
         Mean profiles across the inner and the outer flank, for each finger.
     blur : list of float
         Blur of each finger's flanks (pixels).
+    each_flank : bool
+        Whether each flank of a finger must show the trail by itself: a wall on the inner flank beside a slight
+        asymmetry of the outer one was taken for a trail (2.5 px of error).
     """
     weight = 1.0 / edges.noise_flat**2
     lengths: list[float | None] = []
@@ -66,7 +71,8 @@ def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur
         likely = np.exp(0.5 * (squares.min() - squares)) * SPACING_PX
         lengths.append(float(likely @ TRIED_PX / likely.sum()))
         gain = each[:, NO_TRAIL] - each[:, int(np.argmin(squares))]
-        gains.append(float(gain.sum()) if gain.min() > LEAST_SHARE * gain.sum() else -np.inf)
+        least = max(LEAST_SHARE * float(gain.sum()), SURE_OF_ONE if each_flank else 0.0)
+        gains.append(float(gain.sum()) if gain.min() > least else -np.inf)
     if not (gains and (max(gains) > SURE_OF_ONE or sum(gains) > SURE_OF_BOTH)):
         return None
     known = [length for length in lengths if length is not None]
