@@ -77,3 +77,19 @@ def test_the_record_of_an_encoder_widens_a_play_and_an_exact_one_does_not(tmp_pa
     # The mean rounding error of a stroke resembles a play: with some ten encoder steps per stroke, it is at most a
     # third of the largest rounding error.
     assert 1e-8 + (0.03 / 300.0) ** 2 < found[0.03] < (0.03 / 6.0) ** 2
+
+
+def test_stick_slip_alone_behind_a_noisy_record_keeps_its_covariance(tmp_path: Path) -> None:
+    rng = np.random.default_rng(SEED)
+    t = 0.1 * np.arange(300)
+    u = 0.8 * np.abs((t / 10.0 + 0.5) % 2.0 - 1.0)
+    read, gap = (values + 0.003 * rng.standard_normal(t.size) for values in (u, 2.0 + 5.0 * u))
+    lines = [f"{t[k]:.3f},{read[k]:.6f},{gap[k]:.6f}" for k in range(t.size)]
+    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(lines) + "\n")
+    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-0.2,1.0\n1.0,7.0\n")
+    data = prepare(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv"))
+    problem = data.problem(data.stacked_mm - data.chain.stacked({}), 0, explained=True)
+    best = fit(problem, ("stick_slip",), {"stick_slip": {"jump_mm": 0.02}}, iterations=2)
+    # The prediction depends on it discontinuously, so that no derivative gives the contribution of the record.
+    errors_mm = list(simulated_errors(data, np.random.default_rng(SEED)))
+    np.testing.assert_array_equal(with_record_errors(problem, best, errors_mm).covariance, best.covariance)

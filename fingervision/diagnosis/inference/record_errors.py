@@ -120,6 +120,8 @@ def with_record_errors(
     listed = problem.parameters(explanation.names)
     columns = whitener.columns(derivatives(problem, explanation))[0]
     smooth = np.array([not parameter.rugged for _, parameter in listed])
+    if not smooth.any():
+        return explanation
     columns = columns[:, smooth]
     listed = [entry for entry, kept in zip(listed, smooth.tolist(), strict=True) if kept]
     offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
