@@ -133,10 +133,9 @@ def with_profile(
     outer: list[MeanProfile | None] = [None, None]
     if are_outer_flanks_in_view(edges):
         outer = [mean_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
-    if is_unlike_tip:
-        trailed = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur, each_flank=True)
-        if trailed is not None:
-            return trailed
+    trail = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur) if is_unlike_tip else None
+    if trail is not None and trail.is_on_each_flank:
+        return trail.edges
     weight = 1.0 / edges.noise_flat**2
     profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
     fits = FlankFits(profiles)
@@ -210,11 +209,8 @@ def with_profile(
         walled = with_narrow_wall(edges, profiles, [p for p in outer if p], fits.enough, is_outline, displaced_px)
         if walled is not None:
             return walled
-    if is_unlike_tip:
-        # What no wall and no shadow explains needs less evidence.
-        trailed = with_trail(edges, [[inner[k], outer[k]] for k in range(2)], blur, each_flank=False)
-        if trailed is not None:
-            return trailed
+    if trail is not None:
+        return trail.edges
     flanks, tips = squared_blurs(edges)
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
     if np.any(widened):

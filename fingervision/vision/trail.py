@@ -7,7 +7,7 @@ trail displaces the fitted step backwards by its mean length. The side tells a t
 the two flanks of a finger a trail points the same way in the picture, a wall, shadow or glare to opposite ways.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +36,24 @@ PARAMETERS = 6
 SURE_OF_ONE, SURE_OF_BOTH, LEAST_SHARE = 9.0, 11.8, 0.1
 
 
-def with_trail(
-    edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur: list[float], *, each_flank: bool
-) -> EdgePoints | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Trail:
+    """Edges with the uncertainty that a trail means.
+
+    Parameters
+    ----------
+    edges : EdgePoints
+        The edges.
+    is_on_each_flank : bool
+        Whether each flank of a finger shows the trail by itself. If not, a wall or a shadow is tried first: a wall on
+        the inner flank beside a slight asymmetry of the outer one was taken for a trail (2.5 px of error).
+    """
+
+    edges: EdgePoints
+    is_on_each_flank: bool
+
+
+def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur: list[float]) -> Trail | None:
     """Edges with the uncertainty that a trail behind the fingers means; None if there is no trail.
 
     The fitted step is at the mean position over the mixed pictures, and the edge of the last picture is one mean length
@@ -54,13 +69,11 @@ def with_trail(
         Mean profiles across the inner and the outer flank, for each finger.
     blur : list of float
         Blur of each finger's flanks (pixels).
-    each_flank : bool
-        Whether each flank of a finger must show the trail by itself: a wall on the inner flank beside a slight
-        asymmetry of the outer one was taken for a trail (2.5 px of error).
     """
     weight = 1.0 / edges.noise_flat**2
     lengths: list[float | None] = []
     gains: list[float] = []
+    sure_gains: list[float] = []
     for (inner, outer), width in zip(profiles, blur, strict=True):
         if inner is None or outer is None:  # one flank alone does not tell a trail from a shadow or a wall
             lengths.append(None)
@@ -71,15 +84,22 @@ def with_trail(
         likely = np.exp(0.5 * (squares.min() - squares)) * SPACING_PX
         lengths.append(float(likely @ TRIED_PX / likely.sum()))
         gain = each[:, NO_TRAIL] - each[:, int(np.argmin(squares))]
-        least = max(LEAST_SHARE * float(gain.sum()), SURE_OF_ONE if each_flank else 0.0)
-        gains.append(float(gain.sum()) if gain.min() > least else -np.inf)
-    if not (gains and (max(gains) > SURE_OF_ONE or sum(gains) > SURE_OF_BOTH)):
+        gains.append(float(gain.sum()) if gain.min() > LEAST_SHARE * gain.sum() else -np.inf)
+        sure_gains.append(gains[-1] if gain.min() > SURE_OF_ONE else -np.inf)
+    if not _is_enough(gains):
         return None
+    on_each = _is_enough(sure_gains)
     known = [length for length in lengths if length is not None]
     if len(known) < len(lengths):  # the other finger may move in the same way, or in the opposite way
-        return unsure_edges(edges, [abs(known[0])] * len(lengths), "trail")
+        return Trail(unsure_edges(edges, [abs(known[0])] * len(lengths), "trail"), on_each)
     # With their signs: optics that spread light to one side of every edge (coma) do not change the gap.
-    return replace(edges, marks=stated_marks(edges, [length / np.sqrt(3.0) for length in known]), beside="trail")
+    marks = stated_marks(edges, [length / np.sqrt(3.0) for length in known])
+    return Trail(replace(edges, marks=marks, beside="trail"), on_each)
+
+
+def _is_enough(gains: list[float]) -> bool:
+    """Whether one finger, or both together, surely have a trail, from their gains."""
+    return bool(gains) and (max(gains) > SURE_OF_ONE or sum(gains) > SURE_OF_BOTH)
 
 
 def trail_squares(profile: MeanProfile, weight: float, blur: float) -> Floats:
