@@ -15,6 +15,7 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
+from fingervision.frames.open_container import WHATEVER_METADATA
 from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.sound_jpeg import SoundJpeg
@@ -91,7 +92,7 @@ class NetworkStream:
         self.name = without_password(name)
         try:
             self._container = av.open(
-                name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S), metadata_errors="replace"
+                name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S), **WHATEVER_METADATA
             )
         except (av.FFmpegError, OSError, ValueError) as error:
             raise DeviceError(

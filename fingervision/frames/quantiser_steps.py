@@ -79,8 +79,8 @@ def stated_steps(picture: av.VideoFrame) -> StatedSteps | None:
     picture : av.VideoFrame
         Picture that was decoded with `EXPORTED` among the decoder's options.
     """
-    carried: Any = picture.side_data  # the type stubs of PyAV declare the items as strings
-    found = next((each for each in carried if each.type.name == SIDE_DATA), None)
+    carried: Any = picture.side_data  # some versions of PyAV have no types for it
+    found = carried.get(SIDE_DATA)
     if found is None:
         return None
     data = bytes(found)
