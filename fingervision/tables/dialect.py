@@ -24,10 +24,11 @@ NUMBER = {
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
 GROUPED = {
-    ".": re.compile(r"[+-]?\d{1,3}([,'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(\.\d+)?"),
-    ",": re.compile(r"[+-]?\d{1,3}([.'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(,\d+)?"),
+    ".": re.compile(r"[+-]?[1-9]\d{0,2}([,'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(\.\d+)?"),
+    ",": re.compile(r"[+-]?[1-9]\d{0,2}([.'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(,\d+)?"),
 }
-"""Patterns of numbers with thousands separators, by decimal mark."""
+"""Patterns of numbers with thousands separators, by decimal mark. No program groups the digits of a number that begins
+with a zero: `0,067` has a decimal comma."""
 UNIT_BEHIND = re.compile(r"(?<=\d)\s?(?:[mµμun]?m|[mµμun]?s|[mk]?N)$")
 """A unit behind a number in the same cell: `0.61 mm`, `100ms`."""
 THOUSANDS = {",": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+"), ".": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")}

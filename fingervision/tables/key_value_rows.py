@@ -9,7 +9,7 @@ from fingervision.tables.units import known_unit
 from fingervision.tables.words import role_of
 
 PAIR = re.compile(
-    r"(?<!\d{4}-\d\d-\d\d)([^\W\d]\w*)\s*[=:]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*([^\W\d_]+)(?!\w*\s*[=:]))?"
+    r"(?<!\d{4}-\d\d-\d\d)([^\W\d]\w*)\s*[=:]\s*([+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?)(?:\s*([^\W\d_]+)(?!\w*\s*[=:]))?"
 )
 """A name, a number, and a unit, which is not the name of the next number. `T13:24` of a date and time is no pair."""
 MOST_OTHER = 0.05

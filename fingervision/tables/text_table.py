@@ -13,6 +13,7 @@ from fingervision.storage.number_columns import Numbers
 from fingervision.tables.dialect import (
     BY_NAME,
     MINUS,
+    SAMPLE_LINES,
     Dialect,
     find_dialect,
     is_comment,
@@ -60,10 +61,11 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     OpenQuestionError
         A mark in the numbers may be a decimal sign or a thousands separator.
     """
-    if not given.words and (pairs := rows_of_pairs(lines)) is not None:
-        whole = table_of_lines(path, pairs, replace(given, words={"separator": "tab", "decimal": "."}), encoding)
+    if "separator" not in given.words and (pairs := rows_of_pairs(lines)) is not None:
+        whole = table_of_lines(path, pairs, replace(given, words={**given.words, "separator": "tab"}), encoding)
+        settings = {key: whole.settings[key] for key in ("decimal", "encoding")}
         # The names were put before the first line.
-        return replace(whole, lines=[number - 1 for number in whole.lines], settings={"encoding": encoding})
+        return replace(whole, lines=[number - 1 for number in whole.lines], settings=settings)
     dialect = find_dialect(lines, given.words.get("separator", ""), given.words.get("decimal", ""))
     if dialect is None:
         raise DataError(
@@ -112,17 +114,24 @@ def _settings(dialect: Dialect, header: Header) -> dict[str, str | int]:
 
 
 def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect) -> None:
-    """Refuse rows with twice as many comma-separated cells as column names (unquoted decimal commas)."""
-    if dialect.separator != ",":
+    """Refuse rows in which commas are both decimal marks and separators, without quotes.
+
+    They have twice as many cells as column names; without names, every second cell is a group of digits of one length
+    that may begin with a zero (`0,067,1,250`).
+    """
+    if dialect.separator != "," or dialect.wide % 2:
         return
-    for line in lines[max(0, first - HEADER_LINES) : first]:
-        names = split(line, ",")
-        if 2 * len(names) == dialect.wide and not any(is_value(name, ".") for name in names):
-            raise DataError(
-                f"{path} has {len(names)} names and {dialect.wide} cells a row between commas: decimal commas and "
-                "commas between cells cannot be distinguished. Export the table with semicolons or tabs between the "
-                "cells."
-            )
+    rows = [split(line, ",") for line in lines[first : first + SAMPLE_LINES]]
+    fractions = [cell for row in rows if len(row) == dialect.wide for cell in row[1::2]]
+    are_digits = all(map(str.isdecimal, fractions)) and len(set(map(len, fractions))) == 1
+    headers = [split(line, ",") for line in lines[max(0, first - HEADER_LINES) : first]]
+    halves = [2 * len(names) == dialect.wide and not any(is_value(name, ".") for name in names) for names in headers]
+    if any(halves) or (are_digits and any(len(cell) > 1 and cell[0] == "0" for cell in fractions)):
+        raise DataError(
+            f"{path} has {dialect.wide} cells a row between commas, twice as many as it has columns: decimal commas "
+            "and commas between cells cannot be distinguished. Export the table with semicolons or tabs between the "
+            "cells."
+        )
 
 
 def _marked(lines: Sequence[str], dialect: Dialect) -> str:
