@@ -6,10 +6,9 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.numbers import to_number
 from fingervision.storage.number_columns import Numbers
-from fingervision.tables.dialect import GROUPED, MINUS, MISSING, THOUSANDS
-
-SPACES = dict.fromkeys(map(ord, "'\u2019 \u00a0\u2007\u2009\u202f"))
+from fingervision.tables.dialect import MISSING, THOUSANDS
 
 
 def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.intp]]:
@@ -56,26 +55,3 @@ def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.
         elif cell.strip().lower() not in MISSING:
             odd.append(row)
     return Numbers(value, present), np.array(odd, dtype=np.intp)
-
-
-def to_number(cell: str, decimal: str) -> float | None:
-    """Read a cell as a finite number; None if the cell is not a number.
-
-    Examples
-    --------
-    >>> to_number("1.234,5", ","), to_number("1,234.5", "."), to_number("2,5D-03", ","), to_number("nan", ".")
-    (1234.5, 1234.5, 0.0025, None)
-    """
-    text = cell.strip().translate(MINUS)
-    if GROUPED[decimal].fullmatch(text):
-        text = text.translate(SPACES).replace("," if decimal == "." else ".", "")
-    if decimal == ",":
-        if "." in text:
-            return None
-        text = text.replace(",", ".")
-    text = text.replace("D", "e").replace("d", "e")
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if np.isfinite(number) else None

@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fingervision.domain.numbers import GROUPED, MINUS
+
 COMMENT_MARKS = ("#", "%", "//", "!", "'")
 NAMES = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma", None: "blanks"}
 """Separators, most probable first: a mark of the first kinds that occurs in every line is almost always the
@@ -23,18 +25,11 @@ NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
-GROUPED = {
-    ".": re.compile(r"[+-]?[1-9]\d{0,2}([,'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(\.\d+)?"),
-    ",": re.compile(r"[+-]?[1-9]\d{0,2}([.'\u2019 \u00a0\u2007\u2009\u202f]\d{3})+(,\d+)?"),
-}
-"""Patterns of numbers with thousands separators, by decimal mark. No program groups the digits of a number that begins
-with a zero: `0,067` has a decimal comma."""
 UNIT_BEHIND = re.compile(r"(?<=\d)\s?(?:[mµμun]?m|[mµμun]?s|[mk]?N)$")
 """A unit behind a number in the same cell: `0.61 mm`, `100ms`."""
 THOUSANDS = {",": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+"), ".": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")}
 """Patterns of numbers whose mark may be either a thousands separator or a decimal mark."""
 DATE_LIKE = re.compile(r"[\d./\-]+([T ]\d.*)?|\d{1,2}:\d{2}(:\d{2}([.,]\d*)?)?( ?[AaPp][Mm])?Z?")
-MINUS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{NO-BREAK SPACE}": " "})
 SAMPLE_LINES = 2000
 QUOTED_LINES = 5
 """Last lines of the sample that must have quotes, if a comma separates cells and is the decimal mark too."""

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.numbers import MINUS
 from fingervision.storage.number_block import number_block
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.dialect import (
     BY_NAME,
-    MINUS,
     SAMPLE_LINES,
     Dialect,
     find_dialect,

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.numbers import to_number
 from fingervision.storage.number_columns import Numbers
-from fingervision.tables.cells import to_number, to_numbers
+from fingervision.tables.cells import to_numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.text_file import lines_of
