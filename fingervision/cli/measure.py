@@ -37,7 +37,7 @@ Files written to --out:
   steps/        with --steps: a picture of every processing step
 
 \b
-Exit codes: 0 done; 1 failed, or no frame has a gap; 2 wrong usage;
+Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wrong usage;
 3 done, but the recording was damaged: everything that could be read is written.
 """
 
@@ -235,6 +235,14 @@ def _report(measured: "Measured", as_json: bool) -> None:
         _complain(
             f"None of the {series.frames} frames could be measured ({counts}). Frame {first.frame}: {first.words} To "
             f"see why, add --steps {first.frame}; the table of all frames is {folder.gaps}."
+        )
+    elif series.is_chance and not measured.has_gauge_numbers:
+        first = min(series.first_without.values(), key=lambda bad: bad.frame)
+        _complain(
+            f"Fingers must be found in at least one frame in ten, but are found in {series.counts[Status.OK]} of "
+            f"{series.frames} ({counts}), so that what was measured there is probably something else. Frame "
+            f"{first.frame}: {first.words} State the region of the fingers with --roi; the table of all frames is "
+            f"{folder.gaps}."
         )
     elif series.first_damaged is not None:
         bad = series.first_damaged

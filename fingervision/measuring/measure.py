@@ -53,7 +53,8 @@ class Measured:
     @property
     def exit_code(self) -> ExitCode:
         """Exit code of the measurement."""
-        if self.stopped or not (self.series.counts[Status.OK] or self.has_gauge_numbers):
+        has_gaps = self.series.counts[Status.OK] and not self.series.is_chance
+        if self.stopped or not (has_gaps or self.has_gauge_numbers):
             return ExitCode.COULD_NOT
         return ExitCode.DAMAGED_INPUT if self.series.counts[Status.DAMAGED] else ExitCode.DONE
 

@@ -19,6 +19,10 @@ from fingervision.storage.gaps_csv import GapRow
 # Distance (pixels) between a finger in even rows and in odd rows above which the rows are interlaced fields; colour
 # sensors cause smaller distances.
 COMB_PX = 0.2
+# Share of the frames below which the gaps stand for some moments of a recording only (the majority of its frames have
+# none), and share of the pictures with fingers below which the objects found are no fingers: a picture without fingers
+# that looks like one with them is rare, but not absent (`tests/benchmarks/scenes`, set `empty`).
+MAJORITY, RARELY = 0.5, 0.1
 # Number of decimals (mm) of a contribution to the uncertainty, so that sums do not depend on how many frames are
 # processed at once.
 PLACES = 9
@@ -126,6 +130,17 @@ class GapSeries:
     def frames(self) -> int:
         """Number of frames so far, including those without a gap."""
         return sum(self.counts.values())
+
+    @property
+    def is_minority(self) -> bool:
+        """Whether less than half of the frames have a gap; frames that the source repeats do not count."""
+        return self.counts[Status.OK] < MAJORITY * (self.frames - self.counts[Status.DUPLICATE])
+
+    @property
+    def is_chance(self) -> bool:
+        """Whether fewer than a tenth of the pictures show fingers, apart from damaged and repeated ones."""
+        shown = sum(self.counts[status] for status in (Status.OK, Status.TOUCHING, Status.GRIPPING))
+        return shown < RARELY * (self.frames - self.counts[Status.DUPLICATE] - self.counts[Status.DAMAGED])
 
     @property
     def first_damaged(self) -> FirstBad | None:

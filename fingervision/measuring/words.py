@@ -16,6 +16,11 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
     """Sentences with the number of measured frames, reasons for the others, the gap, its uncertainty, and advice."""
     gap = summary["gap"]
     lines = [f"{gap['count']} of {series.frames} frames measured."]
+    if gap["count"] and series.is_minority:
+        lines = [
+            f"Only {gap['count']} of {series.frames} frames {'was' if gap['count'] == 1 else 'were'} measured: the "
+            "numbers below describe these frames, and not the recording."
+        ]
     lines += [
         f"  {summary['counts'][status]} {status}, first frame {why['first_frame']}: {why['words']}"
         for status, why in summary["why"].items()
@@ -69,7 +74,8 @@ def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
     found = of if gap["count"] == frames else f"{gap['count']} of {of} with a gap"
     bad = series.counts[Status.DAMAGED]
     damage = f", {bad} damaged" if bad else ""
-    return f"{values}, U = {COVERAGE_FACTOR * 1e3 * u_mm:.2f} µm (k = 2{median}{only}), {found}{damage}"
+    few = f"only {gap['count']} of {of} measured: " if series.is_minority else ""
+    return f"{few}{values}, U = {COVERAGE_FACTOR * 1e3 * u_mm:.2f} µm (k = 2{median}{only}), {found}{damage}"
 
 
 __all__ = ["in_one_line", "result_sentences"]

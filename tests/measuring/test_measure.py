@@ -24,6 +24,7 @@ from fingervision.frames.rendered import RenderedFrames
 from fingervision.frames.source import Description
 from fingervision.measuring.measure import Measured, measure
 from fingervision.measuring.task import Task
+from fingervision.measuring.words import result_sentences
 from fingervision.rendering import Camera, Scene, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 
@@ -48,6 +49,30 @@ def rendered(scenes: list[Scene], seed: int = 0, rate_hz: float | None = 25.0) -
 def rows_of(measured: Measured) -> list[dict[str, str]]:
     with measured.folder.gaps.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize(
+    ("count", "rest", "code", "is_said_first"),
+    [
+        (1, "empty", ExitCode.COULD_NOT, True),
+        (3, "empty", ExitCode.DONE, True),
+        (1, "touching", ExitCode.DONE, True),
+        (7, "empty", ExitCode.DONE, False),
+    ],
+)
+def test_gaps_of_few_frames_are_not_those_of_the_recording(
+    tmp_path: Path, count: int, rest: str, code: ExitCode, is_said_first: bool
+) -> None:
+    size_px = (240, 200)
+    joined = two_fingers(-2.0, below_tip_px=BELOW_PX, width_px=70.0, radius_px=30.0, frame=size_px)
+    others = {"empty": Scene((), *size_px), "touching": joined}
+    scenes = [*opening(count), *[others[rest]] * (12 - count)]
+    measured = measure(rendered(scenes), Task(BareScale(PX_PER_MM)), tmp_path)
+    first = result_sentences(measured.summary, measured.series)[0]
+    assert measured.series.counts[Status.OK] == count
+    assert measured.exit_code is code
+    assert f"{count} of 12" in first
+    assert ("recording" in first) is is_said_first
 
 
 @pytest.mark.parametrize("direction", list(Direction))
