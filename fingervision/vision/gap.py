@@ -18,7 +18,7 @@ from fingervision.vision.fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.first_guess import first_guess
 from fingervision.vision.flanks import STEEPEST, has_straight_flanks
 from fingervision.vision.held_part import held_part
-from fingervision.vision.likeness import FARTHEST_TURNED, common_turn
+from fingervision.vision.likeness import FARTHEST_TURNED, LEANS_ALIKE, common_turn
 from fingervision.vision.local_outline import FLATTEST, local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
@@ -307,6 +307,15 @@ def _assemble(
     dx, dy = across[1] - across[0], along[1] - along[0]
     if dx <= 0:
         return NoGap(Status.TOUCHING, "The fingers touch at the measuring height.")
+    # Each edge's slope in its finger's own axes: level fingers of one gripper have the same, and a camera rotated by as
+    # much as is permitted slants the gap by half of this.
+    if abs(dy) > dx and abs(measured[0].slope - measured[1].slope) > LEANS_ALIKE:
+        return NoGap(
+            Status.ONE_FINGER,
+            f"The two measuring points lie {abs(dy):.0f} px apart along the fingers and only {dx:.0f} px across, and "
+            "their edges differ in direction: one of them is on a part that protrudes beyond a finger. Hold the part "
+            "lower, or state the region of the fingers (--roi).",
+        )
     gap = hypot(dx, dy)
     variance = 0.0
     for m, end in zip(measured, (-1.0, 1.0), strict=True):
