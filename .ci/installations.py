@@ -105,9 +105,14 @@ def _tried(folder: Path, python: Path, wheel: Path, constraints: Path | None, te
     assert (report["verdict"], named) == ("named", [HIDDEN]), f"{report['verdict']}: {named}"
     play = report["effects"][0]["parameters"]["play_mm"]
     assert abs(play["value"] - TRUE_PLAY_MM) < 3 * play["u"], play
+    # Units of foreign tables need a library that nothing else loads.
+    (folder / "foreign.csv").write_text("Zeit [s];Weg [um];Spalt [mm]\n0,0;0,0;1,25\n0,1;10,0;1,35\n", encoding="utf-8")
+    assert "um" in _run(folder, program, "table", "foreign.csv")
     seen = f"measured, named {HIDDEN} {play['value']:.5f} mm"
     if tests:
-        said = _run(ROOT, programs / "python", "-m", "pytest", "-q", "-n", "auto", "-p", "no:cacheprovider")
+        said = _run(
+            ROOT, programs / "python", "-m", "pytest", "-q", "-n", "auto", *(["-W", "default"] if constraints else [])
+        )
         seen += f"; tests: {said.strip().splitlines()[-1]}"
     return seen
 

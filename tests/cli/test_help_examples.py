@@ -64,7 +64,7 @@ def shortened(recording: Path) -> None:
     recording.rename(whole)
     with av.open(str(whole)) as source, av.open(str(recording), "w") as target:
         stream = source.streams.video[0]
-        out = target.add_stream_from_template(stream)
+        out = target.add_stream_from_template(stream, opaque=True)
         for number, packet in enumerate(source.demux(stream)):
             if packet.dts is None or number >= FRAMES:
                 break

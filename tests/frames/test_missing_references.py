@@ -58,7 +58,7 @@ def test_the_bit_tells_where_times_do_not(tmp_path: Path) -> None:
     coded(path, "mpeg4", g="20", bf="0")
     with av.open(str(path)) as whole, av.open(str(other), "w") as container:
         stream = whole.streams.video[0]
-        copied = container.add_stream_from_template(stream)
+        copied = container.add_stream_from_template(stream, opaque=True)
         packets = [packet for number, packet in enumerate(whole.demux(stream)) if packet.size and number != 31]
         for number, packet in enumerate(packets):
             assert packet.duration is not None
@@ -141,7 +141,7 @@ def test_hidden_pictures_take_no_time(tmp_path: Path, lost: int | None) -> None:
     coded(path, "libvpx", g="60", **{"cpu-used": "8", "deadline": "realtime"})
     hidden = {9, 29, 49}
     with av.open(str(path)) as whole, av.open(str(other), "w") as container:
-        copied = container.add_stream_from_template(whole.streams.video[0])
+        copied = container.add_stream_from_template(whole.streams.video[0], opaque=True)
         seen = 0
         for number, packet in enumerate(packet for packet in whole.demux(video=0) if packet.size):
             content = bytearray(bytes(packet))

@@ -4,6 +4,7 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
+import av
 import pytest
 
 from fingervision.domain.frame import LostFrame
@@ -64,6 +65,8 @@ def test_of_a_sound_file_every_time_is_believed(clip: Path) -> None:
 @pytest.mark.parametrize("coder", ["ffv1", "mjpeg"])
 def test_coders_that_keep_the_order_are_believed(tmp_path: Path, coder: str) -> None:
     path = tmp_path / "clip.mp4"
+    if coder == "ffv1" and av.__version__.startswith("14."):
+        pytest.skip("PyAV 14 writes no FFV1 into MP4")
     coded(path, coder, g="1")
     assert not states_another_duration(path)
 

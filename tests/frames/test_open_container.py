@@ -16,7 +16,7 @@ def test_a_title_that_is_no_text_costs_no_frame(tmp_path: Path, suffix: str) -> 
     path = tmp_path / f"titled{suffix}"
     with open_container(tmp_path / f"clip{suffix}") as old, av.open(str(path), "w") as new:
         new.metadata["title"] = "Spalt 7"
-        stream = new.add_stream_from_template(old.streams.video[0])
+        stream = new.add_stream_from_template(old.streams.video[0], opaque=True)
         for packet in old.demux(video=0):
             if packet.size:
                 packet.stream = stream

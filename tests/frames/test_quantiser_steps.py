@@ -15,6 +15,7 @@ from fingervision.frames import quantiser_steps
 from fingervision.frames.quantiser_steps import FADES, H264, VP9, VP9_STEPS, StatedSteps, StepTrail
 from fingervision.frames.seeking import seeking
 from fingervision.frames.source import open_source
+from tests.frames.test_rotation import turn
 
 HEIGHT, WIDTH = 72, 104  # neither is a multiple of 16
 
@@ -32,7 +33,8 @@ def recorded(path: Path, codec: str, options: dict[str, str], rotation_deg: int 
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         if codec == "mpeg4":
             stream.codec_context.qmin = stream.codec_context.qmax = int(options["qscale"])
-        stream.set_display_rotation(rotation_deg)
+        if rotation_deg:
+            turn(stream, rotation_deg)
         for number in range(3):
             picture = av.VideoFrame.from_ndarray(drawn(number), format="gray").reformat(format="yuv420p")
             container.mux(stream.encode(picture))

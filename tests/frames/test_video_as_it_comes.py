@@ -85,6 +85,8 @@ def test_a_high_speed_cameras_own_file_says_what_to_export(suffix: str, tmp_path
 def test_high_dynamic_range_is_read_with_its_own_curve(
     number: int, name: str, stated: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if av.__version__.startswith("14."):
+        pytest.skip("PyAV 14 makes no frame of 10 bits from an array")
     monkeypatch.chdir(tmp_path)
     path = Path("12:30:05.mkv")  # FFmpeg takes what precedes a colon for a protocol
     with av.open(f"file:{path}", "w") as container:
