@@ -14,6 +14,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from fingervision.batch.digest import Digest
+from fingervision.storage.plain_file import json_of
 
 RECORD = "record.json"
 TABLES = (".csv", ".json", ".toml")
@@ -62,7 +63,7 @@ class Record:
 def read_record(folder: Path) -> Record | None:
     """Read the record of a result; None for a missing or unreadable record."""
     try:
-        held: Mapping[str, object] = json.loads((folder / RECORD).read_bytes())
+        held: Mapping[str, object] = json_of(folder / RECORD)
         if held.pop("schema") != SCHEMA:  # type: ignore[attr-defined]
             return None
         digest = held.pop("digest")  # type: ignore[attr-defined]

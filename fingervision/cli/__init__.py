@@ -8,6 +8,7 @@ import signal
 import sys
 import unicodedata
 from contextlib import suppress
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,6 +16,10 @@ import click
 
 from fingervision import __version__
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
+
+TRACEBACK = "FINGERVISION_TRACEBACK"
+"""Environment variable with which an unexpected error prints its traceback."""
+OUTPUT_ERRORS = (errno.ENOSPC, errno.EIO, errno.EPIPE)
 
 
 class Commands(click.Group):
@@ -45,6 +50,15 @@ class Commands(click.Group):
         command = importlib.import_module(f"{__name__}.{cmd_name}").command
         assert isinstance(command, click.Command)  # noqa: S101 - a module without a command is a defect of this package
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Suggest the nearest command for a name that does not exist."""
+        known = self.list_commands(ctx)
+        if args[0] not in known and not args[0].startswith("-") and (near := get_close_matches(args[0], known, n=1)):
+            ctx.fail(f"No such command '{args[0]}'. Did you mean '{near[0]}'?")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; an error about an argument states the name of the command-line option."""
@@ -78,30 +92,56 @@ def main() -> None:
     except FingervisionError as error:
         click.echo(f"fingervision: {_printable(str(error))}", err=True)
         sys.exit(error.exit_code)
-    except RuntimeError as error:
-        if "Symlink loop" not in str(error):
-            raise
-        click.echo(
-            f"fingervision: A symbolic link leads back to itself ({error}): name a real file or folder.", err=True
-        )
-        sys.exit(ExitCode.COULD_NOT)
-    except OSError as error:
-        if error.errno == errno.ENAMETOOLONG:
-            click.echo(
-                "fingervision: A file name must fit the limits of the operating system, but is too long: shorten it.",
-                err=True,
-            )
-            sys.exit(ExitCode.COULD_NOT)
+    except Exception as error:
         # Errors of files are reported where the files are written; an error without a file name concerns standard
         # output.
-        if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EPIPE):
+        if isinstance(error, OSError) and error.filename is None and error.errno in OUTPUT_ERRORS:
+            _give_up_output(error)
+        if TRACEBACK in os.environ:
             raise
-        _give_up_output(error)
+        click.echo(f"fingervision: {_printable(_of_system(error) or _unexpected(error))}", err=True)
+        sys.exit(ExitCode.COULD_NOT)
     finally:
         try:
             sys.stdout.flush()
         except OSError as error:
             _give_up_output(error)
+
+
+def _of_system(error: Exception) -> str | None:
+    """Sentence on an error of the operating system, for which neither the input nor this program is to blame."""
+    if isinstance(error, MemoryError):
+        return "This needs more memory than the machine has free: close other programs, or choose a smaller input."
+    if isinstance(error, RuntimeError) and "Symlink loop" in str(error):
+        return f"A symbolic link leads back to itself ({error}): name a real file or folder."
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        return "A file name must fit the limits of the operating system, but is too long: shorten it."
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename} cannot be used ({error.strerror}): check its name, its permissions and the disk."
+    return None
+
+
+def _unexpected(error: Exception) -> str:
+    """Sentence on an error that no part of the program expects; its traceback goes to a file."""
+    import platform
+    import tempfile
+    import traceback
+
+    words = [f"fingervision {__version__}, Python {platform.python_version()}, {platform.platform()}"]
+    words += [repr(sys.argv), "".join(traceback.format_exception(error))]
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="fingervision-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as file:
+            file.write("\n\n".join(words))
+        kept = f"the details are in {file.name}"
+    except OSError:
+        kept = f"{TRACEBACK}=1 before the command prints the details"
+    return (
+        f"The command ended with an error that it does not know ({type(error).__name__}: {str(error)[:200]}): an input "
+        "has content that is not foreseen, or the program has a defect. The input is unchanged. Please report this "
+        f"with the input; {kept}."
+    )
 
 
 def _printable(words: str) -> str:

@@ -2,6 +2,7 @@
 
 import click
 
+from fingervision.cli._number import NUMBER, Number
 from fingervision.cli._on_bed import bed_option
 
 EXAMPLES = """
@@ -13,8 +14,8 @@ Examples:
 
 
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
-@click.argument("speed_mm_s", type=float)
-@click.option("--for-s", type=click.FloatRange(0.0, min_open=True), help="Stop after this many seconds.")
+@click.argument("speed_mm_s", type=NUMBER)
+@click.option("--for-s", type=Number(above=0.0), help="Stop after this many seconds.")
 @click.option(
     "--home-first",
     is_flag=True,

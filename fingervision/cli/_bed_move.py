@@ -2,6 +2,7 @@
 
 import click
 
+from fingervision.cli._number import NUMBER
 from fingervision.cli._on_bed import bed_option
 
 EXAMPLES = """
@@ -18,8 +19,8 @@ relative steps, none of them faster than requested. Ctrl-C first stops the motor
 
 
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
-@click.argument("to_mm", type=float)
-@click.option("--speed-mm-s", type=float, default=1.0, show_default=True, help="Speed of the stage in mm/s.")
+@click.argument("to_mm", type=NUMBER)
+@click.option("--speed-mm-s", type=NUMBER, default=1.0, show_default=True, help="Speed of the stage in mm/s.")
 @click.option(
     "--home-first",
     is_flag=True,

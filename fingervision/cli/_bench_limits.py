@@ -5,6 +5,8 @@ from typing import Any
 
 import click
 
+from fingervision.cli._number import NUMBER
+
 # Option; name and default in calib.limits.Limits (a test compares the defaults); description.
 LIMITS = (
     ("--plane-mm", "plane_mm", 0.5, "Largest distance of the gripper from the plane of the reference, +- mm."),
@@ -44,5 +46,5 @@ def limit_options(command: Command) -> Command:
     """Add one option for the limit of each property of the set-up that the uncertainty budget needs."""
     for option, name, default, words in reversed(LIMITS):
         text = f"{words}  [default: {default:g}]"
-        command = click.option(option, name, type=float, default=None, help=text)(command)
+        command = click.option(option, name, type=NUMBER, default=None, help=text)(command)
     return command

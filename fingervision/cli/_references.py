@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from fingervision.domain.errors import UsageError
+from fingervision.domain.errors import ArgumentError, UsageError
+from fingervision.domain.numbers import stated_number
 
 KINDS = ("bar", "slot")
 
@@ -24,8 +25,10 @@ def _item(item: str, kind: str, form: str, example: str) -> tuple[str, Path, flo
     if colon and prefix in KINDS:
         kind, name = prefix, rest
     try:
-        size_mm = float(size)
-    except ValueError:
+        size_mm = stated_number(size, f"The size in {item}")
+    except ArgumentError as error:
+        if "," in size:
+            raise UsageError(str(error)) from None
         size_mm = 0.0
     if not name or not 0.0 < size_mm < float("inf"):
         raise UsageError(

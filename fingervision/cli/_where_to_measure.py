@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fingervision.cli._number import NUMBER
+
 if TYPE_CHECKING:
     from fingervision.domain.region import Region
 
@@ -42,17 +44,17 @@ OPTIONS = (
     ),
     click.option(
         "--px-per-mm",
-        type=float,
+        type=NUMBER,
         help="Scale in pixels per mm; without --u-px-per-mm, only the random part of the uncertainty is given.",
     ),
     click.option(
         "--u-px-per-mm",
-        type=float,
+        type=NUMBER,
         help="Standard uncertainty of --px-per-mm, in pixels per mm; u_gap_mm then includes it.",
     ),
     click.option(
         "--below-tip-mm",
-        type=float,
+        type=NUMBER,
         default=0.3,
         show_default=True,
         help="Distance (mm) below each finger's tip at which the gap is measured.",

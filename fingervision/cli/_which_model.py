@@ -1,6 +1,8 @@
 """Options that choose the model with which a measurement is compared."""
 
+import os
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -20,13 +22,29 @@ def _single(context: click.Context, parameter: click.Parameter, value: tuple[Pat
     return value[0]
 
 
+class ModelPath(click.Path):
+    """Path of a model; `model.py:simulate` means the file model.py."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path of the model's file."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if ".py:" not in path.name:
+            return path
+        from fingervision.models.function_model import model_file
+
+        return model_file(path)
+
+
 model_option = click.option(
     "--model",
     "model_path",
     required=True,
     multiple=True,
     callback=_single,
-    type=click.Path(path_type=Path),
+    type=ModelPath(),
     help=f"{HELP}.",
 )
 models_option = click.option(
@@ -34,7 +52,7 @@ models_option = click.option(
     "model_paths",
     required=True,
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=ModelPath(),
     help=f"{HELP}; several are compared in one figure.",
 )
 

@@ -159,14 +159,13 @@ def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
 def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
     """Hash of a file, and of the files to which a corrected model refers."""
     import hashlib
-    import tomllib
 
     from fingervision.batch.fingerprint import content_hash
-    from fingervision.storage.plain_file import plain, text_of, why
+    from fingervision.storage.plain_file import plain, toml_of, why
 
     try:
         found = content_hash(plain(path))
-        base = tomllib.loads(text_of(path)).get("base") if path.suffix.lower() == ".toml" else None
+        base = toml_of(path).get("base") if path.suffix.lower() == ".toml" else None
     except FileNotFoundError:
         raise InputFileError(f"There is no file {path}: check the options.") from None
     except (OSError, ValueError) as error:

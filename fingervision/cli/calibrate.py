@@ -9,6 +9,7 @@ import click
 
 from fingervision.cli._bench_limits import limit_options
 from fingervision.cli._calibrating import calibrate_on_board, calibrate_on_lines, calibrate_on_sizes, sentences
+from fingervision.cli._number import NUMBER
 from fingervision.cli._references import named_references, region_from
 from fingervision.domain.errors import DataError, UsageError
 
@@ -99,7 +100,11 @@ def _size_options(command: Command) -> Command:
         (
             click.argument("items", nargs=-1, required=True, metavar="IMAGE=SIZE_MM..."),
             click.option(
-                "--u-size-mm", default=0.001, show_default=True, help="Standard uncertainty of every size, mm."
+                "--u-size-mm",
+                type=NUMBER,
+                default=0.001,
+                show_default=True,
+                help="Standard uncertainty of every size, mm.",
             ),
             click.option("--roi", metavar="X,Y,W,H", help="Use only this part of every picture."),
         )
@@ -138,10 +143,10 @@ def _board_options(command: Command) -> Command:
     for option in reversed(
         (
             click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=click.Path(path_type=Path)),
-            click.option("--square-mm", type=float, required=True, help="Side of a square, mm."),
+            click.option("--square-mm", type=NUMBER, required=True, help="Side of a square, mm."),
             click.option(
                 "--u-square-mm",
-                type=float,
+                type=NUMBER,
                 default=None,
                 help="Standard uncertainty of a square's side, mm.  [default: 0.1 % of it]",
             ),
@@ -168,7 +173,7 @@ def chessboard(**options: Any) -> None:
 @command.command("charuco", epilog=CHARUCO_EXAMPLES)
 @_board_options
 @click.option("--squares", required=True, metavar="8x6", help="Squares along x and y.")
-@click.option("--marker-mm", type=float, default=None, help="Side of a marker, mm.  [default: 0.75 of a square]")
+@click.option("--marker-mm", type=NUMBER, default=None, help="Side of a marker, mm.  [default: 0.75 of a square]")
 @limit_options
 @_output_options
 def charuco(**options: Any) -> None:
@@ -181,12 +186,20 @@ def charuco(**options: Any) -> None:
 
 @command.command("scale", epilog=SCALE_EXAMPLES)
 @click.argument("image", type=click.Path(path_type=Path))
-@click.option("--pitch-mm", type=float, required=True, help="Certified distance of neighbouring lines, mm.")
+@click.option("--pitch-mm", type=NUMBER, required=True, help="Certified distance of neighbouring lines, mm.")
 @click.option(
-    "--u-line-mm", default=0.0003, show_default=True, help="Standard uncertainty of every line's position, mm."
+    "--u-line-mm",
+    type=NUMBER,
+    default=0.0003,
+    show_default=True,
+    help="Standard uncertainty of every line's position, mm.",
 )
 @click.option(
-    "--u-length-mm", default=0.001, show_default=True, help="Standard uncertainty of the length over all lines, mm."
+    "--u-length-mm",
+    type=NUMBER,
+    default=0.001,
+    show_default=True,
+    help="Standard uncertainty of the length over all lines, mm.",
 )
 @click.option("--roi", metavar="X,Y,W,H", help="Use only this part of the picture.")
 @limit_options
@@ -270,7 +283,7 @@ def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | 
 
 @command.command("repeat", epilog=REPEAT_EXAMPLES)
 @click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=click.Path(path_type=Path))
-@click.option("--tolerance-mm", type=float, default=None, help="Full width of the tolerance, for %GRR.")
+@click.option("--tolerance-mm", type=NUMBER, default=None, help="Full width of the tolerance, for %GRR.")
 @click.option("--by-input", is_flag=True, help="Treat every input_mm of the drive as a separate part of the study.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, as_json: bool) -> None:

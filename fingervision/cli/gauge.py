@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from fingervision.cli._live_choices import choices_of
+from fingervision.cli._number import NUMBER
 from fingervision.cli._where_to_measure import where_to_measure
 from fingervision.cli.live import USUAL_OUT, port_of_page
 from fingervision.domain.errors import UsageError
@@ -34,7 +35,7 @@ USUAL_GAUGES = Path("gauges.toml")
     show_default="gauges.toml in the current folder",
     help="Gauges file: read if it exists, and saved to.",
 )
-@click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
+@click.option("--rate-hz", type=NUMBER, help="Images per second, if the images carry no times.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._number import NUMBER
 from fingervision.cli._where_to_measure import how_to_read_pictures, region_of, where_to_measure
 from fingervision.domain.errors import ExitCode, UsageError
 
@@ -25,8 +26,8 @@ WITHOUT_SCALE_PX = 10.0
 @click.command(epilog=EXAMPLES)
 @click.argument("source")
 @where_to_measure
-@click.option("--seconds", type=float, default=5.0, show_default=True, help="Duration of the inspection in seconds.")
-@click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
+@click.option("--seconds", type=NUMBER, default=5.0, show_default=True, help="Duration of the inspection in seconds.")
+@click.option("--rate-hz", type=NUMBER, help="Images per second, if the images carry no times.")
 @how_to_read_pictures
 @click.option(
     "--picture",

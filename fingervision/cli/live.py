@@ -5,7 +5,9 @@ from pathlib import Path
 import click
 
 from fingervision.cli._live_choices import choices_of
+from fingervision.cli._number import NUMBER
 from fingervision.cli._where_to_measure import where_to_measure
+from fingervision.cli._which_model import ModelPath
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -68,21 +70,21 @@ port_of_page = click.option(
 )
 @click.option("--tls-key", type=click.Path(path_type=Path), help="Private key of the certificate (PEM).")
 @click.option("--size", metavar="WxH", help="Picture size to request from the camera.")
-@click.option("--rate-hz", type=float, help="Frames per second to request from the camera.")
+@click.option("--rate-hz", type=NUMBER, help="Frames per second to request from the camera.")
 @click.option(
     "--format",
     "pixel_format",
     metavar="FOUR",
     help="Pixel format to request, such as YUYV (raw) or MJPG.  [default: raw]",
 )
-@click.option("--exposure-ms", type=float, help="Exposure time to request, in ms.")
-@click.option("--gain", type=float, help="Gain (amplification) to request, in the camera's own units.")
-@click.option("--focus", type=float, help="Focus to request, in the camera's own units.")
-@click.option("--white-balance-k", type=float, help="Colour temperature of the white balance to request, in kelvin.")
+@click.option("--exposure-ms", type=NUMBER, help="Exposure time to request, in ms.")
+@click.option("--gain", type=NUMBER, help="Gain (amplification) to request, in the camera's own units.")
+@click.option("--focus", type=NUMBER, help="Focus to request, in the camera's own units.")
+@click.option("--white-balance-k", type=NUMBER, help="Colour temperature of the white balance to request, in kelvin.")
 @click.option(
     "--model",
     "model_path",
-    type=click.Path(path_type=Path),
+    type=ModelPath(),
     help="Compare the gap with this model while it is measured.",
 )
 @click.option(
@@ -99,7 +101,7 @@ port_of_page = click.option(
 )
 @click.option(
     "--drive-offset-s",
-    type=float,
+    type=NUMBER,
     help="Clock offset in seconds, added to the drive's times; determined for a recording if not given.",
 )
 @click.option(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fingervision.cli._columns_option import columns_option
+from fingervision.cli._number import NUMBER
 from fingervision.cli._where_to_measure import how_to_read_pictures, region_of, where_to_measure
 from fingervision.domain.errors import UsageError
 
@@ -45,7 +46,7 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
 @click.command(epilog=EXAMPLES)
 @click.argument("recording")
 @where_to_measure
-@click.option("--rate-hz", type=float, help="Images per second, if the images carry no times.")
+@click.option("--rate-hz", type=NUMBER, help="Images per second, if the images carry no times.")
 @click.option("--frames", metavar="FIRST:LAST", help="Measure only these frames; counted from 0, both included.")
 @click.option(
     "--drive",
@@ -55,7 +56,7 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
 @columns_option
 @click.option(
     "--drive-offset-s",
-    type=float,
+    type=NUMBER,
     help="Clock offset in seconds, added to the drive's times; determined from the motion if not given.",
 )
 @how_to_read_pictures

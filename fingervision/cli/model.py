@@ -8,6 +8,7 @@ import click
 
 from fingervision.cli._columns_option import columns_option
 from fingervision.cli._kind_choice import KindChoice
+from fingervision.cli._number import NUMBER
 from fingervision.cli._results_folder import results_folder
 
 if TYPE_CHECKING:
@@ -80,14 +81,14 @@ Examples:
     help="Damping law of vibrations: modal:RATIO, loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 of "
     "Hricko and Havlik, 2015, above the lowest mode).",
 )
-@click.option("--rate-hz", type=float, help="Rows per second of response.csv, in addition to the drive's own samples.")
+@click.option("--rate-hz", type=NUMBER, help="Rows per second of response.csv, in addition to the drive's own samples.")
 @click.option(
     "--object-mm",
-    type=float,
+    type=NUMBER,
     help="Width (mm) of a part to grip between the fingers or a pair of probes: grip.csv and grip.png.",
 )
 @click.option(
-    "--object-n-mm", type=float, help="With --object-mm: stiffness of the part in N/mm; a rigid part if not given."
+    "--object-n-mm", type=NUMBER, help="With --object-mm: stiffness of the part in N/mm; a rigid part if not given."
 )
 @click.option("--mesh", is_flag=True, help="Write a picture of the finite-element mesh, mesh.png.")
 @click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Vary one number of the drawing over N values from "

@@ -25,6 +25,11 @@ class UnreadableImageError(Exception):
     """An image cannot be read; the message gives the reason in a sentence."""
 
 
+def is_image(file: Path) -> bool:
+    """Whether a file is read as one image, by its name or its first bytes; otherwise it may be a video."""
+    return not file.is_file() or file.suffix.lower() in IMAGE_SUFFIXES or cv2.haveImageReader(str(file))
+
+
 def read_image(file: Path) -> Pixels:
     """Read an image at its own bit depth.
 

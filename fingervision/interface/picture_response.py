@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fingervision.domain.errors import DataError
+
 if TYPE_CHECKING:
     from calib.camera_response import CameraResponse
     from calib.known_widths import KnownSize
@@ -33,14 +35,27 @@ class PictureResponse:
     def of(cls, words: str, files: Sequence[Path]) -> "PictureResponse":
         """Choose the response by the option --response.
 
-        `auto` takes the tag in the first picture, or a linear response if the picture has no tag.
+        `auto` takes the tag of the pictures, or a linear response if they have none. A picture without a tag, such as
+        a frame saved as PNG, may be of the same camera as one with a tag.
+
+        Raises
+        ------
+        DataError
+            The tags of two pictures differ.
         """
         from calib.camera_response import standard_response
         from fingervision.frames.transfer_tag import transfer_tag
         from fingervision.storage.response_csv import response_named
 
         stated = response_named(words)
-        response = stated or standard_response(transfer_tag(tuple(files)) or "linear")
+        tags = {tag: file for file in files if stated is None and (tag := transfer_tag((file,))) is not None}
+        if len(tags) > 1:
+            found = " and ".join(f"{tag} in {file.name}" for tag, file in tags.items())
+            raise DataError(
+                f"All pictures must state the same camera response, but they state {found}: take them with the same "
+                "settings, or give the response with --response."
+            )
+        response = stated or standard_response(next(iter(tags), "linear"))
         other = standard_response("srgb" if response.name == "linear" else "linear")
         return cls(response, other, stated is not None)
 

@@ -16,8 +16,10 @@ from fingervision.domain.errors import (
     InputFileError,
     UsageError,
 )
+from fingervision.domain.frame import Frame, Pixels
 from fingervision.frames.array_levels import levels_of, stated_shape, what_it_is
-from fingervision.frames.image_file import UnreadableImageError, read_image
+from fingervision.frames.image_file import UnreadableImageError, is_image, read_image
+from fingervision.frames.source import open_source
 from fingervision.interface.argument_checks import number, one_of
 from fingervision.vision.grey import GreyImage, to_grey
 
@@ -103,6 +105,8 @@ def known_sizes(references: Sequence[Reference], u_size_mm: float) -> list[Known
 def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
     """Read pictures as grey levels, and name each; all must have the same size, and no file may be named twice.
 
+    Of a video, the first frame is the picture.
+
     Raises
     ------
     UsageError
@@ -146,9 +150,17 @@ def _read(source: Any, index: int) -> tuple[str, GreyImage]:
     if not path.exists():
         raise InputFileError(f"There is no picture {path}; check the name.")
     try:
-        return path.name, to_grey(read_image(path))
+        return path.name, to_grey(read_image(path) if is_image(path) else _first_frame(path))
     except UnreadableImageError as error:
         raise DataError(f"The picture {path} cannot be used: {error}") from error
+
+
+def _first_frame(path: Path) -> Pixels:
+    """First frame of a video that could be decoded."""
+    for frame in open_source(str(path)):
+        if isinstance(frame, Frame):
+            return frame.pixels
+    raise DataError(f"The video {path} must have a frame that can be decoded, but has none: record it again.")
 
 
 __all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of"]

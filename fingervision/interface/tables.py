@@ -18,6 +18,7 @@ from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.column_tables import columns_of, measured_from_columns, simulation_from_columns
 from fingervision.interface.measurement import Measurement
 from fingervision.models.corrected import CorrectedModel
+from fingervision.models.function_model import model_file
 from fingervision.models.kinds import kinds
 from fingervision.models.table import TableModel
 from fingervision.tables import read as tables
@@ -122,7 +123,7 @@ def read_model(
     'gripper.toml (lumped)'
     """
     choice = None if columns is None else path_of("columns", columns, "a columns.toml")
-    return tables.read_model(path_of("path", path, "a model's file"), one_of("kind", kind, kinds()), choice)
+    return tables.read_model(model_file(path_of("path", path, "a model's file")), one_of("kind", kind, kinds()), choice)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +187,7 @@ def model_given(model: Any, kind: str, columns: Any = None) -> Given:
         The file cannot be read.
     """
     if isinstance(model, str | os.PathLike):
-        path = path_of("model", model, "a model's file")
+        path = model_file(path_of("model", model, "a model's file"))
         return Given(read_model(path, kind, columns), path)
     model = getattr(model, "corrected_model", model)
     if isinstance(model, TableModel):

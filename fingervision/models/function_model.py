@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.effect import Array
-from fingervision.domain.errors import ModelError
+from fingervision.domain.errors import ModelError, UsageError
 from fingervision.domain.response import Response
 from fingervision.models.table import TableModel
 
 SUFFIXES = (".fmu", ".py")
+FUNCTION = "simulate"
+"""Name of the function of a Python file that is a model."""
 LONGEST_S = 120.0
 """Longest wall time of one call: the model of an ordinary gripper with some hundred states needs one or two seconds."""
 STEPS = 21
@@ -30,6 +32,24 @@ HOLDS_S = (2.0, 8.0, 32.0)
 about a minute."""
 SETTLED = 1e-4
 """Largest change of the gap in the second half of a hold that counts as settled, as a share of the gap's range."""
+
+
+def model_file(path: Path) -> Path:
+    """Return the file of a model; a Python file may be followed by the name of its function, as `model.py:simulate`.
+
+    Raises
+    ------
+    UsageError
+        The function has another name.
+    """
+    file, separator, function = str(path).rpartition(".py:")
+    if not separator or path.exists():
+        return path
+    if function != FUNCTION:
+        raise UsageError(
+            f"The function of a Python model must have the name {FUNCTION}, but {path} names {function!r}: rename it."
+        )
+    return Path(f"{file}.py")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from fingervision.domain.effect import Array
 from fingervision.models.fmu import fmu_function
-from fingervision.models.function_model import SAYS
+from fingervision.models.function_model import FUNCTION, SAYS
 
 Answer = Mapping[str, Array]
 Function = Callable[[Array, Array], Answer]
@@ -47,7 +47,7 @@ def _python_function(path: Path) -> Function:
         raise ValueError("must be a file, but does not exist.") from None
     except (Exception, SystemExit) as error:
         raise ValueError(f"could not be loaded: {type(error).__name__}: {error}") from error
-    simulate = getattr(module, "simulate", None)
+    simulate = getattr(module, FUNCTION, None)
     if not callable(simulate):
         raise ValueError("must have a function simulate(time_s, input_mm), but has none.")  # noqa: TRY004 - a sentence
 

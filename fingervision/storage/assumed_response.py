@@ -1,12 +1,12 @@
 """Note on a measured table whose camera response was assumed, according to the summary of its measurement."""
 
 import csv
-import json
 import statistics
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from fingervision.storage.plain_file import json_of
 from fingervision.storage.summary_json import GAPS, SUMMARY
 
 
@@ -49,7 +49,7 @@ def response_note_beside(table: Path) -> tuple[str, ...]:
     if table.name != GAPS:
         return ()
     try:
-        summary = json.loads((table.parent / SUMMARY).read_bytes())
+        summary = json_of(table.parent / SUMMARY)
         with table.open(encoding="utf-8", newline="") as file:
             cells = [row.get("u_shift_px") for row in csv.DictReader(line for line in file if not line.startswith("#"))]
         return response_note(summary, [float(cell) for cell in cells if cell])

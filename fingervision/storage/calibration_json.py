@@ -3,14 +3,14 @@
 import json
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from calib.camera_response import CURVES
 from calib.limits import Limits
 from calib.measured_scale import Calibration
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.calibration_reader import SCHEMA, CalibrationReader
-from fingervision.storage.plain_file import text_of
+from fingervision.storage.plain_file import json_of
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:
@@ -94,15 +94,11 @@ def read_calibration(path: Path) -> Calibration:
         The file does not exist, has a newer schema, or its values are inconsistent.
     """
     try:
-        content = json.loads(text_of(path), parse_constant=_no_constant)
+        content = json_of(path)
     except FileNotFoundError:
         raise InputFileError(f"There is no calibration file {path}; make one with `fingervision calibrate`.") from None
     except OSError as error:
         raise InputFileError(f"The calibration file {path} could not be read: {error.strerror}.") from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise DataError(f"{path} is not a calibration file: it is not JSON ({error}).") from error
     return CalibrationReader(path, content).calibration()
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is given where a number is needed")

@@ -1,12 +1,12 @@
 """Protection of files against overwriting: a calibration may replace only an older calibration and its pictures."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import OutputError
+from fingervision.storage.plain_file import json_of
 
 
 def refuse_foreign(out: Path) -> None:
@@ -20,7 +20,7 @@ def refuse_foreign(out: Path) -> None:
     if not out.exists():
         return
     try:
-        content = json.loads(out.read_text(encoding="utf-8"))
+        content = json_of(out)
     except (OSError, ValueError):
         content = None
     if not (isinstance(content, dict) and "px_per_mm" in content):

@@ -2,21 +2,20 @@
 
 import difflib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
 from fingervision.models.gripper_outline import check_outline, check_stated_size
 from fingervision.models.plane_shapes import crosses_itself
 from fingervision.storage.finite import is_number
-from fingervision.storage.plain_file import NotUtf8Error, text_of
 from fingervision.storage.sn_line_toml import check_below_yield, read_sn_line
 from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
+from fingervision.storage.toml_section import read_document
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
@@ -63,18 +62,7 @@ def read_gripper(path: Path) -> Gripper:
         The file cannot be read, a key is missing or unknown, a value is not a number, or the drawing is not a valid
         gripper.
     """
-    try:
-        text = text_of(path)
-    except FileNotFoundError:
-        raise InputFileError(f"There is no gripper {path}.") from None
-    except OSError as error:
-        raise InputFileError(f"The gripper {path} could not be read ({error.strerror}).") from error
-    except NotUtf8Error as error:
-        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
-    try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and endless nesting
-        raise DataError(f"{path} must be TOML, but is not: {error}.") from error
+    tables, _ = read_document(path, "gripper")
     refuse_other_file(path, tables, "the drawing of a gripper or mechanism", DRAWINGS)
     return gripper_from_tables(tables, str(path))
 

@@ -5,7 +5,6 @@ contains the packets without these marks, so that some damaged pictures would se
 again.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from fingervision.domain.status import Status
 from fingervision.storage.csv_columns import number, read_columns
 from fingervision.storage.gaps_csv import TIME_PLACES
 from fingervision.storage.line_file import cell, quoted
+from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN
 
 LOST = "lost.csv"
@@ -85,7 +85,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
     if len(files) != 1:
         return ()
     try:
-        run = json.loads((files[0].parent / RUN).read_text(encoding="utf-8"))
+        run = json_of(files[0].parent / RUN)
         named = str(run["lost"]) if run["video"] == files[0].name else ""
     except (OSError, ValueError, LookupError, TypeError):
         return ()  # there is no run.json, or it belongs to something else

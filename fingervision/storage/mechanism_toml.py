@@ -1,7 +1,6 @@
 """The file mechanism.toml: drawing of any planar flexure mechanism; numbers may be expressions of its [lengths]."""
 
 import difflib
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot
@@ -9,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fingervision.domain.errors import DataError, InputFileError, unreadable
+from fingervision.domain.errors import DataError
 from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
@@ -19,8 +18,9 @@ from fingervision.storage.drawing_numbers import bare_tables, changed_tables, nu
 from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
-from fingervision.storage.plain_file import text_of
+from fingervision.storage.plain_file import toml_of
 from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
+from fingervision.storage.toml_section import read_document
 
 _TOP = (
     "schema",
@@ -49,7 +49,7 @@ _FLEXURES = {
 def is_mechanism(path: Path) -> bool:
     """Whether a TOML file is a mechanism.toml (bodies or a template), not a gripper.toml."""
     try:
-        tables = tomllib.loads(text_of(path))
+        tables = toml_of(path)
     except (OSError, ValueError):
         return False
     return isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
@@ -108,12 +108,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
     DataError, InputFileError
         The file cannot be read, or an uncertainty in it is not a positive number.
     """
-    try:
-        tables = tomllib.loads(text_of(path))
-    except FileNotFoundError:
-        raise InputFileError(f"There is no mechanism {path}.") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise unreadable(error)(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+    tables, _ = read_document(path, "mechanism")
     refuse_other_file(path, tables, "the drawing of a mechanism or gripper", DRAWINGS)
     return MechanismDrawing(path, *bare_tables(tables, str(path)))
 

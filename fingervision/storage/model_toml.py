@@ -2,7 +2,6 @@
 
 import json
 import os
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -11,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.effect import effect_key, split_key
-from fingervision.domain.errors import DataError, InputFileError, unreadable
+from fingervision.domain.errors import DataError, InputFileError
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue, origin_of
 from fingervision.effects.position_error_map import curve_points, curve_values
@@ -24,8 +23,9 @@ from fingervision.models.table import TableModel
 from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
-from fingervision.storage.plain_file import in_utf8, text_of, why
+from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.simulation_table import read_simulation_table
+from fingervision.storage.toml_section import read_document
 
 FMU_KEYS = ("input", "gap", "input_unit", "gap_unit")
 """Keys of an FMU: names of its input and gap, and their units where the FMU declares none."""
@@ -64,12 +64,7 @@ def read_model(
     if path.suffix.lower() != ".toml":
         simulation = table(path)
         return CorrectedModel(simulation.name, simulation, str(path), simulation.input_range_mm, {})
-    try:
-        document = tomllib.loads(text_of(path))
-    except FileNotFoundError:
-        raise InputFileError(f"There is no model {path}.") from None
-    except (ValueError, RecursionError, OSError) as error:
-        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {why(error)}.") from error
+    document, _ = read_document(path, "model")
     if "base" not in document:
         return _gripper(path, kind)
     if document.get("schema", 1) != 1:

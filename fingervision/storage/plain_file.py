@@ -1,8 +1,12 @@
-"""Read input files; refuse pipes and devices, which could block for ever, and text that is not UTF-8."""
+"""Read input files: text in UTF-8, TOML and JSON; refuse pipes and devices, which could block for ever."""
 
 import codecs
 import errno
+import json
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NoReturn
 
 from fingervision.domain.errors import OutputError
 
@@ -59,6 +63,39 @@ def text_of(path: Path) -> str:
         line = content.count(b"\n", 0, error.start) + 1
         found = f"byte 0x{content[error.start]:02x} in line {line} belongs to another encoding"
         raise NotUtf8Error(f"{found}: {SAVE_AS_UTF8}") from error
+
+
+def toml_of(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file; the errors are those of `text_of`, and ValueError for other text than TOML."""
+    tables: dict[str, Any] = parsed(tomllib.loads, text_of(path))
+    return tables
+
+
+def json_of(path: Path) -> Any:
+    """Return the content of a JSON file; the errors are those of `text_of`, and ValueError for other text than JSON."""
+    return parsed(_json, text_of(path))
+
+
+def parsed(parser: Callable[[str], Any], text: str) -> Any:
+    """Parse a document; brackets nested more deeply than the parser can follow are an error of the text.
+
+    Raises
+    ------
+    ValueError
+        The text is not a document of this kind.
+    """
+    try:
+        return parser(text)
+    except RecursionError:
+        raise ValueError("its brackets are nested too deeply") from None
+
+
+def _json(text: str) -> Any:
+    return json.loads(text, parse_constant=_no_constant)
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is given where a number is needed")
 
 
 def why(error: Exception) -> str:

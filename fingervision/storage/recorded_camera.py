@@ -1,9 +1,9 @@
 """The camera's settings of a recorded run, from the run.json beside its video."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN
 
 
@@ -23,7 +23,7 @@ def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:
     if len(files) != 1:
         return {}
     try:
-        run = json.loads((files[0].parent / RUN).read_text(encoding="utf-8"))
+        run = json_of(files[0].parent / RUN)
         camera = run["device"]["camera"] if run["video"] == files[0].name else {}
     except (OSError, ValueError, LookupError, TypeError):
         return {}  # there is no run.json, or it belongs to something else

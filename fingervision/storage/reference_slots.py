@@ -1,9 +1,9 @@
 """Reference slots measured in a run on the test bed, from the run.json beside the run's table."""
 
-import json
 from pathlib import Path
 
 from fingervision.domain.reference_slot import ReferenceSlot
+from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN
 
 KEY = "reference_slots"
@@ -18,7 +18,7 @@ def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
         A table in a run folder, or any other table.
     """
     try:
-        about = json.loads((table.parent / RUN).read_text(encoding="utf-8"))
+        about = json_of(table.parent / RUN)
         names = (about["samples"], about.get("joined"))
         listed = about.get(KEY, []) if table.name in names else []
         return tuple(

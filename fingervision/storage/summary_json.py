@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import OutputError, UsageError
+from fingervision.storage.plain_file import json_of
 
 SUMMARY = "summary.json"
 GAPS = "gaps.csv"
@@ -48,7 +49,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 def recording_of(folder: Path) -> str | None:
     """Name of the recording to which the results in a folder belong; None without a summary."""
     try:
-        name = json.loads((folder / SUMMARY).read_bytes())["recording"]["name"]
+        name = json_of(folder / SUMMARY)["recording"]["name"]
     except (OSError, ValueError, LookupError, TypeError):
         return None
     return name if isinstance(name, str) else None
@@ -83,7 +84,7 @@ def measurement_beside(table: Path) -> Mapping[str, Any]:
     if table.name != GAPS:
         return {}
     try:
-        found = json.loads((table.parent / SUMMARY).read_bytes())
+        found = json_of(table.parent / SUMMARY)
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from fingervision.domain.errors import DataError, InputFileError
 from fingervision.storage.finite import is_number
-from fingervision.storage.plain_file import NotUtf8Error, text_of
+from fingervision.storage.plain_file import NotUtf8Error, parsed, text_of
 
 
 def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
@@ -35,14 +35,14 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
     """
     try:
         text = text_of(path)
-        return tomllib.loads(text), text
+        return parsed(tomllib.loads, text), text
     except FileNotFoundError:
         raise InputFileError(f"There is no {what} {path}.") from None
     except OSError as error:
         raise InputFileError(f"The {what} {path} could not be read ({error.strerror}).") from error
     except NotUtf8Error as error:
         raise DataError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
-    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
+    except ValueError as error:  # also numbers of thousands of digits
         raise DataError(f"{path} must be TOML, but is not: {error}.") from error
 
 

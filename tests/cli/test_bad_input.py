@@ -2,14 +2,16 @@
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import click
 import cv2
 import numpy as np
 import pytest
 
-from fingervision.cli import main
+from fingervision.cli import cli, main
+from fingervision.cli._number import Number
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import Ffv1, write_clip
@@ -65,6 +67,9 @@ FILES: dict[str, str | bytes] = {
     "still.toml": RECIPE + TRIANGLE % ("0", "1"),
     "endless.toml": RECIPE + TRIANGLE % ("1", "1000000000"),
     "deep.json": "[" * 5000,
+    "deep.toml": f"a = {'[' * 3000}{']' * 3000}\n",
+    "timed.csv": TABLE + "".join(f"{k},0.{k},4.{k}\n" for k in range(9)),
+    "own.py": "def simulate(time_s, input_mm):\n    return 4.0 + input_mm\n",
     "list.json": "[]",
     "null.json": '{"schema": 1, "px_per_mm": null}',
     "nan.json": '{"schema": 1, "px_per_mm": NaN}',
@@ -275,6 +280,14 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (("calibrate", "chessboard", "text.png", "--squares", "0x0", "--square-mm", "1", "-o", "x.json"), 1, "0x0"),
     (("effects", "magic"), 2, "magic"),
     (("nonsense",), 2, "nonsense"),
+    (("mesure", "c.mkv"), 2, "measure"),
+    (("model", "deep.toml"), 1, "nested"),
+    (diagnose("timed.csv", "deep.toml"), 1, "nested"),
+    (bed("deep.toml"), 1, "nested"),
+    (diagnose("timed.csv", "own.py:solve"), 2, "simulate"),
+    (("measure", "c.mkv", "--px-per-mm", "1,234"), 2, "1.234 or 1234"),
+    (("bed", "jog", "1", "--for-s", "-1,5"), 2, "greater than 0, but is -1.5"),
+    (("calibrate", "bar", "text.png=5,000"), 2, "5.0 or 5000"),
 ]
 
 
@@ -287,6 +300,49 @@ def test_bad_input_is_one_sentence_and_its_code(
     assert "Traceback" not in said
     assert said.strip().splitlines()[-1].startswith(("fingervision: ", "Error: "))
     assert found == code
+
+
+def test_numbers_with_a_comma_and_a_function_of_a_file_are_understood(refused: Refused) -> None:
+    code, said = refused("measure", "c.mkv", "--px-per-mm", "20,0", "--below-tip-mm", "0,3", "--out", "comma")
+    assert (code, said) == (0, "")
+    code, said = refused("compare", "timed.csv", "--model", "own.py:simulate", "--out", "compared")
+    assert (code, said) == (0, "")
+
+
+def _parameters(command: click.Command, context: click.Context) -> Iterator[click.Parameter]:
+    yield from command.params
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            inner = command.get_command(context, name)
+            assert inner is not None
+            yield from _parameters(inner, click.Context(inner))
+
+
+def test_every_decimal_number_of_every_command_is_read_by_the_same_type() -> None:
+    found = list(_parameters(cli, click.Context(cli)))
+    assert sum(isinstance(each.type, Number) for each in found) > 40
+    assert [each.name for each in found if type(each.type) in (type(click.FLOAT), click.FloatRange)] == []
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_an_unexpected_error_is_a_sentence_with_its_traceback_in_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], asked: bool
+) -> None:
+    def fail(**_: object) -> None:
+        raise LookupError("no such\x1b row")
+
+    monkeypatch.setattr("fingervision.cli.cli", fail)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    if asked:
+        monkeypatch.setenv("FINGERVISION_TRACEBACK", "1")
+    with pytest.raises(LookupError if asked else SystemExit):
+        main()
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    if not asked:
+        (kept,) = tmp_path.iterdir()
+        assert all(fact in said for fact in ("LookupError: no such\\x1b row", str(kept)))
+        assert "in fail" in kept.read_text()
 
 
 def test_a_link_that_leads_back_to_itself_is_a_sentence_wherever_it_is_met(

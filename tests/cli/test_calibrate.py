@@ -4,11 +4,13 @@ import json
 import re
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from calib.camera_response import standard_response
 from calib.limits import Limits
 from fingervision.cli._bench_limits import LIMITS
 from fingervision.cli.calibrate import command
@@ -168,6 +170,33 @@ def test_stated_defaults_are_those_of_the_budget() -> None:
 def test_every_command_has_an_example() -> None:
     for name in ("bar", "slot", "chessboard", "charuco", "check", "repeat"):
         assert f"fingervision calibrate {name}" in run(name, "--help").output
+
+
+@pytest.mark.parametrize("first", ["frame.png", "bar.mkv"])
+def test_a_video_is_a_picture_with_its_own_transfer_tag(tmp_path: Path, first: str) -> None:
+    scene = Scene(light=Light(220.0), behind=(Patch(bar(170.0, 600, x_px=320, y_px=240), 30.0),))
+    light = render(scene, Camera(blur_px=1.2), np.random.default_rng(3)) / 255.0
+    curve = standard_response("bt709")
+    levels = np.interp(light, curve.light, curve.level)
+    video, frame = tmp_path / "bar.mkv", save(tmp_path / "frame.png", np.round(255 * levels).astype(np.uint8))
+    with av.open(str(video), "w") as container:
+        stream = container.add_stream("ffv1", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 640, 480, "gray10le"
+        stream.codec_context.color_trc, stream.codec_context.color_range = 1, 2
+        stored = av.VideoFrame.from_ndarray(np.round(1023 * levels).astype(np.uint16), format="gray10le")
+        container.mux(stream.encode(stored))
+        container.mux(stream.encode())
+    out = tmp_path / "c.json"
+    result = run("bar", f"{tmp_path / first}=5", "-o", out, "--no-picture")
+    assert result.exit_code == 0, result.output
+    error_px = 5.0 * read_calibration(out).px_per_mm - 170.0
+    # A frame that was saved as PNG has lost the tag.
+    assert abs(error_px) < 0.03 if first == video.name else abs(error_px) > 0.5
+    assert run("bar", f"{video}=5", f"{frame}=5", "-o", out, "--no-picture").exit_code == 0
+    assert read_calibration(out).px_per_mm == pytest.approx(34.0, abs=0.01)
+    text = tmp_path / "text.mp4"
+    text.write_text("no video")
+    assert "text.mp4" in sentence_of(run("bar", f"{text}=5", "-o", out))
 
 
 def test_a_line_scale_from_the_command_line(tmp_path: Path) -> None:

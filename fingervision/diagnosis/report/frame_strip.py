@@ -3,7 +3,6 @@
 import base64
 import csv
 import hashlib
-import json
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.frames.source import open_source
+from fingervision.storage.plain_file import json_of
 from fingervision.storage.summary_json import SUMMARY
 
 MOST_FRAMES = 6
@@ -105,7 +105,7 @@ def turning_rows(table: Path) -> tuple[Turn, ...]:
 def _recording_of(table: Path) -> Path | None:
     """Path of the recording from which a gaps.csv was measured, identified by its hash; None if not found nearby."""
     try:
-        recording = json.loads((table.parent / SUMMARY).read_bytes())["recording"]
+        recording = json_of(table.parent / SUMMARY)["recording"]
         name, sha256 = recording["name"], recording["sha256"]
     except (OSError, ValueError, LookupError, TypeError):
         return None

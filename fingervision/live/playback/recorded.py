@@ -1,6 +1,5 @@
 """Open a recording or a run folder for playback, with the settings of its original measurement."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from fingervision.domain.region import Region
 from fingervision.frames.source import FrameSource, Wish, open_source
 from fingervision.live.choices import Choices
 from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN
 
 
@@ -88,7 +88,7 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
 
 def _about(folder: Path) -> dict[str, Any]:
     try:
-        about = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        about = json_of(folder / RUN)
     except (OSError, ValueError):
         return {}
     return about if isinstance(about, dict) else {}

@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 
 from fingervision.domain.errors import OutputError
 from fingervision.domain.recipe import Recipe
+from fingervision.storage.plain_file import json_of
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.run_files import EVENTS, RUN, VIDEO
 from fingervision.storage.samples_csv import SampleRow, read_samples, write_rows
@@ -84,7 +85,7 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
 
 def _about(path: Path) -> dict[str, Any]:
     try:
-        about: dict[str, Any] = json.loads((path / RUN).read_text(encoding="utf-8"))
+        about: dict[str, Any] = json_of(path / RUN)
         kind = about.get("kind")
     except (OSError, ValueError, AttributeError) as error:
         raise OutputError(f"{path / RUN} could not be read ({error}): name another folder with --out.") from error
