@@ -2,14 +2,16 @@
 
 import os
 import re
+import runpy
+import shutil
 import subprocess
 import sys
 import tarfile
 import tomllib
 import venv
 import zipfile
-from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -47,23 +49,69 @@ def test_the_changelog_is_kept_as_such() -> None:
     assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
 
 
+@pytest.mark.parametrize("repository", [None, "https://example.org/name/fingervision/"])
+def test_the_page_of_an_index_has_no_dead_link(repository: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The hooks alone, without hatchling.
+    for name, hook in (("builders.hooks", "BuildHookInterface"), ("metadata", "MetadataHookInterface")):
+        monkeypatch.setitem(sys.modules, f"hatchling.{name}.plugin.interface", SimpleNamespace(**{hook: object}))
+    hooks = runpy.run_path(str(ROOT / ".ci" / "hatch_build.py"))
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    page = hooks["index_page"](readme, repository, "1.2.3")
+    targets = re.findall(r"\]\(([^)]*)\)", page)
+    assert all(target.startswith("https://") for target in targets)
+    if repository is None:
+        assert "![" not in page
+        assert "The first tutorial explains" in page
+        return
+    assert len(targets) == len(re.findall(r"\]\(([^)]*)\)", readme))
+    assert f"({repository}raw/v1.2.3/sample_frames/opening/measured.png)" in page
+    assert f"({repository}blob/v1.2.3/CHANGELOG.md)" in page
+
+
+def other_pythons() -> list[str]:
+    """Every supported Python of this machine."""
+    versions = ("3.11", "3.12", "3.13", "3.14")
+    found = [str(path) for version in versions for path in Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
+    return found + [path for version in versions if (path := shutil.which(f"python{version}"))]
+
+
+LOAD = """
+import array, sys
+from importlib import machinery, util
+loader = machinery.ExtensionFileLoader("_loops", sys.argv[1])
+module = util.module_from_spec(util.spec_from_file_location("_loops", sys.argv[1], loader=loader))
+loader.exec_module(module)
+print(module.median_middle(array.array("d", [3.0, 1.0, 2.0])))
+try:
+    module.median_middle(array.array("f", [3.0]))
+except TypeError as error:
+    print(error)
+"""
+
+
 @pytest.mark.slow
-def test_wheel_and_sdist_are_whole_and_the_wheel_works_alone(tmp_path: Path) -> None:
-    pytest.importorskip("build")
-    pytest.importorskip("twine")
+def test_wheel_and_sdist_are_whole_and_the_wheel_works_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dist = tmp_path / "dist"
-    # The environment has what builds: without isolation nothing is fetched for it.
-    flags = ["--no-isolation"] if find_spec("hatchling") else []
-    run(sys.executable, "-m", "build", *flags, "--outdir", dist, ROOT, cwd=tmp_path)
+    if sys.platform == "linux":
+        monkeypatch.setenv("DIST", str(dist))
+        run(ROOT / ".ci" / "release", "linux_x86_64", cwd=tmp_path)
+    else:
+        pytest.importorskip("build")
+        run(sys.executable, "-m", "build", "--outdir", dist, ROOT, cwd=tmp_path)
     (wheel,) = dist.glob("*.whl")
     (sdist,) = dist.glob("*.tar.gz")
     # The loops in C are built for one kind of machine, for every Python from 3.11 on.
     assert wheel.name.startswith(f"fingervision-{__version__}-cp311-abi3-")
-    assert "PASSED" in run(sys.executable, "-m", "twine", "check", "--strict", wheel, sdist, cwd=tmp_path)
+    if sys.platform == "linux":
+        assert "manylinux_2_17_x86_64" in wheel.name
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
+        (library,) = (name for name in names if name.startswith("fingervision/domain/_loops-"))
+        archive.extract(library, tmp_path)
+    for python in (sys.executable, *other_pythons()):
+        answer = run(python, "-c", LOAD, tmp_path / library, cwd=tmp_path)
+        assert answer.startswith("2.0\nmedian_middle: argument 1"), python
     assert {name.split("/")[0] for name in names} == {"fingervision", "calib", f"fingervision-{__version__}.dist-info"}
-    assert any(name.startswith("fingervision/domain/_loops-") for name in names)
     for needed in ("fingervision/py.typed", "fingervision/live/page/index.html", "fingervision/testbed/simulated.toml"):
         assert needed in names
     with tarfile.open(sdist) as archive:
@@ -73,6 +121,7 @@ def test_wheel_and_sdist_are_whole_and_the_wheel_works_alone(tmp_path: Path) -> 
         "CHANGELOG.md",
         "CITATION.cff",
         "docs/index.md",
+        ".ci/release",
         "tests/test_house.py",
         "fingervision/domain/loops.h",
     ):

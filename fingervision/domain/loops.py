@@ -79,12 +79,14 @@ def _library() -> ModuleType:
 
 
 def _places() -> Iterator[Path]:
-    """Folders in which the compiled library may lie: the installation, that of the sources, or the user's cache."""
+    """Folders in which the compiled library may lie: the installation, a source tree's `build`, or the user's cache."""
     yield loops_build.PACKAGE / "domain"
-    yield loops_build.PACKAGE / "domain" / "__pycache__"
+    kind = loops_build.native_platform()
+    if (loops_build.PACKAGE.parent / "pyproject.toml").exists():
+        yield loops_build.SOURCE_BUILD / kind
     own = os.environ.get("LOCALAPPDATA") if sys.platform == "win32" else os.environ.get("XDG_CACHE_HOME")
     with suppress(RuntimeError):  # no home
-        yield Path(own or Path.home() / ".cache") / "fingervision"
+        yield Path(own or Path.home() / ".cache") / "fingervision" / kind
 
 
 def _forget_others(place: Path, name: str) -> None:

@@ -8,6 +8,7 @@ library, because an installation builds the loops before any dependency is insta
 import ast
 import hashlib
 import os
+import platform
 import re
 import shlex
 import shutil
@@ -20,12 +21,23 @@ from pathlib import Path
 from typing import TypeGuard
 
 PACKAGE = Path(__file__).resolve().parents[1]
+# Where a source tree keeps the libraries that it builds for itself.
+SOURCE_BUILD = PACKAGE.parent / "build" / "loops"
 HEADER, DOOR = "domain/loops.h", "domain/loops.c"
 PREPARE = re.compile(r"^PREPARE\((\w+)\)", re.MULTILINE)
 LOOP = re.compile(r'^LOOP\((\w+), "(\w*)", "(\w*)"\)', re.MULTILINE)
 # The compiler must not reorder sums, so that results are equal on all processors; only optimisations that change no
 # digit are allowed.
 FLAGS = ("-O3", "-std=c11", "-shared", "-fvisibility=hidden", "-fno-math-errno", "-ffp-contract=off", "-w")
+# Platforms for which wheels are made on any machine, and what zig calls them. glibc 2.17 (manylinux2014) and macOS 11
+# are no newer than those of the dependencies' wheels.
+MACHINES = {
+    "linux_x86_64": "x86_64-linux-gnu.2.17",
+    "linux_aarch64": "aarch64-linux-gnu.2.17",
+    "macosx_11_0_x86_64": "x86_64-macos.11.0",
+    "macosx_11_0_arm64": "aarch64-macos.11.0",
+    "win_amd64": "x86_64-windows-gnu",
+}
 Number = int | float
 Constant = Number | tuple["Constant", ...]
 
@@ -39,32 +51,44 @@ def loop_files() -> list[Path]:
     return [path for path in sorted(PACKAGE.rglob("*.c")) if path != PACKAGE / DOOR]
 
 
-def library_name() -> str:
-    """File name of the library for the present sources on this kind of machine."""
+def native_platform() -> str:
+    """Platform tag of a library that is compiled here.
+
+    A Python for two kinds of processor (universal2) compiles for the one that it runs on, and macOS 11 is asked for.
+    """
+    if sys.platform == "darwin":
+        return f"macosx_11_0_{platform.machine()}"
+    return re.sub(r"\W", "_", sysconfig.get_platform())
+
+
+def library_name(machine: str | None = None) -> str:
+    """File name of the library for the present sources; the same on all machines, apart from its suffix."""
     digest = hashlib.sha256(" ".join(FLAGS).encode())
     files = [PACKAGE / HEADER, PACKAGE / DOOR, Path(__file__)]
     for path in loop_files():
         files += [path, path.with_suffix(".py")] if path.with_suffix(".py").exists() else [path]
     for path in files:
         digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
-    kind = re.sub(r"\W", "_", sysconfig.get_platform())
-    return f"_loops-{digest.hexdigest()[:16]}-{kind}{'.pyd' if os.name == 'nt' else '.so'}"
+    is_windows = (machine or native_platform()).startswith("win")
+    return f"_loops-{digest.hexdigest()[:16]}.{'pyd' if is_windows else 'abi3.so'}"
 
 
-def build(target: Path) -> None:
+def build(target: Path, machine: str | None = None) -> None:
     """Compile all loops into one library.
 
     Parameters
     ----------
     target : Path
         Path of the library to create; the folder must exist.
+    machine : str, optional
+        One of `MACHINES`, for which zig compiles; by default this machine, with its own compiler.
 
     Raises
     ------
     CannotBuildError
         If there is no C compiler, or it failed.
     """
-    command = compiler()
+    command = compiler(machine)
     if command is None:
         msg = (
             "The loops in C are not built yet, and no C compiler was found (cc, gcc, clang, or the one that the "
@@ -75,37 +99,52 @@ def build(target: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
         source = Path(name) / "loops.c"
         source.write_text(one_source(), encoding="utf-8")
+        links = _links(command, machine or native_platform(), Path(name))
         # The library is built beside the target and then renamed, so that it appears complete: another process may
         # build it at the same time.
         made = Path(tempfile.mkdtemp(dir=target.parent)) / "made"
         try:
-            done = subprocess.run(
-                [*command, *FLAGS, str(source), "-o", str(made), *_links()], capture_output=True, text=True, check=False
-            )
-            if done.returncode != 0:
-                msg = f"The C compiler ({shlex.join(command)}) failed on the loops in C:\n{done.stderr[-2000:]}"
-                raise CannotBuildError(msg)
+            _run([*command, *FLAGS, str(source), "-o", str(made), *links])
             made.replace(target)
         finally:
             shutil.rmtree(made.parent, ignore_errors=True)
 
 
-def compiler() -> list[str] | None:
-    """Command of a C compiler; None if no compiler is installed."""
-    chosen = os.environ.get("CC")
-    if chosen:
-        return shlex.split(chosen)
-    for name in ("cc", "gcc", "clang"):
-        if found := shutil.which(name):
-            return [found]
-    return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None
+def _run(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        msg = f"The C compiler ({shlex.join(command)}) failed on the loops in C:\n{done.stderr[-2000:]}"
+        raise CannotBuildError(msg)
 
 
-def _links() -> list[str]:
+def compiler(machine: str | None = None) -> list[str] | None:
+    """Command of a C compiler for a machine of `MACHINES`, or for this one; None if no compiler is installed."""
+    if machine is None:
+        chosen = shlex.split(os.environ.get("CC", ""))
+        chosen = chosen or [found for name in ("cc", "gcc", "clang") if (found := shutil.which(name))][:1]
+        if chosen:
+            one_processor = ["-arch", platform.machine(), "-mmacosx-version-min=11.0"]
+            return [*chosen, *one_processor] if sys.platform == "darwin" else chosen
+    if find_spec("ziglang") is None:
+        return None
+    name = MACHINES.get(machine or native_platform())
+    # Without a target zig would use every instruction of the processor at hand.
+    return [sys.executable, "-m", "ziglang", "cc", "-s", *(["-target", name] if name else ["-mcpu=baseline"])]
+
+
+def _links(command: list[str], machine: str, folder: Path) -> list[str]:
     """Linker options by which the compiled loops find the functions of Python and of the C library."""
-    if sys.platform == "win32":
+    if not machine.startswith("win"):
+        return ["-fPIC", "-undefined", "dynamic_lookup"] if machine.startswith("mac") else ["-fPIC", "-lm"]
+    if "ziglang" not in command:
         return [f"-L{Path(sys.base_prefix) / 'libs'}", "-lpython3"]
-    return ["-fPIC", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-fPIC", "-lm"]
+    # What a Python for Windows has in `libs`, made from the functions that are declared.
+    names = re.findall(r"^FROM_PYTHON .*?\b(Py\w*_\w+)", (PACKAGE / DOOR).read_text(encoding="utf-8"), re.MULTILINE)
+    lines = ["LIBRARY python3.dll", "EXPORTS", *(f"{name} DATA" if "PyExc" in name else name for name in names)]
+    (folder / "python3.def").write_text("\n".join(lines), encoding="utf-8")
+    files = ["-d", str(folder / "python3.def"), "-l", str(folder / "libpython3.a")]
+    _run([*command[: command.index("cc")], "dlltool", "-m", "i386:x86-64", *files])
+    return [f"-L{folder}", "-lpython3"]
 
 
 def one_source() -> str:

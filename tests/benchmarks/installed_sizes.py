@@ -73,9 +73,7 @@ def size_mb(found: Distribution) -> tuple[float, float]:
 def own_mb() -> tuple[float, float]:
     """The project's own two packages, as a wheel holds them, and the library of its loops."""
     files = [path for part in ("fingervision", "calib") for path in (TOP / part).rglob("*") if path.is_file()]
-    libraries = sorted(
-        (path for path in files if path.name.startswith("_loops-")), key=lambda path: path.stat().st_mtime
-    )
+    libraries = sorted((TOP / "build" / "loops").rglob("_loops-*"), key=lambda path: path.stat().st_mtime)
     own = [path for path in files if "__pycache__" not in path.parts] + libraries[-1:]
     return sum(path.stat().st_size for path in own) / MB, 0.0
 

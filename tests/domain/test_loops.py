@@ -1,6 +1,7 @@
 """The loops in C: built once and found again, refused where they cannot be, and fed with nothing but what they take."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -48,9 +49,11 @@ def _built(folder: Path) -> list[Path]:
 
 
 def test_it_is_built_once_and_anew_when_a_source_has_changed(copied: Path) -> None:
+    (copied / "pyproject.toml").touch()
     assert _use(copied).stdout == "2.0\n"
     (first,) = _built(copied)
     assert _use(copied, CC="no-such-compiler").stdout == "2.0\n"
+    assert first.parents[1] == copied / "build" / "loops"
     source = copied / "fingervision" / "domain" / "median.c"
     source.write_text(source.read_text().replace("wanted = n / 2", "wanted = 0"))
     assert _use(copied).stdout == "1.0\n"
@@ -59,11 +62,14 @@ def test_it_is_built_once_and_anew_when_a_source_has_changed(copied: Path) -> No
 
 
 def test_where_the_package_cannot_be_written_to_it_is_kept_in_the_users_cache(copied: Path) -> None:
+    (copied / "pyproject.toml").write_text("")
     # A file stands where the folder would be: root could write to any folder.
-    (copied / "fingervision" / "domain" / "__pycache__").write_text("")
+    (copied / "build").write_text("")
     assert _use(copied).stdout == "2.0\n"
-    assert [path.parent for path in _built(copied)] == [copied / "cache" / "fingervision"]
+    assert [path.parents[1] for path in _built(copied)] == [copied / "cache" / "fingervision"]
     (copied / "none").write_text("")
+    (copied / "pyproject.toml").unlink()
+    shutil.rmtree(copied / "cache")
     done = _use(copied, XDG_CACHE_HOME=str(copied / "none"))
     assert "can be written to" in done.stderr
 
