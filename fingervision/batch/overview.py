@@ -14,6 +14,7 @@ from fingervision.batch.reduction import Reduction, reduction_of
 from fingervision.batch.result_folder import replace_text
 from fingervision.batch.small_picture import small_picture
 from fingervision.batch.task import Outcome
+from fingervision.storage.durable import replaced
 
 TABLE, FIGURE, PAGE = "batch.csv", "batch.png", "index.html"
 FIRST_COLUMNS = ("input", "result", "exit_code", "words")
@@ -76,12 +77,8 @@ def _draw(path: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> None
 
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
     reduction.draw(figure, outcomes)
-    part = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
-    try:
+    with replaced(path, unique=f".{uuid4().hex[:8]}") as part:
         figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _page(out: Path, command: str, outcomes: Sequence[Outcome]) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from fingervision.batch.digest import Digest
+from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import json_of
 
 RECORD = "record.json"
@@ -143,14 +144,8 @@ def replace_text(path: Path, text: str) -> None:
     OSError
         The file cannot be written; its earlier version is kept.
     """
-    part = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
-    try:
+    with replaced(path, unique=f".{uuid4().hex[:8]}") as part:
         part.write_text(text, encoding="utf-8", errors="surrogateescape")
-        part.replace(path)
-    except OSError:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise
 
 
 def new_part(folder: Path) -> Path:

@@ -13,6 +13,7 @@ from fingervision.domain.errors import OutputError
 from fingervision.domain.status import Status
 from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.series import GapSeries
+from fingervision.storage.durable import replaced
 
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
 # Largest number of points that can be distinguished in the figure; with more points, each column shows its range.
@@ -35,12 +36,10 @@ def draw_gap(
         If the picture cannot be written.
     """
     figure = gap_figure(series, drive, clock)
-    part = path.with_name(f".{path.name}.part")
     try:
-        figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
-        part.replace(path)
+        with replaced(path) as part:
+            figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise OutputError(
             f"{path} could not be written ({error.strerror}): free disk space or name another folder with "
             "--out, and measure again."

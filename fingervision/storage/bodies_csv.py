@@ -4,12 +4,12 @@ The same quantities can also be added to gaps.csv as columns.
 """
 
 import csv
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fingervision.domain.body_poses import OK, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
+from fingervision.storage.durable import replaced
 
 COLUMNS = (
     "frame", "time_s", "body", "status", "x_mm", "y_mm", "angle_mrad", "u_x_mm", "u_y_mm", "u_angle_mrad",
@@ -82,12 +82,10 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
         own = seen[int(row[at])]
         cells = {name: dict(zip(PARTS, _pairs(own[name]), strict=True)) for name in names if name in own}
         lines.append([*row, *(cells[name][part][k] for k in range(len(prefixes)) for name, part in wanted)])
-    partial = gaps.with_suffix(".part")
-    with partial.open("w", encoding="utf-8", newline="") as file:
+    with replaced(gaps) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(lines)
-    os.replace(partial, gaps)  # noqa: PTH105 - atomic on every system
 
 
 def _pairs(pose: SeenPose) -> list[tuple[str, ...]]:

@@ -10,6 +10,7 @@ from calib.limits import Limits
 from calib.measured_scale import Calibration
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.calibration_reader import SCHEMA, CalibrationReader
+from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import json_of
 
 
@@ -60,10 +61,9 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         "made_at": calibration.made_at,
         "software": calibration.software,
     }
-    temporary = path.with_name(f".{path.name}.part")
     try:
-        temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        temporary.replace(path)
+        with replaced(path) as part:
+            part.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     except OSError as error:
         raise OutputError(
             f"The calibration could not be written to {path}: {error.strerror}; name another place with -o."

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from fingervision.domain.errors import OutputError
 from fingervision.domain.status import Status
+from fingervision.storage.durable import replaced
 from fingervision.storage.line_file import LineFile, cell, quoted
 
 COLUMNS = (
@@ -182,10 +183,13 @@ def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force
     OutputError
         The table cannot be read, or its new version cannot be written; the old table is kept.
     """
-    part = path.with_name(f".{path.name}.part")
     columns = 3 if has_force else 2
     try:
-        with path.open(encoding="utf-8", newline="") as old, part.open("w", encoding="utf-8", newline="") as new:
+        with (
+            replaced(path) as part,
+            path.open(encoding="utf-8", newline="") as old,
+            part.open("w", encoding="utf-8", newline="") as new,
+        ):
             new.write(next(old))
             for line in old:
                 cells = next(csv.reader([line]))
@@ -196,9 +200,7 @@ def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force
                 drive = [quoted(found.run), cell(found.input_mm, MM_PLACES), cell(found.force_n, FORCE_PLACES)]
                 kept = line.rstrip("\r\n").rsplit(",", columns)[0]
                 new.write(",".join([kept, *drive[:columns]]) + "\n")
-        part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise OutputError(
             f"The drive's inputs could not be added to {path} ({error.strerror}); the file holds the gaps only: free "
             "disk space and measure again."

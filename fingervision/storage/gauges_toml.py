@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from fingervision.domain.errors import DataError, InputFileError, OutputError
+from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import NotUtf8Error, plain
 from fingervision.storage.plain_file import text_of as file_text
 
@@ -100,14 +100,11 @@ def write_gauges_text(path: Path, text: str) -> None:
     OutputError
         The file cannot be written; its earlier version is kept.
     """
-    part = path.with_name(f".{path.name}.part")
     try:
         plain(path).parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        with replaced(path) as part:
+            part.write_text(text, encoding="utf-8")
     except OSError as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
         raise OutputError(
             f"{path} could not be written ({error.strerror}); the gauges are not lost: free disk space, and save again."
         ) from error

@@ -7,16 +7,13 @@ from pathlib import Path
 from time import monotonic
 
 from fingervision.domain.errors import OutputError
-
-# Longest time (s) for which a complete line waits in memory. A row may wait as long again before its line is added, so
-# that at most one second is lost when the program is killed.
-FLUSH_EVERY_S = 0.5
+from fingervision.storage.durable import FLUSH_EVERY_S, flush, flush_open
 
 
 class LineFile:
     """Appends lines to a text file.
 
-    Complete lines are written to the file at least every second. If the disk is full, the file is truncated after its
+    Complete lines are on the disk within a second. If the disk is full, the file is truncated after its
     last complete line.
 
     Parameters
@@ -47,6 +44,8 @@ class LineFile:
         if not go_on:
             self._pending.append(header)
         self._write()
+        with suppress(OSError):  # /dev has no entries to flush
+            flush(path.parent)
 
     def add(self, lines: Sequence[str]) -> None:
         """Add lines, in order."""
@@ -73,6 +72,7 @@ class LineFile:
         try:
             while written < len(block):
                 written += os.write(self._file.fileno(), block[written:])
+            flush_open(self._file.fileno())
         except OSError as error:
             # An incomplete line is removed.
             self._whole_bytes += block[:written].rfind(b"\n") + 1

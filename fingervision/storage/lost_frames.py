@@ -12,6 +12,7 @@ from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.storage.csv_columns import number, read_columns
+from fingervision.storage.durable import Flushing, flush
 from fingervision.storage.gaps_csv import TIME_PLACES
 from fingervision.storage.line_file import cell, quoted
 from fingervision.storage.plain_file import json_of
@@ -36,7 +37,7 @@ class LostFrames:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self._path, self._flushing = path, Flushing(path)
         try:
             self._file = path.open("w", encoding="utf-8", buffering=1)
             self._file.write(f"{HEADER}\n")
@@ -47,6 +48,7 @@ class LostFrames:
         """Add a lost frame with its time in the recording (s)."""
         try:
             self._file.write(f"{cell(time_s, TIME_PLACES)},{lost.status.value},{quoted(lost.words)}\n")
+            self._flushing.when_due()
         except OSError as error:
             raise self._failed(error) from error
 
@@ -54,6 +56,7 @@ class LostFrames:
         """Close the file."""
         try:
             self._file.close()
+            flush(self._path)
         except OSError as error:
             raise self._failed(error) from error
 

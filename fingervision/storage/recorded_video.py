@@ -12,6 +12,7 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.missing_references import OWN_RECORDING
 from fingervision.frames.open_container import open_container
 from fingervision.frames.received import OwnPacket
+from fingervision.storage.durable import Flushing, flush
 from fingervision.vision.grey import to_grey
 
 # All times in the recording are multiples of 1 / TICKS_PER_S seconds.
@@ -49,6 +50,7 @@ class RecordedVideo:
     def __init__(self, path: Path, template: av.VideoStream | None, keep: int = 0) -> None:
         self._path = path
         self._template = template
+        self._flushing = Flushing(path)
         self._stream: Any = None
         self._first_s: float | None = None
         self._last_tick = -1
@@ -58,6 +60,7 @@ class RecordedVideo:
             self._container.metadata["comment"] = OWN_RECORDING
             if keep:
                 self._keep(keep)
+                flush(place)
                 place.replace(path)
         except (av.FFmpegError, OSError) as error:
             raise self._failed(error) from error
@@ -91,6 +94,7 @@ class RecordedVideo:
                 self._encode(item, tick)
             else:
                 return None
+            self._flushing.when_due()
         except (av.FFmpegError, OSError, ValueError) as error:
             raise self._failed(error) from error
         return tick / TICKS_PER_S
@@ -107,6 +111,8 @@ class RecordedVideo:
             if self._stream is not None and self._template is None:
                 self._container.mux(self._stream.encode(None))
             self._container.close()
+            if self._path.exists():  # a run without frames has no video
+                flush(self._path)
         except (av.FFmpegError, OSError) as error:
             raise self._failed(error) from error
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import FingervisionError, OutputError
+from fingervision.storage.durable import flush_open, replaced
 
 RUN, VIDEO, EVENTS, CALIBRATION = "run.json", "video.mp4", "events.jsonl", "calibration.json"
 SCHEMA = 1
@@ -35,10 +36,9 @@ class RunFiles:
 
     def write_about(self, about: Mapping[str, Any], *, complete: bool) -> None:
         """Write run.json; an older file is replaced only once the new file is complete."""
-        part = self.path / f".{RUN}.part"
         try:
-            part.write_text(json.dumps({**about, "complete": complete}, indent=2) + "\n", encoding="utf-8")
-            part.replace(self.path / RUN)
+            with replaced(self.path / RUN) as part:
+                part.write_text(json.dumps({**about, "complete": complete}, indent=2) + "\n", encoding="utf-8")
         except OSError as error:
             raise self.failed(error) from error
 
@@ -46,6 +46,7 @@ class RunFiles:
         """Append an event to events.jsonl."""
         try:
             self._events.write(json.dumps(line, ensure_ascii=False) + "\n")
+            flush_open(self._events.fileno())
         except OSError as error:
             raise self.failed(error) from error
 

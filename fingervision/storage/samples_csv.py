@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
+from fingervision.storage.durable import replaced
 from fingervision.storage.line_file import LineFile, cell, quoted
 from fingervision.storage.plain_file import plain
 
@@ -137,9 +138,8 @@ def read_samples(path: Path) -> list[SampleRow]:
 
 def write_rows(path: Path, rows: Sequence[SampleRow]) -> None:
     """Replace the table by the given rows; the file on disk is complete at any time."""
-    part = path.with_name(f".{path.name}.part")
-    part.write_text("\n".join((COLUMNS, *(row.line() for row in rows))) + "\n", encoding="utf-8")
-    part.replace(path)
+    with replaced(path) as part:
+        part.write_text("\n".join((COLUMNS, *(row.line() for row in rows))) + "\n", encoding="utf-8")
 
 
 def _row(cells: list[str]) -> SampleRow:

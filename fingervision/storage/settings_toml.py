@@ -8,6 +8,7 @@ from typing import Any
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import OutputError
+from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.toml_section import Section, read_document
 
@@ -102,10 +103,10 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     camera = {key: value for key, value in (settings.get("camera") or {}).items() if value is not None}
     if camera:
         lines += ["", "[camera]", *(f"{key} = {json.dumps(value)}" for key, value in camera.items())]
-    part, text = path.with_name(f".{path.name}.part"), in_utf8(path, "\n".join(lines) + "\n")
+    text = in_utf8(path, "\n".join(lines) + "\n")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        with replaced(path) as part:
+            part.write_text(text, encoding="utf-8")
     except OSError as error:
         raise OutputError(f"{path} could not be written ({error.strerror}): free disk space.") from error

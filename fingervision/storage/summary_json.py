@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import OutputError, UsageError
+from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import json_of
 
 SUMMARY = "summary.json"
@@ -28,13 +29,11 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
     OutputError
         The file cannot be written.
     """
-    part = path.with_name(f".{path.name}.part")
     try:
-        # A file name that is not valid UTF-8 is written with JSON escapes.
-        part.write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
-        part.replace(path)
+        with replaced(path) as part:
+            # A file name that is not valid UTF-8 is written with JSON escapes.
+            part.write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise OutputError(
             f"{path} could not be written ({error.strerror}): free disk space or name another folder with "
             "--out, and measure again."

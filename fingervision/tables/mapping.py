@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import DataError, OutputError
+from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.toml_section import Section, read_document
 
@@ -207,9 +208,8 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
         if block.strip("\n") in parts:
             return False
         after = "\n\n".join([*kept, block])
-        part_file = path.with_name(f".{path.name}.part")
-        part_file.write_text(after, encoding="utf-8")
-        part_file.replace(path)
+        with replaced(path) as part:
+            part.write_text(after, encoding="utf-8")
     except OSError as error:
         raise OutputError(
             f"{path} could not be written ({error.strerror}): name another file with --out, and give it to --columns."

@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fingervision.domain.errors import OutputError
+from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import read_samples
+from fingervision.testbed.run.resume_state import remains
 from tests.testbed.simulated_beds import recipe_at, run, steps
 
 PACE = ("--real-time",)
@@ -75,6 +78,15 @@ def test_half_a_row_and_half_an_event_are_cut_off(tmp_path: Path, whole: bytes) 
     (folder / "run.json").write_text(json.dumps({**about, "complete": False}))
     assert run(tmp_path).resumed_after == 11
     assert (folder / "samples.csv").read_bytes() == whole
+
+
+def test_empty_files_after_a_power_failure_are_removed(tmp_path: Path) -> None:
+    names = ("run.json", "video.mp4", "samples.csv", "events.jsonl", ".run.json.part")
+    for name in (*names, "notes.txt"):
+        (tmp_path / name).touch()
+    with pytest.raises(OutputError, match=r"notes\.txt"):
+        remains(tmp_path, read_recipe(recipe_at(tmp_path.parent)), "")
+    assert [each.name for each in tmp_path.iterdir()] == ["notes.txt"]
 
 
 def test_ctrl_c_ends_a_run_in_a_sentence(tmp_path: Path) -> None:

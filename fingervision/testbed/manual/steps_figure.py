@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from fingervision.domain.errors import OutputError
 from fingervision.domain.step_data import Operation
+from fingervision.storage.durable import replaced
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.motion.step_checks import PlannedMotion
 
@@ -46,12 +47,10 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
             lower.axhline(level_mm_s, color=LIMIT_COLOUR, linewidth=0.8, linestyle="--")
     for axes in (upper, lower):
         axes.grid(visible=True, alpha=0.3)
-    part = path.with_name(f".{path.name}.part")
     try:
-        figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
-        part.replace(path)
+        with replaced(path) as part:
+            figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise OutputError(f"The plot {path} could not be written ({error.strerror}).") from error
 
 

@@ -8,12 +8,13 @@ from typing import Any, NoReturn
 
 from fingervision.domain.errors import OutputError
 from fingervision.domain.recipe import Recipe
+from fingervision.storage.durable import remove_empty
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.recorded_video import frames_in
-from fingervision.storage.run_files import EVENTS, RUN, VIDEO
+from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, VIDEO
 from fingervision.storage.samples_csv import SampleRow, read_samples, write_rows
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.run.run_metadata import KIND, SAMPLES
+from fingervision.testbed.run.run_metadata import KIND, RECIPE, SAMPLES, SIMULATION
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +49,15 @@ def refuse_others(path: Path, held: str) -> NoReturn:
 def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
     """Find the interrupted run of this recipe on this test bed; None if there is nothing to continue.
 
-    The table is truncated to the rows whose pictures are in the video, and the file of events to complete lines.
+    Empty files are removed. The table is truncated to the rows whose pictures are in the video, and the file of events
+    to complete lines.
 
     Raises
     ------
     DataError, OutputError
         The folder contains other files, a finished run, or a run of another recipe or test bed.
     """
+    remove_empty(path, (RUN, RECIPE, CALIBRATION, SIMULATION, VIDEO, SAMPLES, EVENTS))
     held = contents(path)
     if not held:
         return None

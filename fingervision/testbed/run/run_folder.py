@@ -73,12 +73,13 @@ class BedRunFolder:
             self._about = about_run(recipe, bed, hidden, self.began_at)
             self._files = RunFiles(path)
             self._files.write_about(self._about, complete=False)
-            if not earlier:
+            kept = {name for name in (RECIPE, CALIBRATION, SIMULATION) if earlier and (path / name).exists()}
+            if RECIPE not in kept:
                 (path / RECIPE).write_text(recipe.text, encoding="utf-8")
-                if isinstance(bed.scale, Calibration):
-                    write_calibration(bed.scale, path / CALIBRATION)
-                if bed.model is not None:
-                    write_expected(path / SIMULATION, bed.model, bed.limits)
+            if isinstance(bed.scale, Calibration) and CALIBRATION not in kept:
+                write_calibration(bed.scale, path / CALIBRATION)
+            if bed.model is not None and SIMULATION not in kept:
+                write_expected(path / SIMULATION, bed.model, bed.limits)
             self._samples = SamplesCsv(path / SAMPLES, go_on=bool(self.rows))
             self._video = RecordedVideo(path / VIDEO, None, keep=len(self.rows))
         except FingervisionError:
