@@ -69,10 +69,11 @@ def test_the_page_of_an_index_has_no_dead_link(repository: str | None, monkeypat
 
 
 def other_pythons() -> list[str]:
-    """Every supported Python of this machine."""
+    """Every supported Python of this machine that starts: pyenv also puts names of inactive ones on the path."""
     versions = ("3.11", "3.12", "3.13", "3.14")
     found = [str(path) for version in versions for path in Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
-    return found + [path for version in versions if (path := shutil.which(f"python{version}"))]
+    found += [path for version in versions if (path := shutil.which(f"python{version}"))]
+    return [one for one in found if subprocess.run([one, "-c", ""], capture_output=True, check=False).returncode == 0]
 
 
 LOAD = """
