@@ -13,6 +13,7 @@ from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
+from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.marked import marked
 from fingervision.measuring.one_polarity import one_polarity
@@ -153,12 +154,16 @@ def _outcomes(
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
     pictures = SoundPictures()
-    with closing(decoded_ahead(source)) as frames:
+
+    def judged(frames: Iterable[Frame | LostFrame]) -> Iterator[Judged]:
         for item, outcome in one_polarity(coded(frames, coding), settings, votes, is_stopped):
             if isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
                 yield item, outcome
             else:
                 yield item, pictures.judged(item, outcome)
+
+    with closing(decoded_ahead(source)) as frames:
+        yield from in_sequence(judged(frames))
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:

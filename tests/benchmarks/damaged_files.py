@@ -43,7 +43,7 @@ MJPEG = ("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"})
 H264 = ("libx264", "yuv420p", {"crf": "18", "g": "25"})
 HEVC = ("libx265", "yuv420p", {"crf": "18", "x265-params": "keyint=25:log-level=none"})
 MPEG4 = ("mpeg4", "yuv420p", {"qmin": "3", "qmax": "3", "g": "25", "bf": "0"})
-REALTIME = {"g": "25", "b": "2M", "deadline": "realtime", "cpu-used": "8"}
+REALTIME = {"g": "25", "b": "2M", "deadline": "realtime", "cpu-used": "-8", "threads": "1"}
 KINDS = {
     "ffv1.mkv": FFV1,
     "ffv1.avi": FFV1,

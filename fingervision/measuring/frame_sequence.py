@@ -1,0 +1,257 @@
+"""Refuse the measurement of a frame that the frames before and after it contradict.
+
+A finger is a body: between two frames it moves, rotates and bends a little, at any speed, but it keeps its width and
+its outline. Wrong content in a picture (a page of memory that was not written again, a lost packet that no checksum
+covers, an object that passes) has other outlines. A jump of the measuring points alone proves nothing, because stages
+make steps and springs vibrate; nor does another outline alone, because parts come and go. A measurement is refused if
+its measuring points jump, the fingers there have not the outlines that they have in the last frame, and the next frames
+do not confirm the change.
+
+Method: the outlines of a finger are followed from the measuring point towards its root, on the inner and on the outer
+side, as the places where the grey level passes through that of the measured edge. Relative to the measuring point, and
+apart from a rotation, they must agree between two frames. Symmetric blur from motion or defocus, and a change of the
+light, leave these places where they are.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
+from fingervision.domain.status import Status
+from fingervision.vision.grey import to_grey
+
+Outcome = GapMeasurement | NoGap | LostFrame
+Judged = tuple[Frame | LostFrame, Outcome]
+Floats = NDArray[np.float64]
+
+# Number of successive frames with a gap that may all be unlike one another: more of them are no faults, but fingers
+# that cannot be compared. Number of frames, with those without a gap, that may wait for one that confirms or refutes.
+MOST_UNLIKE, MOST_WAITING = 4, 12
+# Coverage factor and least size (pixels) of a jump, in the position of an edge or a tip.
+JUMP_U, LEAST_JUMP_PX = 3.0, 0.05
+# Height of the bands of rows in which the outlines are compared; number of bands from the measuring point towards the
+# root, and beyond the tip; and change of the share of finger-like pixels there that is no noise.
+BAND_PX, BELOW, BEYOND, COVERED_SHARE = 8, 12, 6, 0.2
+# Permitted difference between the outlines of one finger in two frames: for coarse coding (pixels), and for bending, as
+# a share of the finger's displacement, up to a limit (pixels).
+CODED_PX, BENT_SHARE, MOST_BENT_PX = 0.2, 0.1, 1.0
+# Distance (pixels) within which the outline in a band is searched from that in the band before.
+SEARCH_PX = 40
+# Largest share of the bands that may differ, because a part between the fingers may hide most of the inner sides; and
+# least number of bands for a judgement.
+MOST_DIFFERENT, FEWEST_BANDS = 0.4, 4
+# A finger is torn if this number of bands have its width (within a share), but stand elsewhere.
+FEWEST_TORN, SAME_WIDTH = 2, 0.1
+
+WORDS = (
+    "The fingers would have jumped in this frame alone, and their outlines are not those of the frames before and "
+    "after it: the picture is damaged, or something passed in front of the fingers."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """A frame with its gap."""
+
+    frame: Frame
+    gap: GapMeasurement
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Look:
+    """How a finger looks in a frame.
+
+    Parameters
+    ----------
+    sides_px : ndarray, shape (2, bands)
+        Inner and outer side relative to the measuring point, in bands from there towards the root; NaN where unseen.
+    beyond : ndarray, shape (bands beyond the tip,)
+        Share of the pixels straight beyond the tip that look like the finger, in bands from the tip outwards.
+    """
+
+    sides_px: Floats
+    beyond: Floats
+
+
+class FrameSequence:
+    """Judges the frames of one recording in order; at most `MOST_WAITING` frames wait for those behind them."""
+
+    def __init__(self) -> None:
+        self._sound: list[_Seen] = []
+        self._waiting: list[Judged] = []
+
+    def add(self, item: Frame | LostFrame, outcome: Outcome) -> list[Judged]:
+        """Take the next frame with its result, and return the frames on which the judgement is complete."""
+        self._waiting.append((item, outcome))
+        suspects = self._suspects()
+        if not suspects:
+            return self._released(None)
+        now = suspects[-1]
+        if item is now.frame:
+            if self._sound and (not _jumps(self._sound, now) or _is_alike(self._sound[-1], now)):
+                return self._released(now)
+            if len(suspects) > 1 and _is_alike(suspects[-2], now):
+                return self._released(now)
+            if len(suspects) > MOST_UNLIKE:
+                return self._released(None)
+        return self.finish() if len(self._waiting) > MOST_WAITING else []
+
+    def finish(self) -> list[Judged]:
+        """Return the frames that wait, judged by the last sound frame, because no frame behind them can."""
+        return self._released(self._sound[-1] if self._sound else None)
+
+    def _suspects(self) -> list[_Seen]:
+        # Pictures without times are not known to be successive.
+        return [
+            _Seen(item, outcome)
+            for item, outcome in self._waiting
+            if isinstance(item, Frame) and isinstance(outcome, GapMeasurement) and item.time_s is not None
+        ]
+
+    def _released(self, judge: _Seen | None) -> list[Judged]:
+        """Return the frames that wait, and refuse those unlike the judge; without one, none is refused."""
+        suspects = self._suspects()
+        sound = [one for one in suspects if judge is None or one.frame is judge.frame or _is_alike(judge, one)]
+        refused = {one.frame.index for one in suspects} - {one.frame.index for one in sound}
+        waiting, self._waiting = self._waiting, []
+        self._sound = (self._sound + sound)[-2:]
+        return [
+            (item, LostFrame(item.index, item.time_s, Status.DAMAGED, WORDS) if item.index in refused else outcome)
+            for item, outcome in waiting
+        ]
+
+
+def in_sequence(judged: Iterable[Judged]) -> Iterator[Judged]:
+    """Yield the frames of a recording in order, after they have been compared with those before and after them."""
+    sequence = FrameSequence()
+    for item, outcome in judged:
+        yield from sequence.add(item, outcome)
+    yield from sequence.finish()
+
+
+def _jumps(sound: list[_Seen], now: _Seen) -> bool:
+    """Whether a finger is not where the motion in the last two frames leads it."""
+    last, before = sound[-1], sound[-2] if len(sound) > 1 else sound[-1]
+    (here, u), (there, u_there), (earlier, u_earlier) = (_positions(each.gap) for each in (now, last, before))
+    gone, steps = last.frame.index - before.frame.index, now.frame.index - last.frame.index
+    share = steps / gone if gone else 0.0
+    u_all = np.sqrt(u**2 + ((1.0 + share) * u_there) ** 2 + (share * u_earlier) ** 2)
+    beyond = np.abs(here - there - share * (there - earlier))
+    return now.gap.direction is not last.gap.direction or bool(np.any(beyond > JUMP_U * u_all + LEAST_JUMP_PX))
+
+
+def _positions(gap: GapMeasurement) -> tuple[Floats, Floats]:
+    """Edge and tip of both fingers (pixels), with their standard uncertainties."""
+    sides = (gap.left, gap.right)
+    across = [side.x_px if gap.direction.is_vertical else side.y_px for side in sides]
+    return (
+        np.array([*across, *(side.tip_px for side in sides)]),
+        np.array([*(side.u_across_px for side in sides), *(side.u_tip_px for side in sides)]),
+    )
+
+
+def _is_alike(first: _Seen, second: _Seen) -> bool:
+    """Whether both fingers have the same outlines in two frames, as far as these can be followed."""
+    if first.gap.direction is not second.gap.direction or first.frame.pixels.shape != second.frame.pixels.shape:
+        return False
+    moved = np.abs(_positions(first.gap)[0] - _positions(second.gap)[0])
+    pairs = zip(_fingers(first), _fingers(second), strict=True)
+    for number, (one, other) in enumerate(pairs):
+        u_px = float(np.hypot(one.u_across_px, other.u_across_px))
+        bent_px = min(MOST_BENT_PX, BENT_SHARE * float(moved[[number, number + 2]].max()))
+        looks = (_look(first, one, number == 0), _look(second, other, number == 0))
+        if not _agree(*looks, JUMP_U * u_px + CODED_PX + bent_px):
+            return False
+    return True
+
+
+def _fingers(seen: _Seen) -> tuple[FingerEdge, FingerEdge]:
+    return seen.gap.left, seen.gap.right
+
+
+def _agree(one: _Look, other: _Look, tolerance_px: float) -> bool:
+    """Whether two outlines of a finger differ by no more than a rotation and a tolerance, beneath the same ground."""
+    count = min(one.sides_px.shape[1], other.sides_px.shape[1])
+    sides_px = np.stack((one.sides_px[:, :count], other.sides_px[:, :count]))
+    is_seen = np.isfinite(sides_px).any(axis=0)
+    if np.count_nonzero(is_seen) < FEWEST_BANDS:
+        return True
+    change = sides_px[1] - sides_px[0]
+    heights_px = BAND_PX * np.arange(count)
+    lower, upper = np.triu_indices(count, 1)
+    turns = ((change[:, upper] - change[:, lower]) / (heights_px[upper] - heights_px[lower])).ravel()
+    turns = turns[np.isfinite(turns)]
+    turn = float(np.median(turns)) if turns.size else 0.0
+    # Also different is a side that is known in one frame only.
+    differs = is_seen & ~(np.abs(change - turn * heights_px) <= tolerance_px)
+    widths_px = np.abs(sides_px[:, 1] - sides_px[:, 0])
+    is_finger = np.all(np.abs(widths_px / widths_px[:, :1] - 1.0) < SAME_WIDTH, axis=0)
+    is_torn = np.count_nonzero(is_finger & differs.all(axis=0)) >= FEWEST_TORN
+    beyond = min(one.beyond.size, other.beyond.size)
+    is_covered = np.abs(one.beyond[:beyond] - other.beyond[:beyond]) > COVERED_SHARE
+    return not (
+        is_torn
+        or np.count_nonzero(differs) > MOST_DIFFERENT * np.count_nonzero(is_seen)
+        or np.count_nonzero(is_covered) > MOST_DIFFERENT * beyond
+    )
+
+
+def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
+    """Follow the outlines of a finger from its measuring point towards its root, and look beyond its tip."""
+    vertical = seen.gap.direction.is_vertical
+    upright: NDArray[Any] = seen.frame.pixels if vertical else seen.frame.pixels.swapaxes(0, 1)
+    across_px, along_px = (end.x_px, end.y_px) if vertical else (end.y_px, end.x_px)
+    tip_px = end.tip_px
+    if along_px < tip_px:
+        upright = upright[::-1]
+        along_px, tip_px = upright.shape[0] - 1 - along_px, upright.shape[0] - 1 - tip_px
+    first, tip = round(along_px), max(0, round(tip_px) - BAND_PX)
+    count = max(0, min(BELOW, (upright.shape[0] - first) // BAND_PX))
+    if first < 0 or count == 0:
+        return _Look(np.empty((2, 0)), np.empty(0))
+    rows = to_grey(np.ascontiguousarray(upright[first : first + count * BAND_PX]))
+    below = rows.reshape(count, BAND_PX, -1).mean(axis=1)
+    # The edge is measured at the measuring height, and the first band is centred half a band towards the root.
+    inner_px = across_px + end.slope * (first - along_px + 0.5 * (BAND_PX - 1))
+    level = float(np.interp(inner_px, np.arange(below.shape[1]), below[0]))
+    inwards = 1 if is_left else -1
+    rises = (inwards > 0) is seen.gap.light_gap
+    opposite = _crossings(below[0], level, not rises)
+    outside = opposite[inwards * (inner_px - opposite) > 0.0]
+    outer_px = float(outside.max() if is_left else outside.min()) if outside.size else float("nan")
+    sides = ((rises, inner_px), (not rises, outer_px))
+    sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides]) - inner_px
+    ends = sorted((inner_px, inner_px - BAND_PX * inwards if np.isnan(outer_px) else outer_px))
+    bands = min(BEYOND, tip // BAND_PX)
+    if not bands:
+        return _Look(sides_px, np.empty(0))
+    columns = slice(max(0, int(ends[0])), max(0, int(ends[1])) + 1)
+    over = to_grey(np.ascontiguousarray(upright[tip - bands * BAND_PX : tip, columns]))
+    is_like = (over < level) if seen.gap.light_gap else (over > level)
+    return _Look(sides_px, is_like.reshape(bands, -1).mean(axis=1)[::-1])
+
+
+def _followed(bands: Floats, level: float, rises: bool, start_px: float, slope: float) -> Floats:
+    """Places at which the profiles of the bands pass through a level, each next to that in the band before."""
+    found, near_px = np.full(len(bands), np.nan), start_px
+    for number, band in enumerate(bands):
+        if np.isnan(near_px):
+            break
+        begin = max(0, int(near_px) - SEARCH_PX)
+        places = begin + _crossings(band[begin : max(0, int(near_px)) + SEARCH_PX + 2], level, rises)
+        if places.size:
+            found[number] = near_px = places[np.argmin(np.abs(places - near_px))]
+        near_px += slope * BAND_PX
+    return found
+
+
+def _crossings(profile: Floats, level: float, rises: bool) -> Floats:
+    """Places at which a profile passes through a level upwards (or downwards), linear between pixels."""
+    above = profile > level
+    at = np.flatnonzero(above[1:] & ~above[:-1] if rises else above[:-1] & ~above[1:])
+    return np.asarray(at + (level - profile[at]) / (profile[at + 1] - profile[at]))

@@ -1,0 +1,90 @@
+"""Rows that the frames before and after them contradict are refused; true motions, however fast, never are."""
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement
+from fingervision.measuring.frame_sequence import in_sequence
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.vision.pipeline import Settings, measure_frame
+
+SETTINGS, COUNT, SIZE_PX = Settings(6.0), 14, (320, 240)
+Change = Callable[[int, np.ndarray], None]
+
+
+@lru_cache
+def picture(gap_px: float, seed: int) -> np.ndarray:
+    scene = two_fingers(gap_px, below_tip_px=6.0, width_px=60.0, frame=SIZE_PX)
+    return render(scene, Camera(noise_grey=1.0), np.random.default_rng(seed))
+
+
+def refused(gaps_px: list[float], change: Change, has_times: bool = True, quarter: int = 0) -> list[int]:
+    """Numbers of the refused frames; every frame alone has a gap, also a changed one."""
+    results = []
+    for k, gap_px in enumerate(gaps_px):
+        levels = picture(gap_px, k % 3).copy()
+        change(k, levels)
+        frame = Frame(np.ascontiguousarray(np.rot90(levels, quarter)), k, k / 25 if has_times else None)
+        results.append((frame, measure_frame(frame, SETTINGS)))
+    assert all(isinstance(outcome, GapMeasurement) for _, outcome in results)
+    judged = list(in_sequence(results))
+    assert [item.index for item, _ in judged] == list(range(len(gaps_px)))
+    return [item.index for item, outcome in judged if isinstance(outcome, LostFrame)]
+
+
+def torn(levels: np.ndarray, by_px: int = 20, until: int = 130) -> None:
+    """The upper part of the right finger stands where an older picture had it, as in memory that is not renewed."""
+    levels[:until, 160:-by_px] = levels[:until, 160 + by_px :].copy()
+
+
+MOTIONS = {
+    "rest": [70.0] * COUNT,
+    "slow": [70.0 + 0.5 * k for k in range(COUNT)],
+    "steps": [70.0 + 24.0 * (k // 5 % 2) for k in range(COUNT)],
+    "vibration": [70.0 + 15.0 * np.sin(2.6 * k) for k in range(COUNT)],
+    "shock": [70.0 + 30.0 * (k == 6) for k in range(COUNT)],
+}
+
+
+@pytest.mark.parametrize("which", [{0}, {6}, {6, 7}, {COUNT - 1}, {3, 9}])
+@pytest.mark.parametrize("motion", ["rest", "slow", "steps"])
+def test_fingers_that_break_in_some_frames_are_no_fingers(motion: str, which: set[int]) -> None:
+    gaps_px = MOTIONS[motion]
+    found = refused(gaps_px, lambda k, levels: torn(levels, 20 + 5 * (k % 2)) if k in which else None)
+    assert set(found) == which
+
+
+@pytest.mark.parametrize("quarter", [1, 2, 3])
+def test_every_direction_is_judged_alike(quarter: int) -> None:
+    change = lambda k, levels: torn(levels) if k == 6 else None  # noqa: E731 - one line of a table
+    assert refused(MOTIONS["slow"], change, quarter=quarter) == [6]
+    assert refused(MOTIONS["shock"], lambda k, levels: None, quarter=quarter) == []
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_true_motions_are_never_refused(motion: str) -> None:
+    assert refused(MOTIONS[motion], lambda k, levels: None) == []
+
+
+def test_a_push_at_the_camera_a_flash_and_defocus_change_no_finger() -> None:
+    def change(k: int, levels: np.ndarray) -> None:
+        if k in (4, 5):
+            levels[:] = np.roll(levels, (7, -5), axis=(0, 1))
+        if k == 8:
+            levels[:] = levels // 2
+        if k == 10:  # the fingers run across rows, so that this blurs their edges symmetrically
+            levels[:, 3:-3] = sum(levels[:, 3 + i : 317 + i].astype(int) for i in range(-3, 4)) // 7
+
+    assert refused([*[70.0] * 10, 82.0, *[70.0] * 3], change) == []
+
+
+def test_a_change_that_lasts_is_believed() -> None:
+    assert refused(MOTIONS["rest"], lambda k, levels: torn(levels) if k >= 6 else None) == []
+
+
+def test_pictures_without_times_are_not_compared() -> None:
+    assert refused(MOTIONS["rest"], lambda k, levels: torn(levels) if k == 6 else None, has_times=False) == []
