@@ -9,6 +9,7 @@ from fingervision.cli._columns_option import columns_option
 
 if TYPE_CHECKING:
     from fingervision.tables.account import Account
+    from fingervision.tables.mapping import Entry
 
 EXAMPLES = """
 \b
@@ -28,6 +29,7 @@ Keys of --set and of columns.toml:
   units.ROLE    unit of the column, or what one count is worth: mm, um, ms, '0.1 um'
   separator , ; tab | blank     decimal . ,       encoding    header_line (0: none)      part (sheet, group, variable)
   runs restart|one              date_order dmy|mdy|ymd        missing (such as -9999)      accept (checked doubts)
+  clock continuous|as_written   (a clock that was set, or a counter that ran over)
 
 \b
 Exit codes: 0 interpreted, and columns.toml is written; 1 ambiguous: the message names the key of --set that decides.
@@ -64,13 +66,19 @@ def command(
 
     from fingervision.tables.account import account
     from fingervision.tables.mapping import KINDS, NAME, entry_for, entry_of_settings, write_entry
+    from fingervision.tables.questions import OpenQuestionError
 
     target = out or columns or file.parent / NAME
     decided = {each: entry_for(file, each, columns) for each in KINDS}
+    own = entry_of_settings(settings, target)
     if settings:
-        own = entry_of_settings(settings, target)
         decided = {each: own.over(entry) for each, entry in decided.items()}
-    found = account(file, kind, decided)
+    try:
+        found = account(file, kind, decided)
+    except OpenQuestionError:
+        # What is stated once stays, whatever else is open.
+        _keep(settings, target, file, kind, own)
+        raise
     if as_json:
         click.echo(json.dumps(found.document(), indent=2, allow_nan=False, ensure_ascii=False))
     else:
@@ -78,12 +86,22 @@ def command(
     if png is not None:
         _draw(found, png)
     if found.question is not None:
+        if isinstance(found.question, OpenQuestionError):
+            _keep(settings, target, file, None if found.also else found.kind, decided[found.kind])
         raise found.question
     if found.own:
         _say("The table needs no columns.toml.", quiet=as_json)
         return
     changed = write_entry(target, _name_for(file, target), None if found.also else found.kind, found.entry)
     _say(f"{'Written' if changed else 'Unchanged'}: {target}", quiet=as_json)
+
+
+def _keep(settings: tuple[str, ...], target: Path, file: Path, kind: str | None, entry: "Entry") -> None:
+    """Write the decisions of the user although others are open."""
+    from fingervision.tables.mapping import write_entry
+
+    if settings:
+        write_entry(target, _name_for(file, target), kind, entry)
 
 
 def _name_for(file: Path, target: Path) -> str:

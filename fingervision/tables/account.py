@@ -126,7 +126,11 @@ class Account:
             "left_out": list(self.left_out),
             "notes": list(self.notes),
             "open": [
-                {"words": each.words, "key": each.key}
+                {
+                    "words": each.words,
+                    "key": each.key,
+                    "readings": [{"key": one.key, "gives": one.gives} for one in each.readings],
+                }
                 for each in (self.question.questions if isinstance(self.question, OpenQuestionError) else ())
             ],
             "error": None if self.question is None else str(self.question),

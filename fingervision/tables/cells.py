@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fingervision.domain.numbers import to_number
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.dialect import MISSING, THOUSANDS
+from fingervision.tables.questions import Question, Reading, asked, span
 
 
 def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.intp]]:
@@ -55,3 +56,15 @@ def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.
         elif cell.strip().lower() not in MISSING:
             odd.append(row)
     return Numbers(value, present), np.array(odd, dtype=np.intp)
+
+
+def which_mark(cells: Sequence[str]) -> Question:
+    """Question whether the only mark in numbers is the decimal sign or separates thousands."""
+    marked = [cell for cell in cells if any(mark in cell and THOUSANDS[mark].fullmatch(cell) for mark in ",.")]
+    mark, other, name = (",", ".", "comma") if "," in marked[0] else (".", ",", "point")
+    readings = [
+        Reading(f"decimal={sign}", f"'{marked[0]}' is {to_number(marked[0], sign):g}, and all such numbers are "
+                f"{span(to_numbers(marked, sign)[0].value)}")
+        for sign in (mark, other)
+    ]  # fmt: skip
+    return asked(f"each {name} in the numbers may be the decimal sign or a thousands separator", readings)

@@ -8,9 +8,17 @@ import numpy as np
 from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
-from fingervision.tables.column_suggestions import increases, likeliest
+from fingervision.tables.column_suggestions import (
+    SAME_MOTION,
+    SURE,
+    increases,
+    range_of,
+    ranked,
+    rows_behind,
+    values_of,
+)
 from fingervision.tables.mapping import Entry
-from fingervision.tables.questions import Question
+from fingervision.tables.questions import Question, Reading, asked
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
 from fingervision.tables.units import factor, spelled
@@ -23,27 +31,9 @@ WANTED = {
     "drive": ("run", "force"),
     "simulation": ("left", "right", "force"),
 }
-ACTUAL = frozenset(
-    [
-        "actual",
-        "act",
-        "ist",
-        "istwert",
-        "iststellung",
-        "feedback",
-        "current",
-        "readback",
-        "reached",
-        "value",
-        "axis",
-        "1",
-        "2",
-        "3",
-        "x",
-        "y",
-        "z",
-    ]
-)
+AXES = frozenset(["x", "y", "z", "a", "b", "c", "u", "v", "w", "1", "2", "3", "4", "5", "6"])
+"""Words that tell one axis of a stage from another."""
+MOST_READINGS = 6
 UNIT = {"length": "mm", "time": "s", "force": "n"}
 CANONICAL = {role: f"{role}_{UNIT[dimension]}" for role, dimension in DIMENSION.items()}
 """Names of the columns in fingervision's own tables, by role."""
@@ -83,9 +73,6 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             continue
         # A target without a direction is a commanded position.
         roles.setdefault("input" if role == "target" else role, []).append(place)
-    if "input" in roles and "gap" in roles and all(names[k].role == "target" for k in roles["input"]):
-        # A column `Actual` beside a column `Commanded` is the position that was reached.
-        roles["input"] += [k for k, name in enumerate(names) if k not in fixed and _is_actual(raw.columns[k], name)]
     sources = [k for k, name in enumerate(names) if name.source == kind and k not in fixed]
     if "gap" not in roles and sources:
         roles["gap"] = sources
@@ -94,17 +81,25 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     if "gap" not in chosen and "time" in roles and kind == "simulation":
         roles.pop("time")
     sides = all(side in chosen or len(roles.get(side, ())) == 1 for side in ("left", "right"))
-    suggested: set[int] = set()
     decimal = given.words.get("decimal") or str(raw.settings.get("decimal", "."))
+    if "input" in roles:
+        free = [k for k in range(len(names)) if k not in fixed and names[k].role in (None, "input", "target")]
+        roles["input"] = _one_axis(raw, names, roles["input"], free, decimal, about)
+        roles["input"] = _with_followers(raw, names, roles["input"], free, decimal)
+    suggested: set[int] = set()
 
-    def suggest(role: str, candidates: Sequence[int]) -> str:
-        """Name a column that no other question suggests, so that all suggestions can be followed at once."""
-        place = likeliest(raw, names, role, [k for k in candidates if k not in suggested] or candidates, decimal)
-        if place is None:
-            return "NAME"
-        suggested.add(place)
-        name = raw.columns[place].name
-        return name if [column.name for column in raw.columns].count(name) == 1 else str(place + 1)
+    def readings(role: str, candidates: Sequence[int]) -> list[Reading]:
+        """The possible columns of a role; no two questions suggest the same one, so that all can be followed."""
+        found = sorted(ranked(raw, names, role, candidates, decimal), key=lambda k: k in suggested)
+        suggested.update(found[:1])
+        listed = [column.name for column in raw.columns]
+        return [
+            Reading(
+                f"columns.{role}={listed[k] if listed.count(listed[k]) == 1 and listed[k] else k + 1}",
+                range_of(raw.columns[k], names[k], decimal),
+            )
+            for k in found[:MOST_READINGS]
+        ]
 
     for role in (*NEEDED[kind], *WANTED[kind]):
         if role in chosen:
@@ -123,27 +118,60 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             if role == "gap" and sides and not sources:
                 continue
             listed = " or ".join(f"'{raw.columns[k].name}'" for k in candidates)
-            about.questions.append(
-                Question(f"the column of the {role} may be {listed}", f"columns.{role}={suggest(role, candidates)}")
-            )
+            about.questions.append(asked(f"the column of the {role} may be {listed}", readings(role, candidates)))
         elif role in NEEDED[kind] and not (role == "gap" and sides):
             free = [k for k in range(len(raw.columns)) if k not in set(chosen.values())]
             listed = ", ".join(f"'{raw.columns[k].name}'" for k in free[:12]) + (" ..." if len(free) > 12 else "")
-            about.questions.append(
-                Question(
-                    f"no column has a usual name for the {role} (the columns are {listed or 'taken'})",
-                    f"columns.{role}={suggest(role, free) if free else 'NAME'}",
-                    CANONICAL[role],
-                )
-            )
+            words = f"no column has a usual name for the {role} (the columns are {listed or 'taken'})"
+            found = readings(role, free) or [Reading(f"columns.{role}=NAME", "the table of this file holds none")]
+            about.questions.append(asked(words, found, CANONICAL[role]))
     return chosen
 
 
-def _is_actual(column: RawColumn, name: ColumnName) -> bool:
-    """Whether a column of lengths is called `actual`, `feedback` or `Istwert` only."""
+def _axis_and_stem(name: ColumnName) -> tuple[frozenset[str], tuple[str, ...]]:
+    """The words for an axis in a name, and all other words."""
     words = tokens(name.base)
-    unit = spelled(column.unit) or name.unit
-    return ACTUAL.issuperset(words) and words != () and unit != "" and factor(unit, "length") is not None
+    return frozenset(words) & AXES, tuple(word for word in words if word not in AXES)
+
+
+def _one_axis(
+    raw: RawTable, names: Sequence[ColumnName], inputs: list[int], free: Sequence[int], decimal: str, about: Findings
+) -> list[int]:
+    """Of the axes of a stage, named alike but for a letter, take the one that moves; all if more than one moves."""
+    axis, stem = _axis_and_stem(names[inputs[0]])
+    axes = [k for k in free if _axis_and_stem(names[k])[1] == stem and len(_axis_and_stem(names[k])[0]) == len(axis)]
+    same_unit = {spelled(raw.columns[k].unit) or names[k].unit for k in axes}
+    different = len({_axis_and_stem(names[k])[0] for k in axes}) == len(axes)
+    if len(axis) != 1 or len(axes) < 2 or not set(inputs) <= set(axes) or len(same_unit) > 1 or not different:
+        return inputs
+    moved = {k: float(np.ptp(found)) if (found := values_of(raw.columns[k], decimal)).size else 0.0 for k in axes}
+    most, *others = sorted(axes, key=lambda k: -moved[k])
+    if moved[most] <= SURE * moved[others[0]]:
+        return sorted([most, *(k for k in others if moved[k] > 0.0)])
+    if others:
+        about.notes.append(
+            f"'{raw.columns[most].name}' is read as the input: it moves {moved[most]:.4g}, and "
+            f"'{raw.columns[others[0]].name}' {moved[others[0]]:.4g}, in the unit of the file."
+        )
+    return [most]
+
+
+def _with_followers(
+    raw: RawTable, names: Sequence[ColumnName], inputs: list[int], free: Sequence[int], decimal: str
+) -> list[int]:
+    """Add to a set-point the columns of lengths that make the same motion: one may be the position reached."""
+    if not all(names[k].role == "target" for k in inputs):
+        return inputs
+    lead = values_of(raw.columns[inputs[0]], decimal)
+
+    def follows(k: int) -> bool:
+        values = values_of(raw.columns[k], decimal)
+        unit = spelled(raw.columns[k].unit) or names[k].unit
+        if not unit or factor(unit, "length") is None or values.size != lead.size or not lead.size:
+            return False
+        return bool(np.std(values - lead) < SAME_MOTION * np.ptp(lead) or rows_behind(values, lead) != 0)
+
+    return inputs + [k for k in free if k not in inputs and follows(k)]
 
 
 def _lone_u(

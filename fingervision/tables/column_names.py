@@ -60,15 +60,15 @@ def column_name(text: str) -> ColumnName:
     """
     text = unescape(text.strip().strip('"').strip())
     match = BRACKETS.match(text)
-    if match is None and role_of(text) is not None:
+    if match is None and role_of(text) is not None and not _has_marked_unit(text):
         return ColumnName(text, text, "")
     if match is not None:
         unit = next(part for part in match.group("a", "b", "c", "d") if part is not None)
         # Brackets may contain a remark instead of a unit: `gap (left)`, `position (actual) [mm]`.
-        if known_unit(unit) is not None or role_of(f"{match['base']} {unit}") is None:
+        if known_unit(unit) or _is_unit_of(match["base"], unit) or role_of(f"{match['base']} {unit}") is None:
             return ColumnName(text, re.sub(r"[\[\](){}]", " ", match["base"]).strip(), spelled(unit))
         return ColumnName(text, f"{match['base']} {unit}", "")
-    if (match := BESIDE.match(text)) is not None and known_unit(match["unit"]) is not None:
+    if (match := BESIDE.match(text)) is not None and (known_unit(match["unit"]) or _has_marked_unit(text)):
         base = match["base"].strip(" _-/,.:")
         # `stage.s` is a variable `s` of `stage` (Modelica), and no position in seconds.
         dimension = DIMENSION.get(role_of(base) or "", "length")
@@ -77,3 +77,15 @@ def column_name(text: str) -> ColumnName:
         if role_of(base) is not None or source_of(base) is not None or base == "u":
             return ColumnName(text, base, spelled(match["unit"]))
     return ColumnName(text, text, "")
+
+
+def _has_marked_unit(text: str) -> bool:
+    """Whether a name ends with a slash or the word `in` and a unit of the dimension that the name before has."""
+    match = BESIDE.match(text)
+    return match is not None and match["mark"] in ("/", "in") and _is_unit_of(match["base"], match["unit"])
+
+
+def _is_unit_of(base: str, unit: str) -> bool:
+    """Whether a text is a unit of the dimension that a name has by its role."""
+    dimension = DIMENSION.get(role_of(base.strip(" _-/,.:")) or "")
+    return dimension is not None and factor(unit, dimension) is not None

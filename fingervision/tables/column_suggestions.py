@@ -3,26 +3,40 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.cells import to_numbers
 from fingervision.tables.column_names import DIMENSION, ColumnName
+from fingervision.tables.questions import span
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
-from fingervision.tables.units import factor, known_unit, spelled
+from fingervision.tables.units import CANONICAL, factor, known_unit, spelled
 from fingervision.tables.words import mentions, tokens
 
 LOOKED_AT = 200
 """Number of cells of a column that are examined: enough to distinguish a clock or a counter from a position."""
-BY_NAME, BY_UNIT, BY_CLOCK, BY_READING = 4, 3, 3, 1
+BY_NAME, BY_UNIT, BY_CLOCK, BY_READING, BY_LAG = 4, 3, 3, 1, 2
 """Points for a word of the role in the name, a unit of its dimension, times that increase, and a word that
-distinguishes a reading from a command. A suggestion is only an example in a question; the user decides."""
+distinguishes a reading from a command; and for following another column. Only the order of the readings in a question
+depends on them; the user decides."""
+SURE = 20.0
+"""Least ratio of the motion of a column to that of another with which the other is considered as at rest."""
+MOST_BEHIND = 12
+"""Largest delay, in rows, between a set-point and the position that follows it."""
+SAME_MOTION = 0.1
+"""Largest difference of two columns of one motion, as a share of the range."""
 NEVER = -100
 """Points of a column without numbers, which is not suggested."""
 READINGS = frozenset(
     [
         "actual",
+        "current",
+        "enc",
         "encoder",
+        "get",
+        "pv",
+        "rbv",
         "feedback",
         "measured",
         "readback",
@@ -37,10 +51,8 @@ READINGS = frozenset(
 """Words that denote a measured position, and not a command."""
 
 
-def likeliest(
-    raw: RawTable, names: Sequence[ColumnName], role: str, candidates: Sequence[int], decimal: str
-) -> int | None:
-    """Find the most probable column for a role; None if no column is possible.
+def ranked(raw: RawTable, names: Sequence[ColumnName], role: str, candidates: Sequence[int], decimal: str) -> list[int]:
+    """Sort the possible columns of a role, the most probable first.
 
     Parameters
     ----------
@@ -54,33 +66,77 @@ def likeliest(
         Numbers of the columns that have no role yet.
     decimal : str
         Decimal mark of cells that are still text.
-
-    Returns
-    -------
-    int or None
-        Number of the column, from 0.
     """
-    points = {k: _points(raw.columns[k], names[k], role, decimal) for k in candidates}
-    best = max(candidates, key=lambda k: points[k], default=None)
+    points = {k: float(_points(raw.columns[k], names[k], role, decimal)) for k in candidates}
+    possible = [k for k in candidates if points[k] > -BY_UNIT] or [k for k in candidates if points[k] > NEVER / 2]
+    if role == "input":
+        values = {k: values_of(raw.columns[k], decimal) for k in possible}
+        widest = max((float(np.ptp(values[k])) for k in possible if values[k].size), default=0.0)
+        for k in possible:
+            points[k] += BY_LAG * sum(np.sign(rows_behind(values[k], values[j])) for j in possible if j != k)
+            points[k] -= (BY_NAME + BY_READING) * (values[k].size == 0 or float(np.ptp(values[k])) * SURE < widest)
     # If a file has no names and units, the columns are suggested in their order.
-    return best if best is not None and points[best] >= 0 else None
+    return sorted(possible, key=lambda k: -points[k])
+
+
+def values_of(column: RawColumn, decimal: str) -> NDArray[np.float64]:
+    """Numbers of a column in the unit of the file, without missing ones; none for dates."""
+    content = column.content
+    if not isinstance(content, Numbers):
+        if looks_like_time(content):
+            return np.zeros(0)
+        content = to_numbers(content, decimal)[0]
+    return content.value[content.present]
+
+
+def range_of(column: RawColumn, name: ColumnName, decimal: str) -> str:
+    """Range of a column in words, in mm, s or N if its unit is known."""
+    values, unit = values_of(column, decimal), spelled(column.unit) or name.unit
+    for dimension, target in CANONICAL.items():
+        if unit and (size := factor(unit, dimension)) is not None:
+            return span(values * size, target)
+    if not values.size and not isinstance(column.content, Numbers) and looks_like_time(column.content):
+        return f"{column.content[0]} to {column.content[-1]}"
+    return span(values, unit)
+
+
+def rows_behind(follower: NDArray[np.float64], leader: NDArray[np.float64]) -> int:
+    """Number of rows by which a column follows another one; 0 if it does not, or without a delay.
+
+    A position follows its set-point: shifted by some rows, the two differ by little against their range.
+    """
+    size = follower.size
+    reach = min(MOST_BEHIND, size // 4)
+    moved = float(np.ptp(leader)) if leader.size else 0.0
+    if size != leader.size or reach < 1 or not moved:
+        return 0
+
+    def apart(shift: int) -> float:
+        late, early = follower[reach + shift : size - reach + shift], leader[reach : size - reach]
+        return float(np.std(late - early))
+
+    shifts = range(-reach, reach + 1)
+    found = [apart(shift) for shift in shifts]
+    best = int(np.argmin(found))
+    is_same_motion = found[best] < SAME_MOTION * moved and found[best] < 0.5 * found[reach]
+    return shifts[best] if is_same_motion else 0
 
 
 def _points(column: RawColumn, name: ColumnName, role: str, decimal: str) -> int:
     if role in DIMENSION and not _has_values(column, decimal):
         return NEVER
     found = mentions(name.base)
-    constant = _is_constant(column)
     points = BY_NAME if role in found else -BY_NAME if found else 0
     unit = spelled(column.unit) or name.unit
-    if known_unit(unit) is not None:
-        points += BY_UNIT if factor(unit, DIMENSION.get(role, "length")) is not None else -2 * BY_UNIT
+    is_sized = unit != "" and factor(unit, DIMENSION.get(role, "length")) is not None
+    if is_sized or known_unit(unit) is not None:
+        points += BY_UNIT if is_sized else -2 * BY_UNIT
     points += BY_READING * (role == "input" and bool(READINGS & set(tokens(name.base))))
-    points -= BY_READING * (role == "input" and "target" in found) + BY_READING * constant
+    points -= BY_READING * (role == "input" and "target" in found) + BY_READING * _is_constant(column)
     is_clock = increases(column, decimal)
     if role == "time":
         return points + (BY_CLOCK if is_clock else -2 * BY_CLOCK)
-    return points - (BY_READING if is_clock else 0)
+    return points - (BY_READING if is_clock and not is_sized else 0)
 
 
 def _has_values(column: RawColumn, decimal: str) -> bool:
@@ -103,13 +159,7 @@ def _is_constant(column: RawColumn) -> bool:
 
 def increases(column: RawColumn, decimal: str) -> bool:
     """Whether a column's first values increase by equal steps, or are dates."""
-    content = column.content
-    if isinstance(content, Numbers):
-        values = content.value[:LOOKED_AT][content.present[:LOOKED_AT]]
-    else:
-        if looks_like_time(content):
-            return True
-        numbers, _ = to_numbers(content[:LOOKED_AT], decimal)
-        values = numbers.value[numbers.present]
-    steps = np.diff(values)
+    if not isinstance(column.content, Numbers) and looks_like_time(column.content):
+        return True
+    steps = np.diff(values_of(column, decimal)[:LOOKED_AT])
     return bool(steps.size and np.all(steps > 0.0) and np.ptp(steps) <= 0.5 * float(np.median(steps)))

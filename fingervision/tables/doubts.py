@@ -4,14 +4,15 @@ Each doubt has a name, by which the key `accept` in columns.toml confirms the va
 columns.toml is not doubted.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
+from fingervision.tables.clock_leaps import clock_leaps, is_known_leap, usual_step, without_leaps
 from fingervision.tables.mapping import Entry
-from fingervision.tables.questions import Question
+from fingervision.tables.questions import Question, Reading, asked, span
 
 LEAST_RATIO, GREATEST_RATIO = 0.1, 100.0
 """Plausible ratio of the range of the gap to the range of the input. Compliant grippers have 0.3 to 50 (the published
@@ -60,7 +61,7 @@ def doubts(
             value = f"{inputs[0]:g} mm in each of its {inputs.size} rows" if inputs.size else "without any number"
             found.append(Question(f"the input never changes ({value})", "accept=constant_input"))
         return found
-    if "sizes" not in given.accept and "input" not in given_units:
+    if "sizes" not in given.accept:
         found += _sizes(columns, travel, given_units)
     if kind == "measured" and "overlap" not in given.accept:
         found += _overlap(columns)
@@ -88,29 +89,43 @@ def _gap(columns: Mapping[str, Numbers]) -> NDArray[np.float64] | None:
 
 
 def _sizes(columns: Mapping[str, Numbers], travel: float, given_units: set[str]) -> list[Question]:
-    if not LEAST_INPUT_MM <= travel <= GREATEST_INPUT_MM:
-        words = "metres" if travel < LEAST_INPUT_MM else "micrometres"
-        unit = "m" if travel < LEAST_INPUT_MM else "um"
-        return [
-            Question(
-                f"with the stated unit, the input ranges over {travel:g} mm; the numbers look like {words} (if the "
-                "stated unit is right, set accept=sizes)",
-                f"units.input={unit}",
-            )
-        ]
+    """State a doubt if the range of the input, or of the gap beside that of the input, is implausible."""
+    inputs = columns["input"].value[columns["input"].present]
+    if "input" not in given_units and not LEAST_INPUT_MM <= travel <= GREATEST_INPUT_MM:
+        words = f"with the stated unit, the input ranges over {travel:g} mm"
+        return [asked(words, _other_units("input", inputs, lambda size: LEAST_INPUT_MM <= size <= GREATEST_INPUT_MM))]
     gap = _gap(columns)
-    if gap is None or not gap.size or given_units & {"gap", "left", "right"}:
+    sides = given_units & {"gap", "left", "right"}
+    if gap is None or not gap.size or (sides and "input" in given_units):
         return []
     opening = float(np.ptp(gap))
+    if "gap" in columns and not sides and float(np.max(np.abs(gap))) > GREATEST_GAP_MM:
+        words = f"with the stated unit, the gap is {span(gap, 'mm')}"
+        return [asked(words, _other_units("gap", gap, lambda size: size < opening))]
     if opening == 0.0 or LEAST_RATIO <= opening / travel <= GREATEST_RATIO:
         return []
-    ratio = opening / travel
+    readings: list[Reading] = []
+    if "input" not in given_units:
+        readings += _other_units("input", inputs, lambda size: LEAST_RATIO <= opening / size <= GREATEST_RATIO)[:-1]
+    if "gap" in columns and not sides:
+        readings += _other_units("gap", gap, lambda size: LEAST_RATIO <= size / travel <= GREATEST_RATIO)[:-1]
+    words = (
+        f"the gap ranges over {opening:g} mm while the input ranges over {travel:g} mm, {opening / travel:.3g} times "
+        "as far: one of the two units cannot be right"
+    )
+    return [asked(words, [*readings, Reading("accept=sizes", f"both as stated, gap {span(gap, 'mm')}")])]
+
+
+def _other_units(role: str, stated_mm: NDArray[np.float64], is_plausible: Callable[[float], bool]) -> list[Reading]:
+    """Readings of lengths in mm whose numbers are metres or micrometres, where plausible; and as they are."""
+    travel = float(np.ptp(stated_mm))
     return [
-        Question(
-            f"the gap ranges over {opening:g} mm while the input ranges over {travel:g} mm, {ratio:.3g} times as far: "
-            "one of the two units cannot be right",
-            f"units.{'input=m' if ratio > GREATEST_RATIO else 'gap=m'}",
-        )
+        *(
+            Reading(f"units.{role}={unit}", span(size * stated_mm, "mm"))
+            for unit, size in (("m", 1e3), ("um", 1e-3))
+            if is_plausible(size * travel)
+        ),
+        Reading("accept=sizes", span(stated_mm, "mm")),
     ]
 
 
@@ -125,19 +140,12 @@ def _times(
     same = np.diff(of_run) == 0
     steps = np.diff(time)
     found: list[Question] = []
-    back = np.flatnonzero(same & (steps < 0.0))
-    if back.size and "backward_time" not in given.accept:
-        at = int(back[0]) + 1
-        restarts = np.isclose(time[back + 1], time[0], atol=2.0 * float(np.median(np.abs(steps)))).all()
-        found.append(
-            Question(
-                f"the time decreases {back.size} time(s), first from {time[at - 1]:g} to {time[at]:g} s"
-                + (" and starts again: runs=restart begins a new run at each of these rows" if restarts else "")
-                + " (accept=backward_time sorts the rows by time)",
-                "runs=restart" if restarts else "accept=backward_time",
-            )
-        )
-        return found
+    leaps = clock_leaps(time, dated=dated)
+    leaps = leaps[same[leaps]]
+    if leaps.size and "clock" not in given.words and "backward_time" not in given.accept:
+        at = int(leaps[0]) + 1
+        words = f"the time leaps {leaps.size} time(s), first from {time[at - 1]:g} to {time[at]:g} s"
+        return [asked(words, _readings_of_leaps(time, steps, leaps))]
     if dated or "speed" in given.accept or "time" in given.units or time.size < FEWEST_FOR_SPEED:
         return found
     moving = same & (np.abs(np.diff(inputs)) > EPSILON_MM)
@@ -148,12 +156,31 @@ def _times(
     step = float(np.median(steps[moving]))
     slow = speed < LEAST_SPEED_MM_S and step >= USUAL_STEPS_S[1]
     if slow or (speed > GREATEST_SPEED_MM_S and step < USUAL_STEPS_S[0]):
-        found.append(
-            Question(
-                f"with the stated unit of time, the input moves at {speed:.2g} mm/s with a row every {step:.2g} s; the "
-                f"times look like {'milliseconds' if slow else 'seconds'} (if the stated unit is right, set "
-                "accept=speed)",
-                f"units.time={'ms' if slow else 's'}",
-            )
-        )
+        unit, size = ("ms", 1e-3) if slow else ("s", 1e3)
+        elapsed = time - time[0]
+        words = f"with the stated unit of time, the input moves at {speed:.2g} mm/s with a row every {step:.2g} s"
+        readings = [
+            Reading(f"units.time={unit}", span(elapsed * size, "s")),
+            Reading("accept=speed", span(elapsed, "s")),
+        ]
+        found.append(asked(words, readings))
     return found
+
+
+def _readings_of_leaps(time: NDArray[np.float64], steps: NDArray[np.float64], leaps: NDArray[np.intp]) -> list[Reading]:
+    """Readings of a time that leaps: the clock was set or ran over, the run began again, or rows are out of order."""
+    through = without_leaps(time, leaps)
+    continuous = Reading("clock=continuous", f"the clock was set, or its counter ran over: {span(through, 's')}")
+    forward = bool(np.all(steps[leaps] > 0.0))
+    if forward:
+        return [continuous, Reading("clock=as_written", f"a pause: {span(time - time[0], 's')}")]
+    if np.any(is_known_leap(steps[leaps], time)):
+        order = "clock"
+    else:
+        order = "runs" if np.isclose(time[leaps + 1], time[0], atol=2.0 * usual_step(time)).all() else "accept"
+    found = [
+        continuous,
+        Reading("runs=restart", f"{leaps.size + 1} runs"),
+        Reading("accept=backward_time", f"rows out of order: {span(time - time.min(), 's')}"),
+    ]
+    return sorted(found, key=lambda each: not each.key.startswith(order))

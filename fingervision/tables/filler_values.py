@@ -3,6 +3,7 @@
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 
@@ -44,13 +45,49 @@ def filler_value(values: Numbers) -> float | None:
     return furthest if is_far else None
 
 
+def dropped_out(values: Numbers) -> NDArray[np.bool_]:
+    """Rows in which a column leaps to exactly zero and back, which no motion does: a drop-out.
+
+    A leap is larger than twice the largest step between other rows; a stage that rests at zero arrives there by steps
+    of the usual size. In a column with such leaps, zeros that last no longer are drop-outs too, unless the steps beside
+    them become small: to lose a row does less harm than a wrong one.
+    Zeros in more than `MOST_ROWS` of the rows are a state and no drop-outs.
+
+    Examples
+    --------
+    >>> dropped_out(Numbers.whole(np.array([0.0, 0.1, 0.2, 0.3, 0.0, 0.3, 0.2, 0.1, 0.0]))).nonzero()[0]
+    array([4])
+    """
+    known = np.flatnonzero(values.present)
+    number = values.value[known]
+    none, sure, likely = (np.zeros(values.value.size, dtype=np.bool_) for _ in range(3))
+    rest = np.flatnonzero(number != 0.0)
+    if rest.size < 2 or rest.size == number.size:
+        return none
+    steps = np.abs(np.diff(number[rest]))
+    usual = float(np.max(steps[np.diff(rest) == 1], initial=0.0))
+    ends = np.concatenate([[-1], rest, [number.size]])
+    longest = 1
+    # Zeros stand before the row `place` of those that are not zero.
+    for place in np.flatnonzero(np.diff(ends) > 1).tolist():
+        rows = known[ends[place] + 1 : ends[place + 1]]
+        beside = np.abs(number[rest[max(place - 1, 0) : place + 1]])
+        near = np.concatenate([steps[max(place - 2, 0) : max(place - 1, 0)], steps[place : place + 1]])
+        leaps = float(np.min(beside)) > 2.0 * usual > 0.0
+        sure[rows] = leaps and beside.size == 2
+        longest = max(longest, rows.size if leaps else 0)
+        off = beside.size == 2 and float(np.mean(beside)) > 0.5 * float(np.max(near, initial=0.0))
+        likely[rows] = leaps or (off and rows.size <= longest)
+    return likely if sure.any() and np.count_nonzero(likely) <= MOST_ROWS * number.size else none
+
+
 def without_filler(values: Numbers, stated: str) -> Numbers:
-    """Mark the number that the user states as the filler value as missing."""
+    """Mark the number that the user states as the filler value as missing; of zeros, only those that drop out."""
     try:
         filler = float(stated)
     except ValueError:
         return values
     if not isfinite(filler):
         return values
-    held = values.value == filler
+    held = dropped_out(values) if filler == 0.0 else values.value == filler
     return Numbers(np.where(held, 0.0, values.value), values.present & ~held)

@@ -24,6 +24,7 @@ WORDS = {
     "decimal": (".", ","),
     "runs": ("restart", "one"),
     "date_order": ("dmy", "mdy", "ymd"),
+    "clock": ("continuous", "as_written"),
 }
 """Keys whose value must be one of a few words."""
 TEXTS = ("encoding", "part", "missing")

@@ -11,6 +11,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.numbers import MINUS
 from fingervision.storage.number_block import number_block
 from fingervision.storage.number_columns import Numbers
+from fingervision.tables.cells import which_mark
 from fingervision.tables.dialect import (
     BY_NAME,
     SAMPLE_LINES,
@@ -26,7 +27,7 @@ from fingervision.tables.header_pairs import Header
 from fingervision.tables.key_value_rows import rows_of_pairs
 from fingervision.tables.mapping import Entry
 from fingervision.tables.other_rows import is_other_header, other_header, statistics_below
-from fingervision.tables.questions import OpenQuestionError, Question
+from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
 from fingervision.tables.text_header import HEADER_LINES, find_header, first_row, header_below_values, names_in
 
@@ -83,14 +84,10 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     if not header.names:
         _check_commas(path, lines, first, dialect)
     if dialect.either_way:
-        example = _marked(lines, dialect)
-        mark, name = (",", "comma") if "," in example else (".", "point")
-        other = "." if mark == "," else ","
-        words = (
-            f"each {name} in the numbers may be the decimal sign or a thousands separator ('{example}'): "
-            f"decimal={mark} or decimal={other} states the decimal sign"
-        )
-        raise OpenQuestionError(path, "table", [Question(words, f"decimal={mark}")])
+        rows_of_cells = [
+            cells for line in lines[first:] if len(cells := split(line, dialect.separator)) == dialect.wide
+        ]
+        raise OpenQuestionError(path, "table", [which_mark([cell for row in rows_of_cells for cell in row])])
     rows = _Rows(path, dialect, header, first, is_part=given.header_line is not None)
     columns, numbers, left_out, restarts = rows.read(lines)
     notes = () if header.names else (f"The file has no column names: its columns are named 1 to {len(columns)}.",)
@@ -132,15 +129,6 @@ def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect
             "and commas between cells cannot be distinguished. Export the table with semicolons or tabs between the "
             "cells."
         )
-
-
-def _marked(lines: Sequence[str], dialect: Dialect) -> str:
-    """Find the first number with a decimal mark or thousands separator."""
-    for line in lines:
-        for cell in split(line, dialect.separator):
-            if ("," in cell or "." in cell) and is_number(cell, dialect.decimal) and not is_comment(line):
-                return cell
-    return ""
 
 
 class _Rows:

@@ -11,17 +11,18 @@ from fingervision.storage.number_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels, channels_in
 from fingervision.tables.cell_units import with_units_of_cells
 from fingervision.tables.cells import to_numbers
+from fingervision.tables.clock_leaps import clock_leaps, without_leaps
 from fingervision.tables.column_choice import NEEDED, Findings, choose
 from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
 from fingervision.tables.dialect import NO_NUMBER
 from fingervision.tables.doubts import doubts
-from fingervision.tables.filler_values import filler_value, without_filler
-from fingervision.tables.likely_unit import likely_unit
+from fingervision.tables.filler_values import dropped_out, filler_value, without_filler
 from fingervision.tables.long_table import refuse_long_table
 from fingervision.tables.mapping import Entry
-from fingervision.tables.questions import OpenQuestionError, Question
+from fingervision.tables.questions import OpenQuestionError, Question, Reading, asked, span
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import is_day_number, is_epoch, looks_like_time, seconds_of
+from fingervision.tables.unit_readings import unit_question, unit_readings, wrong_unit
 from fingervision.tables.units import factor, known_unit, spelled
 
 DATE = "date"
@@ -152,19 +153,24 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
             taken.pop()
             continue
         if size is None:
-            about.questions.append(_wrong_unit(column, role, unit))
+            known = values.value[values.present]
+            about.questions.append(wrong_unit(column.name, role, DIMENSION[role], unit, known))
             continue
         if role == "time":
             values = _from_epoch(values, column, unit, about)
         elif "missing" in given.words:
             values = without_filler(values, given.words["missing"])
-        elif "sizes" not in given.accept and (filler := filler_value(values)) is not None:
-            about.questions.append(_filler(column.name, values, filler))
+        elif "sizes" not in given.accept and DIMENSION[role] == "length":
+            filler = 0.0 if dropped_out(values).any() else filler_value(values)
+            if filler is not None:
+                about.questions.append(_filler(column.name, values, filler, unit))
         columns[role] = values if size == 1.0 else Numbers(values.value * size, values.present)
         if column.since and role == "time":
             taken[-1] = Taken(column.name, role, DATE)
         if column.since:
             about.notes.append(f"The times in {column.name} are counted from {column.since}.")
+    if "time" in columns and given.words.get("clock") == "continuous":
+        columns["time"] = _continuous(columns["time"], about)
     run_cells = _runs(raw, chosen, columns, given, about)
     if not about.questions and "input" in columns:
         codes = None if run_cells is None else _codes(run_cells)
@@ -194,9 +200,8 @@ def _unit(
     stated = [unit for unit in (spelled(column.unit), name.unit) if unit and unit != "-"]
     if stated:
         if len({known_unit(unit) or unit for unit in stated}) > 1:
-            about.questions.append(
-                Question(f"the unit of '{column.name}' is {stated[0]} and {stated[1]}", f"units.{role}={stated[0]}")
-            )
+            readings = unit_readings(role, DIMENSION[role], stated, values.value[values.present])
+            about.questions.append(asked(f"the unit of '{column.name}' is {stated[0]} and {stated[1]}", readings))
             return None
         return stated[0]
     optional = role not in NEEDED[kind] and role in ("force", "u_gap", "u_random")
@@ -205,28 +210,25 @@ def _unit(
             f"{column.name} has no unit and is not used; state its unit as units.{role} in columns.toml."
         )
         return None
-    example = likely_unit(DIMENSION[role], values.value[values.present])
-    about.questions.append(Question(f"the unit of '{column.name}' ({role}) is not stated", f"units.{role}={example}"))
+    words = f"the unit of '{column.name}' ({role}) is not stated"
+    about.questions.append(unit_question(words, role, DIMENSION[role], values.value[values.present]))
     return None
 
 
-def _filler(name: str, values: Numbers, filler: float) -> Question:
-    rows = int(np.count_nonzero(values.present & (values.value == filler)))
-    return Question(
-        f"{rows} of {values.value.size} rows of '{name}' hold {filler:.12g}, far from all others, which may mean no "
-        "value (if the number was measured, set accept=sizes)",
-        f"missing={filler:.12g}",
-    )
-
-
-def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
-    dimension = DIMENSION[role]
-    # A micro sign that was lost on the way is often a question mark.
-    micro = known_unit(unit.replace("?", "µ").replace("\N{REPLACEMENT CHARACTER}", "µ"))
-    example = micro or {"length": "0.1 um", "time": "ms", "force": "mN"}[dimension]
-    return Question(
-        f"'{column.name}' ({role}) must be a {dimension}, but its unit is '{unit}': state what one unit is worth",
-        f"units.{role}={example}",
+def _filler(name: str, values: Numbers, filler: float, unit: str) -> Question:
+    """Question whether a number means no value, with the range of the column for both answers."""
+    key = f"missing={filler:.12g}"
+    others = without_filler(values, key.partition("=")[2])
+    rows = np.count_nonzero(values.present) - np.count_nonzero(others.present)
+    size = factor(unit, "length") or 1.0
+    readings = [
+        Reading(each, span(size * kept.value[kept.present], "mm"))
+        for each, kept in ((key, others), ("accept=sizes", values))
+    ]
+    return asked(
+        f"{rows} of {values.value.size} rows of '{name}' hold {filler:.12g}, far from the rows beside them, which may "
+        "mean no value",
+        readings,
     )
 
 
@@ -297,6 +299,16 @@ def _from_epoch(values: Numbers, column: RawColumn, unit: str, about: Findings) 
             )
             return Numbers(np.where(values.present, values.value - first, 0.0), values.present)
     return values
+
+
+def _continuous(values: Numbers, about: Findings) -> Numbers:
+    """Take the leaps out of a clock that was set or ran over."""
+    known = values.value[values.present]
+    leaps = clock_leaps(known, dated=True)
+    about.notes.append(f"The clock leaps {leaps.size} time(s); times are counted on from the row before each leap.")
+    elapsed = np.zeros(values.value.size)
+    elapsed[values.present] = without_leaps(known, leaps)
+    return Numbers(elapsed, values.present)
 
 
 def _runs(

@@ -93,7 +93,7 @@ def factor(text: str, dimension: str) -> float | None:
         raise InstallationError(
             "Units of a foreign table need the library pint, which is not installed: pip install pint."
         ) from error
-    size, rest = _multiple(spelled(text))
+    size, rest = written_multiple(spelled(text))
     unit = known_unit(rest)
     if unit is None and (spelled(rest) in CASE_TELLS or BY_PREFIX.fullmatch(spelled(rest)) is None):
         return None
@@ -105,12 +105,12 @@ def factor(text: str, dimension: str) -> float | None:
     return found if found > 0.0 else None
 
 
-def _multiple(words: str) -> tuple[float, str]:
+def written_multiple(words: str) -> tuple[float, str]:
     """Split `0.1 um` or `10^-3 mm` into a number and a unit.
 
     Examples
     --------
-    >>> _multiple("0.1 um"), _multiple("10^-3 mm"), _multiple("1/100 mm"), _multiple("mm")
+    >>> written_multiple("0.1 um"), written_multiple("10^-3 mm"), written_multiple("1/100 mm"), written_multiple("mm")
     ((0.1, 'um'), (0.001, 'mm'), (0.01, 'mm'), (1.0, 'mm'))
     """
     if (scale := POWER.match(words)) is not None and scale.end() < len(words):
@@ -129,6 +129,9 @@ def is_unit(text: str) -> bool:
     words = spelled(text)
     if words.lower() in NO_UNIT or known_unit(words) is not None or words in {"%", "°", "°C", "C", "V", "A", "Hz"}:
         return True
+    rest = re.sub(r"^[x\u00d7*\u00b7]\s*", "", words)
+    if written_multiple(rest)[1] != rest:
+        return any(factor(rest, dimension) is not None for dimension in CANONICAL)
     if len(words) > 12 or any(letter.isdigit() and letter not in "23" for letter in words):
         return False
     try:

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from fingervision.tables.cells import which_mark
 from fingervision.tables.dialect import THOUSANDS, is_number
 from fingervision.tables.mapping import Entry
-from fingervision.tables.questions import OpenQuestionError, Question
+from fingervision.tables.questions import OpenQuestionError
 
 
 def is_number_text(cell: object) -> bool:
@@ -34,15 +35,5 @@ def decimal_of_texts(path: Path, rows: Sequence[Sequence[object]], given: Entry)
     if not commas:
         return "."
     if all(THOUSANDS[","].fullmatch(text) for text in commas):
-        raise OpenQuestionError(
-            path,
-            "table",
-            [
-                Question(
-                    f"each comma in the texts may be the decimal sign or a thousands separator ('{commas[0]}'): "
-                    "decimal=, or decimal=. states the decimal sign",
-                    "decimal=,",
-                )
-            ],
-        )
+        raise OpenQuestionError(path, "table", [which_mark(commas)])
     return ","

@@ -1,0 +1,39 @@
+"""Tables of other programs: nothing is read wrongly in silence, and to obey an advice never gives a wrong table."""
+
+from pathlib import Path
+
+import pytest
+
+from fingervision.tables.questions import OpenQuestionError
+from fingervision.tables.read import read_measured_table
+from tests.benchmarks.foreign.drawn import Drawn, drawn
+from tests.benchmarks.foreign_tables import outcome
+
+TABLES = drawn(seed=7, each=10)
+NO_ADVICE_IS_POSSIBLE = "Rigol"
+"""Volts of an oscilloscope: only the user knows what a volt is worth."""
+
+
+@pytest.mark.parametrize(
+    "table", [table for _, table in TABLES], ids=[f"{n}-{t[1].what}" for n, t in enumerate(TABLES)]
+)
+def test_a_foreign_table_is_read_rightly_or_asks_questions_whose_answers_are_right(
+    table: Drawn, tmp_path: Path
+) -> None:
+    told: list[str] = []
+    result = outcome(table, tmp_path, told)
+    expected = ("dead end",) if table.what == NO_ADVICE_IS_POSSIBLE else ("right", "right after advice")
+    assert result in expected, told
+
+
+def test_the_axis_that_moves_is_the_input_and_two_moving_axes_are_asked_about(tmp_path: Path) -> None:
+    rows = [f"{0.1 * k:.1f},{1e-4 * (k % 2):.4f},0.5,{0.01 * k:.3f},{3.0 + 0.1 * k:.2f}" for k in range(40)]
+    table = tmp_path / "axes.csv"
+    table.write_text("\n".join(["Time [s],X [mm],Y [mm],Z [mm],Gap [mm]", *rows]), encoding="utf-8")
+    assert read_measured_table(table).input_mm.max() == pytest.approx(0.39)
+    rows = [row.replace(",0.5,", ",0.55,") if k > 20 else row for k, row in enumerate(rows)]
+    table.write_text("\n".join(["Time [s],X [mm],Y [mm],Z [mm],Gap [mm]", *rows]), encoding="utf-8")
+    with pytest.raises(OpenQuestionError, match=r"0 to 0\.39 mm") as caught:
+        read_measured_table(table)
+    keys = [each.key for each in caught.value.questions[0].readings]
+    assert {"columns.input=Z [mm]", "columns.input=Y [mm]"} == set(keys[:2])
