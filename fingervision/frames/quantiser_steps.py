@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import av
 import numpy as np
+from av.sidedata.sidedata import SideDataContainer
 from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
@@ -44,6 +45,7 @@ BLOCK_BYTES = 20
 FADES = 0.97
 
 _fill = loop("quantiser_steps_fill")
+_side_data: Any = SideDataContainer  # PyAV's types do not know that it takes a picture
 
 
 def _vp9_steps() -> NDArray[np.float64]:
@@ -79,8 +81,9 @@ def stated_steps(picture: av.VideoFrame) -> StatedSteps | None:
     picture : av.VideoFrame
         Picture that was decoded with `EXPORTED` among the decoder's options.
     """
-    carried: Any = picture.side_data  # some versions of PyAV have no types for it
-    found = carried.get(SIDE_DATA)
+    # Up to PyAV 18, a picture keeps its `picture.side_data`, which keeps the picture: decoded pictures would stay in
+    # memory until Python's collector finds the cycle. The picture does not know of a container that is made here.
+    found = _side_data(picture).get(SIDE_DATA)
     if found is None:
         return None
     data = bytes(found)

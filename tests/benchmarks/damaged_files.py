@@ -137,7 +137,7 @@ def coded(path: Path, frames: list[Frame], coder: str, pixel_format: str, option
     """Write a film as a camera's program does."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream(coder, rate=int(RATE_HZ), options=options)
-        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, pixel_format
+        stream.width, stream.height, stream.pix_fmt = frames[0].width_px, frames[0].height_px, pixel_format
         for frame in frames:
             picture = av.VideoFrame.from_ndarray(frame.pixels, format="gray").reformat(
                 format=pixel_format, src_color_range="JPEG", dst_color_range="JPEG"

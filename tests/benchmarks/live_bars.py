@@ -21,7 +21,7 @@ import subprocess
 import sys
 from typing import Any
 
-MOST_ALONE, MOST_ADDED, MOST_GROWN = 0.15, 0.03, 1.05
+MOST_ALONE, MOST_ADDED, MOST_GROWN_MB = 0.15, 0.03, 10.0
 
 
 def part(*options: str) -> dict[str, Any]:
@@ -63,8 +63,8 @@ def main() -> None:
         met = busy["late_p99_ms"] <= busy["period_ms"]
         told(f"{where}: late, 99th percentile", late, f"a frame, {busy['period_ms']:.0f} ms", met=met)
         grown = f"{busy['early_mb']:.0f} to {busy['late_mb']:.0f} MB"
-        flat = busy["late_mb"] <= MOST_GROWN * busy["early_mb"]
-        told(f"{where}: memory", grown, "flat, within 5 %", met=flat)
+        flat = busy["late_mb"] <= busy["early_mb"] + MOST_GROWN_MB
+        told(f"{where}: memory", grown, f"flat, within {MOST_GROWN_MB:g} MB", met=flat)
         told(
             f"{where}: share of a core",
             f"{100 * busy['core']:.1f} %",

@@ -1,12 +1,13 @@
 """Speed, memory and start-up of `measure`.
 
-    python tests/benchmarks/speed.py [--frames 1500] [--runs 5] [--only rate|kinds|memory|start]
+    python tests/benchmarks/speed.py [--frames 1500] [--runs 5] [--only rate|kinds|memory|start] [--sizes 1920x1080]
 
 Rate: frames per second of decoding alone and of measuring, in turn on the same file, medians; and milliseconds of one
 core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Kinds: the
 same milliseconds for a picture of 3840x2160 and for each kind of picture without two fingers, which is refused. Memory:
-peak of a 10-minute file against a 10-second one. Start-up: `fingervision --help`. Every figure is that of the machine
-it runs on; the clip is 640x480, H.264 of about 5 Mbit/s.
+peak of `measure` at 60 and 2000 frames, for four codecs and three sizes of the picture (`--sizes` takes fewer).
+Start-up: `fingervision --help`. Every figure is that of the machine it runs on; the clip of the rates is 640x480, H.264
+of about 5 Mbit/s.
 """
 
 import argparse
@@ -36,11 +37,18 @@ from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import H264, write_clip
 from fingervision.vision.pipeline import Settings, measure_frame
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from tests.benchmarks.damaged_files import KINDS, coded
+from tests.benchmarks.scenes.empty import EMPTY
+
 PX_PER_MM = 34.0
 BELOW_PX = 0.3 * PX_PER_MM
 # Noise of this size takes x264 to about 5 Mbit/s at this quality.
 NOISE_GREY, CRF = 4.0, 20.0
 RENDERED = 100
+# Pictures of the clip that is repeated for the lengths (frames) at which memory is read.
+RENDERED_FOR_MEMORY, LENGTHS, RATE_HZ = 20, (60, 2000), 25
+SIZES = ("640x480", "1920x1080", "3840x2160")
 
 
 def pictures() -> list[Pixels]:
@@ -146,9 +154,6 @@ def rate(folder: Path, levels: list[Pixels], frames: int, runs: int) -> None:
 
 def kinds(runs: int) -> None:
     """Milliseconds of one core for a large picture, and for those that are refused."""
-    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-    from tests.benchmarks.scenes.empty import EMPTY
-
     rng = np.random.default_rng(2)
     large = two_fingers(700.0, below_tip_px=6.0 * BELOW_PX, width_px=500.0, radius_px=200.0, frame=(3840, 2160))
     shown = [("3840x2160", render(large, Camera(blur_px=1.2, noise_grey=2.0), rng), 6.0 * BELOW_PX)]
@@ -183,7 +188,7 @@ def repeat(clip: Path, path: Path, times: int) -> None:
         copy = target.add_stream_from_template(stream)
         packets = [packet for packet in source.demux(stream) if packet.dts is not None]
         stamps = [(packet.pts, packet.dts) for packet in packets]
-        length = max(pts for pts, _ in stamps) + packets[-1].duration
+        length = round(RENDERED_FOR_MEMORY / (RATE_HZ * stream.time_base))
         for k in range(times):
             for packet, (pts, dts) in zip(packets, stamps, strict=True):
                 packet.stream, packet.time_base = copy, stream.time_base
@@ -191,20 +196,31 @@ def repeat(clip: Path, path: Path, times: int) -> None:
                 target.mux(packet)
 
 
-def memory(folder: Path, levels: list[Pixels]) -> None:
-    print(f"\n{'Peak memory of measure':34}{'MB':>10}{'of the first':>14}")
-    clip, long = folder / "250.mp4", folder / "15000.mp4"
-    write(clip, 250, levels)
-    repeat(clip, long, 60)
-    peak_mb(clip, folder / "built")  # the very first run of a source tree builds its loops
-    first = None
-    for words, path in (("10 seconds, 250 frames", clip), ("10 minutes, 15000 frames", long)):
-        frames = decode(path)
-        if frames != int(path.stem):
-            raise RuntimeError(f"{path.name} must hold as many frames as its name says, but holds {frames}.")
-        peak = peak_mb(path, folder / f"out{path.stem}")
-        first = first or peak
-        print(f"{words:34}{peak:10.0f}{peak / first:14.2f}", flush=True)
+def memory(folder: Path, sizes: list[str]) -> None:
+    """Largest resident memory of `measure` at two lengths, and what the longer file needs of the shorter's."""
+    rng = np.random.default_rng(4)
+    short, long = LENGTHS
+    print(f"\n{f'Peak memory of measure, {short} and {long} frames':46}{'MB':>7}{'MB':>7}{'ratio':>7}")
+    for size in sizes:
+        width_px, height_px = (int(part) for part in size.split("x"))
+        zoom = height_px / 480.0
+        scene = [two_fingers((90.0 + k) * zoom, radius_px=34.0, frame=(width_px, height_px)) for k in range(5)]
+        shown = [render(each, Camera(blur_px=0.9, noise_grey=NOISE_GREY), rng) for each in scene]
+        clip = [Frame(shown[k % len(shown)], k, k / RATE_HZ) for k in range(RENDERED_FOR_MEMORY)]
+        for kind in ("h264.mp4", "hevc.mp4", "mjpeg.mkv", "ffv1.mkv"):
+            drawn = folder / kind
+            coded(drawn, clip, *KINDS[kind])
+            peaks = []
+            for count in LENGTHS:
+                path = folder / f"{count}-{kind}"
+                repeat(drawn, path, count // RENDERED_FOR_MEMORY)
+                if (frames := decode(path)) != count:
+                    raise RuntimeError(f"{path.name} must hold as many frames as its name says, but holds {frames}.")
+                if size == sizes[0] and not peaks:
+                    peak_mb(path, folder / "built")  # the very first run of a source tree builds its loops
+                peaks.append(peak_mb(path, folder / f"{size}-{path.name}.out"))
+                path.unlink()
+            print(f"{f'{size}, {kind}':46}{peaks[0]:7.0f}{peaks[1]:7.0f}{peaks[1] / peaks[0]:7.2f}", flush=True)
 
 
 def start_up(runs: int) -> None:
@@ -218,9 +234,10 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=1500)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--only", choices=["rate", "kinds", "memory", "start"])
+    parser.add_argument("--sizes", nargs="+", default=SIZES)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        folder, levels = Path(name), pictures() if asked.only not in ("start", "kinds") else []
+        folder, levels = Path(name), pictures() if asked.only in (None, "rate") else []
         if asked.only in (None, "rate"):
             rate(folder, levels, asked.frames, asked.runs)
         if asked.only in (None, "kinds"):
@@ -228,7 +245,7 @@ def main() -> None:
         if asked.only in (None, "start"):
             start_up(asked.runs)
         if asked.only in (None, "memory"):
-            memory(folder, levels)
+            memory(folder, asked.sizes)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The quantiser steps of a stream are read for every block, at the block's position in the picture."""
 
+import gc
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -60,6 +61,22 @@ def test_mpeg4_leaves_alone_as_much_as_h264_of_twice_its_step(tmp_path: Path) ->
     frames = frames_of(recorded(tmp_path / "clip.avi", "mpeg4", {"qscale": "5"}))
     assert frames[0].quantiser is not None
     assert np.median(frames[0].quantiser.step) == 2.0 * 2.0 * 5.0
+
+
+@pytest.mark.parametrize("codec", ["libx264", "libx265", "mpeg4", "ffv1"])
+def test_decoded_pictures_leave_memory_without_the_collector(tmp_path: Path, codec: str) -> None:
+    options = {"qscale": "5"} if codec == "mpeg4" else {"x265-params": "log-level=none"} if codec == "libx265" else {}
+    path = recorded(tmp_path / "clip.mkv", codec, options)
+    frames_of(path)  # what is made once, at the first file
+    gc.collect()
+    gc.disable()
+    try:
+        count = len(frames_of(path))
+        unreachable = gc.collect()
+    finally:
+        gc.enable()
+    assert count == 3
+    assert unreachable < count
 
 
 def test_vp9_steps_end_where_the_format_does() -> None:
