@@ -5,7 +5,7 @@ a finger may be shown at its position in an earlier frame. The container may hel
 CRC-32 states the checksum of all following bytes (FFmpeg writes it into `.mkv`, not into `.webm`). If the checksum is
 wrong, every picture of the cluster counts as damaged, and so does every later picture that depends on a damaged
 picture. Codecs that detect damage themselves are not checked by checksums, because a codec rejects a single picture
-whereas a wrong checksum rejects a whole cluster.
+whereas a wrong checksum rejects a whole cluster; for them a wrong checksum only says that times may be damaged.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 11.3.1 (CRC-32: of ISO 3309, little-endian).
 """
@@ -14,6 +14,7 @@ import mmap
 from binascii import crc32
 from bisect import bisect_right
 from pathlib import Path
+from typing import BinaryIO
 
 from fingervision.frames.ebml import element
 from fingervision.frames.matroska_times import CLUSTER
@@ -44,7 +45,7 @@ class ClusterChecksums:
         """Whether every cluster has a checksum that agrees with its bytes."""
         try:
             with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-                self._read(content)
+                self._read(content, file)
         except (OSError, ValueError):
             return
 
@@ -55,7 +56,12 @@ class ClusterChecksums:
         at = bisect_right(self._sound, (position + 1, 0)) - 1
         return at < 0 or position >= self._sound[at][1]
 
-    def _read(self, content: mmap.mmap) -> None:
+    @property
+    def is_any_broken(self) -> bool:
+        """Whether a cluster of a file with checksums has a wrong one, or none."""
+        return self.are_stated and not self.cover_all
+
+    def _read(self, content: mmap.mmap, file: BinaryIO) -> None:
         at, clusters = content.find(CLUSTER), 0
         while at >= 0:
             clusters += 1
@@ -63,7 +69,9 @@ class ClusterChecksums:
             if cluster is not None:
                 stated = _stated(content, cluster.begin)
                 self.are_stated = self.are_stated or stated is not None
-                if stated is not None and crc32(content[cluster.begin + ELEMENT_BYTES : cluster.end]) == stated:
+                # Pages read through the map would stay in memory, as many as the file has.
+                file.seek(cluster.begin + ELEMENT_BYTES)
+                if stated is not None and crc32(file.read(max(0, cluster.end - file.tell()))) == stated:
                     self._sound.append((at, cluster.end))
                     end = cluster.end
             at = content.find(CLUSTER, end)

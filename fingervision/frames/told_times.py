@@ -1,4 +1,4 @@
-"""Detect damage from time stamps: times that decrease, isolated jumps, missing frames."""
+"""Detect damage from time stamps: times that decrease, isolated jumps in a damaged file, missing frames."""
 
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
@@ -16,21 +16,30 @@ TICKS = 1.01
 BACKWARDS = (
     "The frame's time is not later than that of the previous frame: one of the two times is damaged in the file."
 )
-OUT_OF_ROW = "The frame's time does not fit between those of its neighbours, which are equidistant."
+OUT_OF_ROW = (
+    "The frame's time does not fit between those of its neighbours, which are equidistant, and a checksum of the file "
+    "is wrong."
+)
 
 
-def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
+def believable(pictures: Iterable[Picture], *, is_damaged: bool) -> Iterator[Picture]:
     """Yield pictures in order of presentation, with lost frames in place of pictures whose time is impossible.
 
     Pictures leave a decoder in the order of presentation. If a time is earlier than the previous time, one of the two
     times is wrong, but it is not known which one. Two pictures with contradicting times count as lost, and so do all
-    following pictures until times are later than both times. A single time that deviates from an otherwise regular
-    series is wrong. A repeated time is left unchanged, because it means a duplicate frame.
+    following pictures until times are later than both times. A repeated time is left unchanged, because it means a
+    duplicate frame.
+
+    A single time that deviates from an otherwise regular series counts as wrong only in a file that is known to be
+    damaged: in a sound file it is the camera's. A camera that is late by some milliseconds in one frame of hundreds is
+    common, and one flipped bit that meets the two bytes of a time is rare.
 
     Parameters
     ----------
     pictures : iterable of (int or None, VideoFrame or str)
         Ticks with pictures, or with the reason why there is no picture. One item is read in advance.
+    is_damaged : bool
+        Whether the bytes that state the times may be damaged: a checksum over them is wrong.
 
     Yields
     ------
@@ -56,7 +65,7 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
             held, before = _lost(picture, BACKWARDS), None
             steps.clear()
             continue
-        if before is not None and _out_of_row(steps, held_tick - before, tick - held_tick):
+        if is_damaged and before is not None and _out_of_row(steps, held_tick - before, tick - held_tick):
             held = _lost(held, OUT_OF_ROW)
         else:
             if before is not None:
@@ -95,7 +104,8 @@ class EvenRow:
         self._steps.append(step)
         if often < EVEN_STEPS // 2 and self._stated is not None and abs(usual - self._stated) <= TICKS:
             often = EVEN_STEPS
-        return often >= EVEN_STEPS // 2 and step > usual + TICKS
+        # A missing frame leaves at least two steps; a time that jitters is no missing frame.
+        return often >= EVEN_STEPS // 2 and step > 1.5 * usual + TICKS
 
 
 def _usual(steps: "deque[int]") -> float | None:

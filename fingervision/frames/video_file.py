@@ -161,13 +161,13 @@ class VideoFile:
                 # (libavcodec/h264_slice.c, enable_er), so that parts of older pictures would remain unnoticed.
                 # With threads for frames, the exported quantiser steps of some pictures are incomplete, differently in
                 # every run, because FFmpeg exports them before the last slice is decoded.
-                # With threads for frames, the exported quantiser steps of some pictures are incomplete, differently in
-                # every run, because FFmpeg exports them before the last slice is decoded.
                 stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
             tick_s = stream.time_base
             untrusted = unseen_damage(Path(self.name), stream, container.metadata.get("comment"))
-            for tick, found in believable(pictures(container, stream, Path(self.name))):
+            # Only a checksum over the bytes between the pictures, as Matroska has, tells that a time may be damaged.
+            is_damaged = "matroska" in container.format.name and ClusterChecksums(Path(self.name)).is_any_broken
+            for tick, found in believable(pictures(container, stream, Path(self.name)), is_damaged=is_damaged):
                 index = next(numbers)
                 time_s = None if tick is None or tick_s is None else tick * tick_s.numerator / tick_s.denominator
                 if untrusted or isinstance(found, str):
