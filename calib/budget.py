@@ -90,7 +90,7 @@ def distance_budget(
     u_random_px : ndarray, shape (n,)
         Random standard uncertainty of each distance, in pixels of `flat_px`.
     polarity : ndarray, shape (n,)
-        +1 for a light gap, -1 for a dark gap.
+        +1 for a light gap, -1 for a dark gap; nearer to zero where the edge bias displaces the points by less.
     """
     limits, s = scale.limits, scale.px_per_mm
     said = scale.how_stated

@@ -38,7 +38,9 @@ class BareScale:
         """Zero, because the edge bias is not known."""
         return 0.0
 
-    def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
+    def distances(
+        self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_], shares: Floats | None = None
+    ) -> Distances:
         """Distances between pairs of points, without the (unknown) uncertainty of the scale.
 
         Parameters
@@ -49,6 +51,8 @@ class BareScale:
             Standard uncertainty of each distance due to effects that vary from frame to frame.
         light_gap : ndarray of bool, shape (n,)
             True for a light gap between dark edges; without an edge bias it makes no difference.
+        shares : ndarray, shape (n, 2), optional
+            Share of the edge bias at each point; without an edge bias it makes no difference.
 
         Returns
         -------
@@ -64,13 +68,18 @@ class BareScale:
         )
 
     def positions_mm(
-        self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
+        self,
+        points_px: Floats,
+        axis: int,
+        light_gap: NDArray[np.bool_],
+        frame_size_px: tuple[int, int],
+        shares: Floats | None = None,
     ) -> Floats:
         """Coordinates (mm) of both points of each distance along an axis of the picture, from the picture's centre.
 
         Parameters
         ----------
-        points_px, light_gap
+        points_px, light_gap, shares
             As for `distances`.
         axis : int
             0 for x (to the right), 1 for y (downwards).

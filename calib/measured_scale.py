@@ -194,11 +194,15 @@ class Calibration:
             seen = self.plane.unflatten(seen)
         return seen if self.lens is None else self.lens.distort(seen)
 
-    def budget(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Budget:
+    def budget(
+        self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_], shares: Floats | None = None
+    ) -> Budget:
         """Uncertainty budget of each distance; the arguments are those of `distances`."""
-        return self._measured(points_px, u_random_px, light_gap)[1]
+        return self._measured(points_px, u_random_px, light_gap, shares)[1]
 
-    def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
+    def distances(
+        self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_], shares: Floats | None = None
+    ) -> Distances:
         """Distances between pairs of points.
 
         Parameters
@@ -209,13 +213,16 @@ class Calibration:
             Standard uncertainty of each distance due to effects that vary from frame to frame.
         light_gap : ndarray of bool, shape (n,)
             True for a light gap between dark edges.
+        shares : ndarray, shape (n, 2), optional
+            Displacement of the first and the second point across the gap, as a share of the displacement of an outline
+            along its normal; 1, the default, for straight parallel edges.
 
         Returns
         -------
         Distances
             Values, standard uncertainties with the full budget, and random standard uncertainties; millimetres.
         """
-        value_mm, budget = self._measured(points_px, u_random_px, light_gap)
+        value_mm, budget = self._measured(points_px, u_random_px, light_gap, shares)
         return Distances(value_mm=value_mm, u_mm=budget.u_mm, u_random_mm=budget.u_random_mm)
 
     def positions_mm(
@@ -224,6 +231,7 @@ class Calibration:
         axis: int,
         light_gap: NDArray[np.bool_],
         frame_size_px: tuple[int, int],
+        shares: Floats | None = None,
     ) -> Floats:
         """Coordinates of both points of each distance along an axis of the picture, from the picture's centre (mm).
 
@@ -232,7 +240,7 @@ class Calibration:
 
         Parameters
         ----------
-        points_px, light_gap
+        points_px, light_gap, shares
             As for `distances`.
         axis : int
             0 for x (to the right), 1 for y (downwards).
@@ -249,7 +257,7 @@ class Calibration:
         length = np.linalg.norm(apart, axis=1)
         along = np.divide(apart[:, axis], length, out=np.ones_like(length), where=length > 0.0)
         half_px = np.where(light_gap, 0.5, -0.5) * self.edge_bias_px * along
-        outward_px = np.stack([-half_px, half_px], axis=1)
+        outward_px = np.stack([-half_px, half_px], axis=1) * (1.0 if shares is None else shares)
         return np.asarray((flat[:, :, axis] - centre_px(frame_size_px)[axis] + outward_px) / self.px_per_mm)
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:
@@ -271,13 +279,15 @@ class Calibration:
                     "this setting, or calibrate again."
                 )
 
-    def _measured(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> tuple[Floats, Budget]:
+    def _measured(
+        self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_], shares: Floats | None
+    ) -> tuple[Floats, Budget]:
         points = np.asarray(points_px, dtype=np.float64)
         flat = self.flatten(points)
         flat_gap_px = np.linalg.norm(flat[:, 1] - flat[:, 0], axis=1)
         gap_px = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
         magnified = np.divide(flat_gap_px, gap_px, out=np.ones_like(gap_px), where=gap_px > 0.0)
-        polarity = np.where(light_gap, 1.0, -1.0)
+        polarity = np.where(light_gap, 1.0, -1.0) * (1.0 if shares is None else np.mean(shares, axis=1))
         value_mm = (flat_gap_px + polarity * self.edge_bias_px) / self.px_per_mm
         budget = distance_budget(
             self, points, flat, value_mm, magnified * np.asarray(u_random_px, dtype=np.float64), polarity

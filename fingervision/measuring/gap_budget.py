@@ -8,11 +8,10 @@ from calib.budget import Budget, BudgetLine
 from calib.contributions import edge_noise_mm
 from calib.measured_scale import Calibration
 from fingervision.domain.gap import GapMeasurement
+from fingervision.measuring.bias_share import bias_shares
 from fingervision.measuring.response_budget import u_response_shift_mm
 from fingervision.measuring.scale import Scale
-from fingervision.measuring.tip_bias import u_tip_bias_mm
 
-TIPS = "edge bias at rounded tips"
 PICTURE = "seen beside or at the edges"
 RESPONSE = "assumed camera response"
 
@@ -46,12 +45,10 @@ def gap_budget(measured: Sequence[GapMeasurement], scale: Scale) -> Budget:
         return Budget((noise, seen))
     points = np.array([((m.left.x_px, m.left.y_px), (m.right.x_px, m.right.y_px)) for m in measured], dtype=float)
     light_gap = np.array([m.light_gap for m in measured], dtype=bool)
-    of_scale = scale.budget(points, u_random_px, light_gap)
-    u_tip_mm = u_tip_bias_mm(measured, scale.edge_bias_px, scale.px_per_mm)
+    of_scale = scale.budget(points, u_random_px, light_gap, bias_shares(measured))
     return Budget(
         (
             *of_scale.lines,
-            BudgetLine(TIPS, u_tip_mm, "the calibration's edge bias and the slope of each edge"),
             seen,
             BudgetLine(
                 RESPONSE, u_response_shift_mm(measured, scale), "the change of the gap under the other usual response"

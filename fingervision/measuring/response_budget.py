@@ -10,6 +10,7 @@ from calib.camera_response import CameraResponse, standard_response
 from calib.measured_scale import Calibration
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.transfer_tag import transfer_tag
+from fingervision.measuring.bias_share import bias_shares
 from fingervision.measuring.scale import Scale
 
 
@@ -23,7 +24,7 @@ def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDA
     if not isinstance(scale, Calibration) or scale.response_shift_px is None:
         return np.zeros(len(measured))
     shift_px = np.array([m.response_shift_px for m in measured])
-    polarity = np.where([m.light_gap for m in measured], 1.0, -1.0)
+    polarity = np.where([m.light_gap for m in measured], 1.0, -1.0) * bias_shares(measured).mean(axis=1)
     left_px = np.where(shift_px == 0.0, 0.0, shift_px - polarity * scale.response_shift_px)
     return np.asarray(np.abs(left_px) / np.sqrt(3.0) / scale.px_per_mm)
 

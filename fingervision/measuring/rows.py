@@ -8,6 +8,7 @@ import numpy as np
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.measuring.bias_share import bias_shares
 from fingervision.measuring.drive_at import drive_at
 from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.scale import Scale
@@ -76,11 +77,14 @@ class RowMaker:
         u_random_px = np.array([m.u_gap_px for m in measured], dtype=float)
         light_gap = np.array([m.light_gap for m in measured], dtype=bool)
         vertical = np.array([m.direction.is_vertical for m in measured], dtype=bool)
-        distances = self.scale.distances(points, u_random_px, light_gap)
+        shares = bias_shares(measured)
+        distances = self.scale.distances(points, u_random_px, light_gap, shares)
         across = np.empty((len(measured), 2))
         for axis, chosen in ((0, vertical), (1, ~vertical)):
             if chosen.any():
-                across[chosen] = self.scale.positions_mm(points[chosen], axis, light_gap[chosen], self.frame_size_px)
+                across[chosen] = self.scale.positions_mm(
+                    points[chosen], axis, light_gap[chosen], self.frame_size_px, shares[chosen]
+                )
         u_mm: list[float | None] = [None] * len(measured)
         if distances.u_mm is not None:
             u_mm = gap_budget(measured, self.scale).u_mm.tolist()

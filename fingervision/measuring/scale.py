@@ -88,12 +88,19 @@ class Scale(Protocol):
         """Edge bias b of the calibration (px): loss of width of a light gap between straight dark edges."""
         ...
 
-    def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
+    def distances(
+        self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_], shares: Floats | None = None
+    ) -> Distances:
         """Distances between pairs of points."""
         ...
 
     def positions_mm(
-        self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
+        self,
+        points_px: Floats,
+        axis: int,
+        light_gap: NDArray[np.bool_],
+        frame_size_px: tuple[int, int],
+        shares: Floats | None = None,
     ) -> Floats:
         """Coordinates (mm) along an axis, from the picture's centre, of the two points of each distance."""
         ...

@@ -25,6 +25,7 @@ from calib.measured_scale import Reference
 from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
+from fingervision.measuring.bias_share import bias_shares
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.lens import RadialLens, Tilt
 from fingervision.rendering.light import Light
@@ -113,7 +114,9 @@ def trial(seed: int, shape: str, radius_mm: float) -> tuple[str, float, float, f
     if not isinstance(found, GapMeasurement):
         return None
     points = np.array([[[found.left.x_px, found.left.y_px], [found.right.x_px, found.right.y_px]]])
-    got = fit.calibration.distances(points, np.array([found.u_gap_px]), np.array([found.light_gap]))
+    got = fit.calibration.distances(
+        points, np.array([found.u_gap_px]), np.array([found.light_gap]), bias_shares([found])
+    )
     assert got.u_mm is not None
     bare_mm = found.gap_px / fit.calibration.px_per_mm
     return name, float(got.value_mm[0]) - gap_mm, float(got.u_mm[0]), float(got.u_random_mm[0]), bare_mm - gap_mm

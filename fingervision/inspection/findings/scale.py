@@ -8,6 +8,7 @@ from calib.measured_scale import Calibration
 from fingervision.domain.status import Status
 from fingervision.inspection.finding import Finding, refusing, weighed, without
 from fingervision.inspection.sample import FILLED, Sample
+from fingervision.measuring.bias_share import bias_shares
 
 CLOSER = (
     "Bring the camera nearer, or use a lens of longer focal length, until fingers and gap fill most of the picture."
@@ -54,7 +55,7 @@ def _calibration(sample: Sample) -> tuple[float, str]:
         return 0.0, ""
     m = sample.looks[len(sample.looks) // 2].outcome
     points = np.array([[[m.left.x_px, m.left.y_px], [m.right.x_px, m.right.y_px]]])
-    budget = scale.budget(points, np.array([m.u_gap_px]), np.array([m.light_gap]))
+    budget = scale.budget(points, np.array([m.u_gap_px]), np.array([m.light_gap]), bias_shares([m]))
     u_mm, random_mm = float(budget.u_mm[0]), float(budget.u_random_mm[0])
     shared = [line for line in budget.lines if line.shared]
     worst = max(shared, key=lambda line: float(line.u_mm[0]), default=None)

@@ -15,6 +15,7 @@ from fingervision.live.commands.asking import Answer, Request, shown, words
 from fingervision.live.playback.playback import Playback
 from fingervision.live.set_up import SetUp
 from fingervision.live.view import View
+from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.scale import stated_scale
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.settings_toml import read_settings, write_settings
@@ -114,9 +115,7 @@ def _budget(view: View) -> list[list[Any]] | None:
     if seen is None or not isinstance(scale, Calibration) or not isinstance(seen.outcome, GapMeasurement):
         return None
     outcome = seen.outcome
-    points = np.array([[[edge.x_px, edge.y_px] for edge in (outcome.left, outcome.right)]])
-    budget = scale.budget(points, np.array([outcome.u_gap_px]), np.array([outcome.light_gap]))
-    lines = sorted(budget.lines, key=lambda line: -float(line.u_mm[0]))
+    lines = sorted(gap_budget([outcome], scale).lines, key=lambda line: -float(line.u_mm[0]))
     return [[line.source, 1e3 * float(line.u_mm[0]), line.supplied] for line in lines]
 
 
