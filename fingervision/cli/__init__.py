@@ -64,8 +64,12 @@ class Commands(click.Group):
         """Run the command; an error about an argument states the name of the command-line option."""
         from fingervision.interface.argument_names import command_words
 
-        with command_words():
-            return super().invoke(ctx)
+        try:
+            with command_words():
+                return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("fingervision: Stopped before it was done, as asked (Ctrl-C or SIGTERM).", err=True)
+            ctx.exit(ExitCode.COULD_NOT)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

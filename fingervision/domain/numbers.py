@@ -62,7 +62,7 @@ def stated_number(text: str, name: str) -> float:
     [34.0, 0.067, 1.234, 1234.5, 1234.5, 0.0015]
     """
     readings = [value for mark in ".," if (value := to_number(text, mark)) is not None]
-    if not readings:
+    if not readings or any(sign.isdigit() and not sign.isascii() for sign in text):
         raise ArgumentError(name, "be a number", f"is {text!r}")
     if "," in text and len(set(readings)) > 1:
         whole, broken = readings

@@ -58,7 +58,7 @@ def stand_beside(session: Session, beside: Beside) -> None:
         put_live_gauges(session, beside.gauges, is_asked_for=True)
     if isinstance(bench, Bench):
         session.features |= {"bed": bench, "allow_motion": beside.allow_motion}
-        bench.say = session.say
+        bench.say, bench.supervisor = session.say, session.supervisor
         if model is None and bench.bed.model is not None:
             # Prediction for the bed's gripper without the hidden effects, in the same form as the file beside a run's
             # table.
@@ -78,4 +78,4 @@ def stand_beside(session: Session, beside: Beside) -> None:
     if model is not None:
         comparison = Comparison(session, model, beside.kind)
         session.features["model"] = comparison
-        session.on_row.append(comparison.add)
+        session.on_row.append(session.supervisor.guarded("Comparing with the model", comparison.add))

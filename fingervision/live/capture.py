@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from queue import Empty, Full, Queue
-from threading import Event, Thread
+from threading import Event
 from time import monotonic
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import Driven, LiveSource, OwnPacket, Received
 from fingervision.live.adjustments import Adjustments
-from fingervision.live.promptness import be_prompt
+from fingervision.live.supervisor import Supervisor, told
 from fingervision.live.timeline import Timeline
 
 # Largest number of frames that wait for the measurement while the processor is busy: four seconds at 25 frames per
@@ -18,6 +18,7 @@ from fingervision.live.timeline import Timeline
 FRAMES_WAITING = 100
 # Time between attempts to open an interrupted source again.
 AGAIN_AFTER_S = 0.3
+READING = "Reading the source"
 
 Open = Callable[[], LiveSource]
 
@@ -79,19 +80,19 @@ class Capture:
         self._begun, self._stopped = Event(), Event()
         self._index = 0
         self._timeline = Timeline(monotonic())
-        self._thread = Thread(target=self._read, name="capture", daemon=True)
 
-    def start(self) -> None:
+    def start(self, supervisor: Supervisor) -> None:
         """Begin to read and discard frames, because frames that queue up in a camera would arrive late."""
+        self._supervisor = supervisor
         if self._again is not None:
-            self._thread.start()
+            self._thread = supervisor.start(READING, self._read, self._end)
 
     def begin(self) -> None:
         """Pass frames to the measurement from now on; a recording is read from its first frame."""
         self._timeline = Timeline(monotonic())
         self._begun.set()
         if self._again is None:
-            self._thread.start()
+            self._thread = self._supervisor.start(READING, self._read, self._end)
 
     def stop(self) -> None:
         """End reading; queued frames are kept."""
@@ -105,8 +106,10 @@ class Capture:
         except Empty:
             return None
 
+    def _end(self, why: str) -> None:
+        self._put(Ended())
+
     def _read(self) -> None:
-        be_prompt()
         while not self._stopped.is_set():
             try:
                 for received in self.source.received():
@@ -121,14 +124,12 @@ class Capture:
                     self._put(Ended())
                     return
                 why = "The source ended."
-            except FingervisionError as error:
-                why = str(error)
-            except Exception as error:  # an error in a driver must not end the live view without a message
-                why = f"The source failed ({type(error).__name__}: {error})."
-            if self._again is None:
-                self._put(Happening("failed", why))
-                self._put(Ended())
-                return
+            except Exception as error:  # a camera may come back after any error of its driver
+                if self._stopped.is_set():
+                    return
+                if self._again is None:
+                    raise
+                why = told(error) if isinstance(error, FingervisionError) else f"The source failed ({told(error)})."
             self._put(Happening("interrupted", f"{why} The live view waits until the source is back."))
             if not self._reopened():
                 return

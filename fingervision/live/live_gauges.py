@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.gauges.kinds import measured_together
@@ -13,7 +12,7 @@ from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.reading import unread
 from fingervision.live.playback.gauge_board import GaugeBoard
-from fingervision.live.playback.gauge_following import NO_SCALE, told
+from fingervision.live.playback.gauge_following import FOLLOWING, NO_SCALE, told
 from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
 from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
@@ -47,7 +46,6 @@ class LiveGauges:
         self._read: OrderedDict[int, tuple[int, list[dict[str, Any]]]] = OrderedDict()
         self._scale: object = None
         self._left_out: deque[bool] = deque(maxlen=FRAMES_COUNTED)
-        self._failure = ""
         self.frames = 0
 
     @property
@@ -61,8 +59,8 @@ class LiveGauges:
         """Reason why there are no readings, or fewer readings than frames."""
         if self._session.choices.task is None:
             return NO_SCALE
-        if self._failure:
-            return self._failure
+        if failure := self._session.supervisor.trouble_of(FOLLOWING):
+            return failure
         if left_out := sum(self._left_out):
             return (
                 f"{left_out} of the last {len(self._left_out)} frames were measured without the gauges, because the "
@@ -84,11 +82,8 @@ class LiveGauges:
         self._left_out.append(is_left_out)
         if is_left_out:
             return
-        try:
+        with self._session.supervisor.watching(FOLLOWING):
             self._read_all(item, row)
-            self._failure = ""
-        except (FingervisionError, ValueError, ArithmeticError, IndexError) as error:
-            self._failure = f"The gauges cannot be read ({type(error).__name__}: {error})."
 
     def _read_all(self, item: Frame | LostFrame, row: GapRow | None) -> None:
         task = self._session.choices.task

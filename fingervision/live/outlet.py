@@ -3,8 +3,10 @@
 import os
 from contextlib import suppress
 from queue import Empty, Full, Queue
-from threading import Event, Thread
+from threading import Event
 from typing import TextIO
+
+from fingervision.live.supervisor import Supervisor
 
 # Largest number of queued lines: ten minutes at 25 frames per second. Further lines are left out and counted.
 LINES_WAITING = 15_000
@@ -19,19 +21,20 @@ class Outlet:
     ----------
     stream : text stream or None
         Standard output or standard error; None if the stream was closed before the program began.
+    supervisor : Supervisor
+        Supervisor of the live view.
     waiting : int
         Largest number of queued lines.
     """
 
-    def __init__(self, stream: TextIO | None, waiting: int = LINES_WAITING) -> None:
+    def __init__(self, stream: TextIO | None, supervisor: Supervisor, waiting: int = LINES_WAITING) -> None:
         self.left_out = 0
         self.broken = stream is None
         """Whether the stream is closed, so that text cannot be printed any more."""
         self._stream = stream
         self._waiting: Queue[str] = Queue(waiting)
         self._ending = Event()
-        self._thread = Thread(target=self._print, name="printing", daemon=True)
-        self._thread.start()
+        self._thread = supervisor.start("Printing", self._print)
 
     def put(self, text: str) -> None:
         """Queue text for printing; never waits."""

@@ -14,15 +14,22 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from fingervision.domain.errors import FingervisionError, StateError
 from fingervision.live.commands import Answer, harmless, obey
+from fingervision.live.commands.asking import QuestionError
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.guard import POLICY_VIOLATION, WRITER
+from fingervision.live.page_words import page_json
 from fingervision.live.pen import Pen
 from fingervision.live.picture_watch import PictureWatch
 from fingervision.live.preview import Known, is_short, message, state_has_changed
+from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
 
 MESSAGES_A_SECOND, MOST_DIGITS = 120, 12
-TRY_AGAIN_LATER = 1013
+TRY_AGAIN_LATER, UNSUPPORTED_DATA = 1013, 1003
+# Largest length of the reason with which a WebSocket is closed (RFC 6455, section 5.5: 123 bytes).
+MOST_OF_REASON = 100
+# Errors of a connection that its browser has ended.
+GONE = (WebSocketDisconnect, TimeoutError, OSError, RuntimeError)
 # Shortest time between two pictures, as a screen needs it; longest time between two states without a new picture.
 PREVIEW_EVERY_S, STATE_EVERY_S = 0.03, 0.2
 # Time between two pictures while the measurement or the disk is too slow.
@@ -30,7 +37,7 @@ PREVIEW_IN_A_HURRY_EVERY_S = 0.5
 # The connection of a page that does not acknowledge a state within this time is closed.
 ACKNOWLEDGED_WITHIN_S = 20.0
 ONLY_LOOKS = "With this address you can only watch: ask whoever started the live view for the address that controls it."
-TAKE_OVER = "take_over"
+TAKE_OVER, SENDING = "take_over", "Sending to a page"
 
 
 class PageSocket:
@@ -75,16 +82,12 @@ class PageSocket:
             await asyncio.gather(*tasks, return_exceptions=True)
         failed = next((error for task in done if (error := task.exception()) is not None), None)
         if failed is not None and not isinstance(failed, WebSocketDisconnect):
-            silent = isinstance(failed, TimeoutError)
-            why = (
-                "The browser page did not acknowledge the last picture."
-                if silent
-                else f"Sending failed ({type(failed).__name__})."
-            )
-            if not silent:
-                self._view.say("page", f"{why} The browser page connects again.")
+            why = "The browser page did not acknowledge the last picture."
+            if not isinstance(failed, GONE):
+                why = sentence(SENDING, failed)
+                self._view.supervisor.alarm(SENDING, why)
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-                await page.close(TRY_AGAIN_LATER, why)
+                await page.close(TRY_AGAIN_LATER, why[:MOST_OF_REASON])
 
     def _about(self) -> dict[str, Any]:
         return {"viewer": self._is_viewer, "holds_pen": not self._is_viewer and self._pen.may_write(self)}
@@ -117,7 +120,13 @@ class PageSocket:
         received_s: deque[float] = deque(maxlen=MESSAGES_A_SECOND)
         with contextlib.suppress(WebSocketDisconnect):
             while True:
-                text = await self._page.receive_text()
+                received = await self._page.receive()
+                if received["type"] == "websocket.disconnect":
+                    return
+                text = received.get("text")
+                if text is None:
+                    await self._page.close(UNSUPPORTED_DATA, "A message of the page must be text, but is binary.")
+                    return
                 if len(received_s) == MESSAGES_A_SECOND and monotonic() - received_s[0] < 1.0:
                     await self._page.close(
                         POLICY_VIOLATION, f"A page may send at most {MESSAGES_A_SECOND} messages per second."
@@ -128,7 +137,7 @@ class PageSocket:
                 if request.get("do") == "ack":
                     self._acknowledged.set()
                 else:
-                    await self._page.send_text(json.dumps(await self._answer(request)))
+                    await self._page.send_text(page_json(await self._answer(request)))
 
     def _may_write(self, takes_over: bool) -> None:
         if self._is_viewer:
@@ -140,16 +149,27 @@ class PageSocket:
 
     async def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request.get("do")
+        answer = Answer()
+        refused: dict[str, Any] = {}
+        part = f"The request {str(name)[:40]}"
         try:
             if not (isinstance(name, str) and name in harmless()):
                 self._may_write(name == TAKE_OVER)
             if name == TAKE_OVER:
                 return {"words": "", "do": name}
-            answer: Answer = await asyncio.to_thread(obey, self._view, request)
+            answer = await asyncio.to_thread(obey, self._view, request)
+            self._view.supervisor.clear(part)
+        except QuestionError as error:
+            refused = {"question": str(error), "request": {**request, "sure": True}}
         except FingervisionError as error:
-            return {"refused": str(error), "do": str(name)[:40], "field": getattr(error, "field", None)}
+            refused = {"refused": str(error), "field": getattr(error, "field", None)}
+        except Exception as error:  # the request is answered, and the connection of the page remains
+            refused = {"refused": sentence(part, error)}
+            self._view.supervisor.alarm(part, refused["refused"])
         finally:
             state_has_changed()
+        if refused:
+            return {**refused, "do": str(name)[:40]}
         if answer.pictures:
             self._steps[:] = answer.pictures
         steps = [title for title, _ in answer.pictures]

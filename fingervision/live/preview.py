@@ -1,6 +1,5 @@
 """Compose a message to the browser page: changes since the last message, and the newest picture with measured edges."""
 
-import json
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.live.commands import section
 from fingervision.live.frame_measurement import Seen
+from fingervision.live.page_words import page_json
 from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import draw_overlay
@@ -78,18 +78,24 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
     last = min(count, first + ROWS_AT_ONCE)
     rows = list(view.rows(first, last))
     said = [each for each in tuple(view.messages) if not is_same or each.number > known.messages]
+    measured: dict[str, Any] = {"points": [], "now": None}
+    with view.supervisor.watching("Describing the measurement"):
+        measured = {"points": points(view, rows), "now": _now(view, seen or view.seen)}
+    state = {**_STATES.of(view), **(about or {})}
     head = {
         "view": identity,
         "first": first,
         "last": last,
         "count": count,
-        "points": points(view, rows),
-        "now": _now(view, seen or view.seen),
-        "state": {**_STATES.of(view), **(about or {})},
+        **measured,
+        "state": state,
         "messages": [[each.number, each.name, each.words] for each in said],
     }
-    words = json.dumps(head, ensure_ascii=False).encode()
-    picture = b"" if seen is None else _PICTURES.of(seen)
+    words = page_json(head).encode()
+    picture = b""
+    if seen is not None:
+        with view.supervisor.watching("Drawing the picture"):
+            picture = _PICTURES.of(seen)
     content = struct.pack(">I", len(words)) + words + picture
     newest = max([known.messages if is_same else 0, *(each.number for each in said)])
     return Next(content, Known(identity, last, newest))
@@ -98,7 +104,10 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
     """Rows for the chart: time, gap, standard uncertainty, frame, reason for a missing gap, and the model's gap."""
     model = view.features.get("model")
-    predicted = [None] * len(rows) if model is None else model.predicted_mm(rows)
+    predicted: list[float | None] = [None] * len(rows)
+    if model is not None:
+        with view.supervisor.watching("Predicting the gap"):
+            predicted = model.predicted_mm(rows)
     return [
         [
             row.time_s if row.time_s is not None else row.frame,
@@ -146,7 +155,8 @@ def draw_beforehand(view: View) -> None:
     """Render the picture for the next messages in advance, unless the measurement is too slow."""
     seen = view.seen
     if seen is not None and not view.in_a_hurry:
-        _PICTURES.of(seen)
+        with view.supervisor.watching("Drawing the picture"):
+            _PICTURES.of(seen)
 
 
 def is_short(view: View, known: Known) -> bool:
@@ -189,9 +199,10 @@ class _States:
     def of(self, view: View) -> dict[str, Any]:
         with self._lock:
             if self._view is not view or monotonic() > self._until_s:
-                self._state = {**view.state(), **section(view)}
+                with view.supervisor.watching("Describing the state"):
+                    self._state = {**view.state(), **section(view)}
                 self._view, self._until_s = view, monotonic() + STATE_FOR_S
-            return self._state
+            return {**self._state, "trouble": view.supervisor.trouble}
 
     def forget(self) -> None:
         with self._lock:

@@ -1,13 +1,13 @@
 """Recording in a separate thread, so that a slow disk does not delay the measurement."""
 
 from queue import Empty, Full, Queue
-from threading import Thread
 from time import monotonic
 
-from fingervision.domain.errors import FingervisionError, OutputError
+from fingervision.domain.errors import OutputError
 from fingervision.live.free_space import minutes_left
-from fingervision.live.promptness import be_prompt
+from fingervision.live.processor_use import of_process_s, of_this_thread_s
 from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.live.supervisor import Supervisor, told
 
 # Largest number of frames that wait for the disk: ten seconds at 25 frames per second. The recording ends if more
 # frames would have to wait.
@@ -17,6 +17,11 @@ FRAMES_UNTIL_HURRY = 12
 # Longest time that the disk may take for the waiting frames after the recording is stopped.
 PATIENCE_S = 30.0
 DISK_EVERY_S = 1.0
+# A thread that writes is limited by the processor if it used or awaited one during at least this share of the time. If
+# not, its waits are those for the disk, unless all threads together needed this share of one processor, which only one
+# thread at a time may have while it executes Python.
+OF_ONE_PROCESSOR = 0.5, 0.9
+RECORDING = "Recording"
 
 
 class Recorder:
@@ -26,18 +31,22 @@ class Recorder:
     ----------
     run : RunFolder
         Folder of the run, opened for writing.
+    supervisor : Supervisor
+        Supervisor of the live view.
     """
 
-    def __init__(self, run: RunFolder) -> None:
-        self.run = run
+    def __init__(self, run: RunFolder, supervisor: Supervisor) -> None:
+        self.run, self._supervisor = run, supervisor
         self.began_s = monotonic()
         self.minutes_left: float | None = None
         self._looked_s = self.began_s
         self.failure = ""
         self._waiting: Queue[RecordedFrame | tuple[str, str] | None] = Queue(FRAMES_WAITING)
         self._why = "Recording was stopped."
-        self._thread = Thread(target=self._write, name="recorder", daemon=True)
-        self._thread.start()
+        self._worked_s = 0.0
+        self._since: tuple[float, float, float] | None = None
+        self._began = (self.began_s, 0.0, of_process_s())
+        self._thread = supervisor.start(RECORDING, self._write, self.fail)
 
     @property
     def in_a_hurry(self) -> bool:
@@ -48,10 +57,19 @@ class Recorder:
         """Queue a frame, or an event (its name and words)."""
         if self.failure:
             return
+        if not self.in_a_hurry:
+            self._since = None
+        elif self._since is None:
+            self._since = (monotonic(), self._worked_s, of_process_s())
         try:
             self._waiting.put_nowait(what)
         except Full:
-            self.failure = self._too_slow()
+            self.fail(self._too_slow())
+
+    def fail(self, why: str) -> None:
+        """End the recording with an alarm."""
+        self.failure = why
+        self._supervisor.alarm(RECORDING, f"Recording has ended: {why}")
 
     def stop(self) -> None:
         """End the recording and wait for the disk.
@@ -65,15 +83,26 @@ class Recorder:
             try:
                 self._waiting.put(None, timeout=PATIENCE_S)
             except Full:
-                self.failure = self._too_slow()
+                self.fail(self._too_slow())
         self._thread.join(PATIENCE_S)
         if self.failure:
             raise OutputError(self.failure)
 
     def _too_slow(self) -> str:
+        """State whether the disk or the processor was the bottleneck since frames have had to wait."""
+        since_s, worked_s, used_s = self._since or self._began
+        waited_s = max(monotonic() - since_s, 1e-3)
+        writes, needs = (self._worked_s - worked_s) / waited_s, (of_process_s() - used_s) / waited_s
+        processor = "close other programs, or choose smaller pictures or a lower frame rate"
+        disk = "record to a folder on another disk"
+        what, advice = f"The disk of {self.run.path}", disk
+        if writes >= OF_ONE_PROCESSOR[0]:
+            what, advice = "The processor", processor
+        elif needs >= OF_ONE_PROCESSOR[1]:
+            what, advice = f"The processor, or the disk of {self.run.path},", f"{processor}, or {disk}"
         return (
-            f"The disk of {self.run.path} is too slow for this camera, so that recording ended; the frames recorded "
-            f"before are valid: name a folder on another disk with --out."
+            f"{what} is too slow for this camera, so that recording ended; the frames recorded before are valid: "
+            f"{advice}."
         )
 
     def _look_at_the_disk(self) -> None:
@@ -84,30 +113,30 @@ class Recorder:
         if not self.run.is_there:
             raise OutputError(
                 f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: "
-                "put the disk back, or name another folder with --out."
+                "put the disk back, or record to another folder."
             )
         self.minutes_left = minutes_left(self.run.path, monotonic() - self.began_s)
 
     def _write(self) -> None:
-        be_prompt()
         try:
-            while True:
-                try:
-                    what = self._waiting.get(timeout=0.5)
-                except Empty:
-                    if self.failure:
-                        break
-                    continue
-                if what is None:
-                    break
-                if isinstance(what, RecordedFrame):
-                    self.run.add(what)
-                else:
-                    self.run.event(*what)
-                self._look_at_the_disk()
-        except FingervisionError as error:
-            self.failure = str(error)
-        try:
-            self.run.close(self.failure or self._why)
-        except FingervisionError as error:
-            self.failure = self.failure or str(error)
+            self._write_all()
+        except Exception as error:  # the run is closed with the reason, whatever ended it
+            self.fail(told(error))
+        self.run.close(self.failure or self._why)
+
+    def _write_all(self) -> None:
+        while True:
+            try:
+                what = self._waiting.get(timeout=0.5)
+            except Empty:
+                if self.failure:
+                    return
+                continue
+            if what is None:
+                return
+            if isinstance(what, RecordedFrame):
+                self.run.add(what)
+            else:
+                self.run.event(*what)
+            self._worked_s = of_this_thread_s()
+            self._look_at_the_disk()

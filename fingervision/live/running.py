@@ -11,7 +11,7 @@ from threading import Event
 from types import FrameType
 from typing import TextIO
 
-from fingervision.domain.errors import DeviceError, ExitCode, FingervisionError
+from fingervision.domain.errors import DeviceError, ExitCode
 from fingervision.live.access import Access
 from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.capture import Capture
@@ -64,31 +64,21 @@ def look_through(recording: Recorded, out: Path, showing: Showing, beside: Besid
     if comparison is not None:
         playback.features["model"] = comparison
         playback.on_table = comparison.add_all
+        playback.on_stop.append(comparison.stop)
     listening = bound(showing.way.host, showing.way.port)
     if gauges is not None:
         put_gauges_beside(playback, gauges, is_asked_for=True)
         words = "read, and saved to" if gauges.exists() else "a new file, written when they are saved"
         playback.say("gauges", f"Gauges: {gauges} ({words}).")
     page = Page(playback, listening, showing.way)
-    if showing.way.warning:
-        playback.say("network", showing.way.warning)
-    out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
-    playback.on_message.append(lambda message: told(message, said, in_place=is_terminal(sys.stderr)))
-    for message in tuple(playback.messages):
-        told(message, said, in_place=is_terminal(sys.stderr))
-    try:
-        with _until_signalled() as signalled:
+    with _printing(playback, showing) as (out_there, _), _until_signalled() as signalled:
+        try:
             playback.start()
-            try:
-                _announce(page, out_there, browser=showing.browser)
-                page.serve(signalled)
-            finally:
-                playback.stop()
-                if comparison is not None:
-                    comparison.stop()
-    finally:
-        out_there.close()
-        said.close()
+            _announce(page, out_there, browser=showing.browser)
+            page.serve(signalled)
+        finally:
+            playback.stop()
+    _end(playback)
 
 
 def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside: Beside | None = None) -> None:
@@ -106,29 +96,22 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
         stand_beside(session, beside or Beside())
         # The port is bound before the camera is started, so that a port in use is reported at once.
         page = Page(session, bound(showing.way.host, showing.way.port), showing.way) if showing.page else None
-    except FingervisionError:
+    except BaseException:
         capture.source.close()
         raise
-    if page is not None and showing.way.warning:
-        session.say("network", showing.way.warning)
-    out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
-    on_terminal = is_terminal(sys.stderr)
-    session.on_message.append(lambda message: told(message, said, in_place=on_terminal))
-    for message in tuple(session.messages):
-        told(message, said, in_place=on_terminal)
-    lines = JsonLines(out_there) if showing.json_lines else None
-    status = (
-        StatusLine(session, out_there, in_place=is_terminal(sys.stdout)) if page is None and lines is None else None
-    )
-    for listener in (lines, status):
-        if listener is not None:
-            session.on_row.append(listener.add)
-    if showing.record:
-        session.record()
-    try:
+    with _printing(session, showing) as (out_there, said):
+        lines = JsonLines(out_there) if showing.json_lines else None
+        status = (
+            StatusLine(session, out_there, in_place=is_terminal(sys.stdout)) if page is None and lines is None else None
+        )
+        for listener in (lines, status):
+            if listener is not None:
+                session.on_row.append(session.supervisor.guarded("Printing the rows", listener.add))
         with _until_signalled() as signalled:
-            session.start()
             try:
+                if showing.record:
+                    session.record()
+                session.start()
                 if page is None:
                     while not (signalled.wait(0.1) or session.ended.is_set() or out_there.broken):
                         pass
@@ -142,21 +125,39 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
                     comparison.stop()
                 if status is not None:
                     status.end()
+    if page is None and not session.history.count and session.ended.is_set() and not session.supervisor.trouble:
+        raise DeviceError(f"{session.description.name} gave no frame: check the source.")
+    _end(session)
+
+
+@contextmanager
+def _printing(view: Session | Playback, showing: Showing) -> Iterator[tuple[Outlet, Outlet]]:
+    """Print the messages of a view on standard error; yield the outlets of standard output and of standard error."""
+    out_there, said = Outlet(sys.stdout, view.supervisor), Outlet(sys.stderr, view.supervisor)
+    in_place = is_terminal(sys.stderr)
+    if showing.page and showing.way.warning:
+        view.say("network", showing.way.warning)
+    view.on_message.append(lambda message: told(message, said, in_place=in_place))
+    for message in tuple(view.messages):
+        told(message, said, in_place=in_place)
+    try:
+        yield out_there, said
     finally:
         broken = out_there.broken
         out_there.close()
         if out_there.left_out:
-            session.say(
+            view.say(
                 "left_out",
                 f"{out_there.left_out} lines were not printed, because the reader of standard output was too slow.",
             )
         elif broken:
-            session.say("unread", "Standard output was closed by the reading program: the live view has ended.")
+            view.say("unread", "Standard output was closed by the reading program: the live view has ended.")
         said.close()
-    if page is None and not session.history.count and session.ended.is_set():
-        raise DeviceError(f"{session.description.name} gave no frame: check the source.")
-    failed = [message for message in session.messages if message.name in ("failed", "recording_failed")]
-    if failed:
+
+
+def _end(view: Session | Playback) -> None:
+    """End the program with the exit code of what could not be done, if a part of the view has failed."""
+    if view.supervisor.trouble:
         raise SystemExit(int(ExitCode.COULD_NOT))
 
 

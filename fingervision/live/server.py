@@ -6,7 +6,7 @@ import html
 import os
 import socket
 from pathlib import Path
-from threading import Event, Thread
+from threading import Event
 
 import uvicorn
 from starlette.applications import Starlette
@@ -25,8 +25,8 @@ from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
 from fingervision.live.page_token import VIEWER_FILE, kept_token
 from fingervision.live.pen import Pen
 from fingervision.live.picture_watch import PictureWatch
-from fingervision.live.promptness import be_prompt
 from fingervision.live.save_gaps import save_gaps
+from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
 from fingervision.storage.out_folder import out_folder
 
@@ -34,6 +34,7 @@ MESSAGE_BYTES = 4096
 # Largest number of browser pages, each of which takes a share of a core, and of connections, which also fetch files.
 PAGES_AT_ONCE, CONNECTIONS_AT_ONCE = 32, 128
 DOOR = ".live_page.html"
+SERVING = "Serving the page"
 
 
 def bound(host: str, port: int) -> socket.socket:
@@ -97,7 +98,8 @@ class Page:
                 Route("/gaps.csv", self._gaps),
                 Route("/steps/{number}.png", self._step),
                 WebSocketRoute("/socket", self._socket),
-            ]
+            ],
+            exception_handlers={Exception: self._failed},
         )
         self._server = uvicorn.Server(
             uvicorn.Config(
@@ -129,8 +131,7 @@ class Page:
 
     def serve(self, until: Event) -> None:
         """Serve browser pages until the event `until` is set."""
-        thread = Thread(target=self._run, name="page", daemon=True)
-        thread.start()
+        thread = self._view.supervisor.start(SERVING, self._run)
         while not until.wait(0.2) and thread.is_alive():
             pass
         for page in tuple(self._sockets):
@@ -140,8 +141,12 @@ class Page:
         self._listening.close()
 
     def _run(self) -> None:
-        be_prompt()
         asyncio.run(self._server.serve(sockets=[self._listening]))
+
+    async def _failed(self, request: Request, error: Exception) -> Response:
+        words = sentence(f"The request {request.url.path}", error)
+        self._view.supervisor.alarm(SERVING, words)
+        return PlainTextResponse(words, 500)
 
     async def _index(self, request: Request) -> Response:
         return HTMLResponse(index())

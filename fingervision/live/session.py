@@ -21,10 +21,10 @@ from fingervision.live.frame_measurement import FrameMeasurement, Seen
 from fingervision.live.history import History
 from fingervision.live.messages import Message, MessageListener, Messages
 from fingervision.live.overflow_report import OverflowReport
-from fingervision.live.promptness import be_prompt
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.session_state import state_of_session
+from fingervision.live.supervisor import Supervisor
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.gaps_csv import GapRow
@@ -78,29 +78,29 @@ class Session:
         self._interrupted, self._run = False, ""
         self._recorder: Recorder | None = None
         self._beginning = False
-        self.trouble = ""
-        """Fault that remains until the user acts; the page shows it prominently."""
+        self.supervisor = Supervisor(self.say)
         self._overflow = OverflowReport(capture, self.say)
         self._lock = Lock()
         self._stopped = Event()
-        self._thread = Thread(target=self._measure, name="measuring", daemon=True)
+        self._thread: Thread | None = None
         for note in (*self.description.notes, other_camera(choices.scale, self.description.camera)):
             if note:
                 self.say("camera", note)
 
     def start(self) -> None:
         """Start the measurement as soon as the source is ready."""
-        self.capture.start()
+        self.capture.start(self.supervisor)
         rehearse()
         self.capture.begin()
         self._frame_at_s = monotonic()
-        self._thread.start()
+        self._thread = self.supervisor.start("Measuring", self._measure, lambda why: self.ended.set())
 
     def stop(self) -> None:
         """End the measurement; a running recording is completed properly."""
         self.capture.stop()
         self._stopped.set()
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
         if self._recorder is not None:
             self.stop_recording()
 
@@ -178,20 +178,21 @@ class Session:
             task = self.choices.task
             if self.ended.is_set():
                 raise StateError("The source has ended, so nothing can be recorded: start the live view again.")
-            if self._recorder is not None:
+            if self._recorder is not None and not self._recorder.failure:
                 raise StateError(f"A run is being recorded already, in {self._recorder.run.path}.")
             if self._beginning:
                 raise StateError("A recording is already being started.")
             if task is None:
                 raise StateError("The scale is not known: give the scale before recording, so that the run has gaps.")
             if not self.description.has_times:
-                raise StateError("These images have no times, which a recording needs: give --rate-hz.")
+                raise StateError(
+                    "These images have no times, which a recording needs: start the live view with their frame rate."
+                )
             self._beginning = True
         try:
             # The folder is made without the lock, because a slow disk would otherwise delay the measurement.
             run = RunFolder(self.out, self.capture.source.description, task, self.capture.source.template)
-            self._recorder = Recorder(run)
-            self.trouble = ""
+            self._recorder = Recorder(run, self.supervisor)
         finally:
             self._beginning = False
         self.say("recording", f"Recording to {run.path}.")
@@ -235,17 +236,6 @@ class Session:
         return lags or (recorder is not None and recorder.in_a_hurry)
 
     def _measure(self) -> None:
-        be_prompt()
-        try:
-            self._measure_all()
-        except Exception as error:
-            # The user must see a programming error, and not merely a picture that no longer changes.
-            self.trouble = "Measuring has failed: start the live view again."
-            self.say("failed", f"Measuring failed ({type(error).__name__}: {error}): start the live view again.")
-            self.ended.set()
-            raise
-
-    def _measure_all(self) -> None:
         while not self._stopped.is_set():
             what = self.capture.next(0.1)
             if isinstance(what, Arrival):
@@ -290,9 +280,6 @@ class Session:
                 recorder.add(RecordedFrame(item, arrival.packets, row))
                 if recorder.failure:
                     self._recorder = None
-        if recorder is not None and recorder.failure:
-            self.trouble = f"Recording has ended: {recorder.failure}"
-            self.say("recording_failed", recorder.failure)
         self._overflow.say()
         for listener in self.on_row:
             listener(row, arrival.arrived_s)

@@ -45,7 +45,7 @@ def state_of_session(session: "Session") -> dict[str, Any]:
         "exposure": session.exposure.words,
         "silent_s": session.silent_s,
         "ended": session.ended.is_set(),
-        "trouble": session.trouble,
+        "trouble": session.supervisor.trouble,
         "recording": None
         if recorder is None
         else {

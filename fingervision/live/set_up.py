@@ -1,15 +1,13 @@
 """Inspection of the set-up in a live view: `inspect` applied to the newest frames, while the measurement continues."""
 
-from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, StateError
+from fingervision.domain.errors import StateError
 from fingervision.domain.frame import Frame
 from fingervision.inspection.catalogue import inspect
 from fingervision.inspection.report import as_json
 from fingervision.inspection.sample import take_sample
-from fingervision.live.promptness import be_prompt
 from fingervision.live.view import View
 
 # Duration as in the command `inspect` for a camera; enough frames to average noise and to detect vibration.
@@ -37,8 +35,7 @@ class SetUp:
         self.findings: list[dict[str, Any]] | None = None
         self.words = "Frames are collected for three seconds."
         self._view = view
-        self._thread = Thread(target=self._look, name="set-up", daemon=True)
-        self._thread.start()
+        self._thread = view.supervisor.start("Inspecting the set-up", self._look, self._failed)
 
     @property
     def is_busy(self) -> bool:
@@ -46,33 +43,24 @@ class SetUp:
         return self._thread.is_alive()
 
     def _look(self) -> None:
-        # This thread needs the same priority as the others, because a waiting thread that holds Python's interpreter
-        # lock delays all threads (see `promptness`).
-        be_prompt()
-        try:
-            frames = self._frames()
-            task = self._view.choices.task
-            if task is None or len(frames) < FEWEST_FRAMES:
-                self.words = (
-                    f"Only {len(frames)} frames arrived in {LOOKS_FOR_S:g} s: check the camera or stream first."
-                )
-                return
-            self.words = f"{len(frames)} frames are being inspected."
-            settings, _ = task.settings_for(self._view.description.files)
-            sample = take_sample(frames, self._view.description, settings, task.scale)
-            report = as_json(sample, inspect(sample))
-        except FingervisionError as error:
-            self.words = str(error)
+        frames = self._frames()
+        task = self._view.choices.task
+        if task is None or len(frames) < FEWEST_FRAMES:
+            self.words = f"Only {len(frames)} frames arrived in {LOOKS_FOR_S:g} s: check the camera or stream first."
             return
-        except Exception as error:  # a programming error must not look like a set-up without faults
-            self.words = f"The set-up could not be inspected ({type(error).__name__}: {error})."
-            return
+        self.words = f"{len(frames)} frames are being inspected."
+        settings, _ = task.settings_for(self._view.description.files)
+        sample = take_sample(frames, self._view.description, settings, task.scale)
+        report = as_json(sample, inspect(sample))
         self.findings = report["findings"]
         self.words = (
             f"{len(frames)} frames inspected: nothing has to be changed."
             if report["nothing_to_mend"]
             else f"{len(frames)} frames inspected."
         )
+
+    def _failed(self, why: str) -> None:
+        self.words = why
 
     def _frames(self) -> list[Frame]:
         found: list[Frame] = []

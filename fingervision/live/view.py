@@ -9,6 +9,7 @@ from fingervision.frames.source import Description
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.messages import Message
+from fingervision.live.supervisor import Supervisor
 from fingervision.storage.gaps_csv import GapRow
 
 
@@ -23,11 +24,14 @@ class View(Protocol):
         Settings that the user chose.
     features : dict
         Additions to the measurement (a model, a test bed) by name, for the commands of each topic.
+    supervisor : Supervisor
+        Supervisor of all threads and tasks of this view.
     """
 
     out: Path
     choices: Choices
     features: dict[str, Any]
+    supervisor: Supervisor
 
     @property
     def identity(self) -> str:

@@ -33,7 +33,7 @@ def test_two_readings_are_asked_about(text: str) -> None:
     assert all(fact in str(caught.value) for fact in ("--px-per-mm", text.replace(",", "."), text.replace(",", "")))
 
 
-@pytest.mark.parametrize("text", ["", "wide", "1,2,3", "nan", "inf", "3 mm"])
+@pytest.mark.parametrize("text", ["", "wide", "1,2,3", "nan", "inf", "3 mm", "\u0661"])
 def test_no_number(text: str) -> None:
     with pytest.raises(ArgumentError, match="number"):
         stated_number(text, "--px-per-mm")

@@ -89,7 +89,7 @@ def test_what_the_bed_may_not_do_is_refused_and_nothing_moves(session: Session, 
     outside = tmp_path.parent / "outside.toml"
     outside.write_text(RECIPE)
     for request in (
-        {"do": "bed_move", "to_mm": "0.5", "speed_mm_s": 0.5},
+        {"do": "bed_move", "to_mm": "0,5 mm", "speed_mm_s": 0.5},
         {"do": "bed_move", "to_mm": float("nan"), "speed_mm_s": 0.5},
         {"do": "bed_move", "speed_mm_s": 0.5},
         {"do": "bed_jog", "speed_mm_s": 0.5, "for_s": 11.0},
@@ -125,7 +125,7 @@ def test_anybody_stops_and_only_who_may_moves(session: Session, bench: Bench) ->
         {"do": "bed_home"},
         {"do": "bed_run", "recipe": "recipe.toml"},
     ):
-        with pytest.raises(StateError, match="--allow-motion"):
+        with pytest.raises(StateError, match="allow motions"):
             obey(session, request)
     session.features["allow_motion"] = True
     obey(session, {"do": "bed_move", "to_mm": 1.4, "speed_mm_s": 0.1})

@@ -158,7 +158,7 @@ REFUSED: tuple[tuple[str, object, str], ...] = (
     ("exposure", 1e9, "must be 0.5 to 20 ms, but is 1e+09"),
     ("exposure", -3, "must be a positive number, but is -3"),
     ("exposure", None, "value must be a number, but is empty"),
-    ("exposure", "8", "value must be a number, but is '8'"),
+    ("exposure", "8 ms", "value must be a number, but is '8 ms'"),
     ("exposure", True, "value must be a number"),
     ("exposure", float("nan"), "value must be a number"),
     ("exposure", 10**5000, "value must be a number, but is too large"),

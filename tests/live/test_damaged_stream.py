@@ -15,6 +15,7 @@ from fingervision.frames.network_stream import NetworkStream
 from fingervision.frames.source import open_source
 from fingervision.live.capture import Arrival, Capture, Ended
 from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.live.supervisor import Supervisor
 from fingervision.measuring.measure import measure
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.task import Task
@@ -61,6 +62,7 @@ def recorded(stream: Path, out: Path, task: Task) -> Path:
     source = capture.source
     run = RunFolder(out, source.description, task, source.template)
     rows = RowMaker(task.scale, SIZE_PX)
+    capture.start(Supervisor(lambda *_: None))
     capture.begin()
     while not isinstance(what := capture.next(5.0), Ended):
         if isinstance(what, Arrival):

@@ -5,7 +5,6 @@ import json
 import shutil
 import struct
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -35,6 +34,7 @@ from fingervision.live.outlet import PATIENCE_S, Outlet
 from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.preview import Known, message, state_has_changed
 from fingervision.live.session import Session
+from fingervision.live.supervisor import Supervisor
 from fingervision.live.terminal import JsonLines
 from fingervision.storage.gaps_csv import GapRow
 
@@ -77,7 +77,7 @@ def test_a_reader_that_pauses_costs_no_frame_of_measurement_or_recording(
     session: Session, rows: Callable[[Path], list[dict[str, str]]]
 ) -> None:
     stream = Unread()
-    outlet = Outlet(stream)
+    outlet = Outlet(stream, Supervisor(lambda *_: None))
     session.on_row.append(JsonLines(outlet).add)
     run = session.record()
     session.start()
@@ -94,7 +94,7 @@ def test_a_reader_that_pauses_costs_no_frame_of_measurement_or_recording(
 
 def test_printing_to_a_reader_that_does_not_read_never_waits_and_counts_what_it_leaves_out() -> None:
     stream = Unread()
-    outlet = Outlet(stream, waiting=10)
+    outlet = Outlet(stream, Supervisor(lambda *_: None), waiting=10)
     began_s = time.monotonic()
     for _ in range(200):
         outlet.put("line\n")
@@ -106,7 +106,7 @@ def test_printing_to_a_reader_that_does_not_read_never_waits_and_counts_what_it_
 
 
 def test_a_reader_that_is_gone_is_noticed() -> None:
-    outlet = Outlet(Gone())
+    outlet = Outlet(Gone(), Supervisor(lambda *_: None))
     outlet.put("line\n")
     outlet.close()
     assert outlet.broken
@@ -202,10 +202,10 @@ def test_a_recording_that_failed_is_told_until_the_next_one(session: Session) ->
     session.record()
     recorder = session.recording
     assert recorder is not None
-    recorder.failure = "the disk is full"
+    recorder.fail("the disk is full")
     session.start()
     until_s = time.monotonic() + 30.0
-    while not session.trouble and time.monotonic() < until_s:
+    while not session.supervisor.trouble and time.monotonic() < until_s:
         time.sleep(0.02)
     assert "the disk is full" in head_of(session)["state"]["trouble"]
     session.record()
@@ -224,10 +224,10 @@ def test_a_folder_that_is_taken_away_ends_the_recording_with_a_sentence(
         time.sleep(0.02)
     away = run.with_name("away")
     run.rename(away)
-    while not session.trouble and time.monotonic() < until_s:
+    while not session.supervisor.trouble and time.monotonic() < until_s:
         time.sleep(0.02)
-    assert str(run) in session.trouble
-    assert "is gone" in session.trouble
+    assert str(run) in session.supervisor.trouble
+    assert "is gone" in session.supervisor.trouble
     measured = session.history.count
     while session.history.count < measured + 5 and time.monotonic() < until_s:
         time.sleep(0.02)
@@ -251,7 +251,7 @@ def test_frames_that_nobody_measures_hold_up_no_capture_and_are_counted_and_said
 ) -> None:
     monkeypatch.setattr(capture_module, "FRAMES_WAITING", 3)
     capture = opened("simulated", Wish())
-    capture.start()
+    capture.start(Supervisor(lambda *_: None))
     capture.begin()
     until_s = (
         time.monotonic() + 12.0
@@ -273,7 +273,7 @@ def test_a_disk_that_stands_still_holds_up_nobody_and_ends_the_recording_with_a_
     monkeypatch.setattr(recorder_module, "FRAMES_WAITING", 3)
     goes_on = Event()
     run = SimpleNamespace(path=tmp_path, is_there=True, event=lambda *_: goes_on.wait(), close=lambda _: None)
-    recorder = recorder_module.Recorder(run)  # type: ignore[arg-type]
+    recorder = recorder_module.Recorder(run, Supervisor(lambda *_: None))  # type: ignore[arg-type]
     thread = Thread(target=lambda: [recorder.add(("name", "words")) for _ in range(10)], daemon=True)
     thread.start()
     thread.join(5.0)
@@ -291,7 +291,6 @@ def test_a_fault_of_ours_in_measuring_is_seen_and_ends_the_view(
         raise RuntimeError("a fault of ours")
 
     monkeypatch.setattr(session, "_take", fail)
-    monkeypatch.setattr(threading, "excepthook", lambda _: None)
     session.start()
     assert session.ended.wait(30.0)
     session.stop()

@@ -191,17 +191,17 @@ def test_a_recording_that_is_moved_away_while_it_plays_is_said_and_goes_on_when_
         until(lambda: view.frame > 3)
         path.rename(path.with_suffix(".away"))
         # What the system still holds open plays on; a step back reads anew.
-        until(lambda: view.frame > 5 or bool(view.trouble))
+        until(lambda: view.frame > 5 or bool(view.supervisor.trouble))
         obey(view, {"do": "play", "on": False, "speed": 1.0})
         obey(view, {"do": "seek", "frame": 40})
         obey(view, {"do": "seek", "frame": 1})
-        until(lambda: bool(view.trouble) or (view.seen is not None and view.seen.frame.index == 1))
-        if path.is_dir() or view.trouble:
-            assert "cannot be read any more" in view.trouble
-            assert path.name in view.trouble
+        until(lambda: bool(view.supervisor.trouble) or (view.seen is not None and view.seen.frame.index == 1))
+        if path.is_dir() or view.supervisor.trouble:
+            assert "cannot be read any more" in view.supervisor.trouble
+            assert path.name in view.supervisor.trouble
         path.with_suffix(".away").rename(path)
         obey(view, {"do": "seek", "frame": 7})
-        until(lambda: view.seen is not None and number_in(view.seen.frame.pixels) == 7 and not view.trouble)
+        until(lambda: view.seen is not None and number_in(view.seen.frame.pixels) == 7 and not view.supervisor.trouble)
     finally:
         view.stop()
 

@@ -40,7 +40,7 @@ WRONG: list[dict[str, Any]] = [
     {"do": "height", "below_tip_mm": 0},
     {"do": "height", "below_tip_mm": -0.3},
     {"do": "height", "below_tip_mm": None},
-    {"do": "height", "below_tip_mm": "0.3"},
+    {"do": "height", "below_tip_mm": "1,234"},
     {"do": "height", "below_tip_mm": float("nan")},
     {"do": "tips", "tips": "upwards"},
     {"do": "fingers", "fingers": "grey"},
@@ -52,7 +52,7 @@ WRONG: list[dict[str, Any]] = [
     {"do": "scale", "px_per_mm": float("inf")},
     {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": 0},
     {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": 34.0},
-    {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": "0.1"},
+    {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": "0,1 px"},
     {"do": "calibrate", "kind": "ring", "box": [0, 0, 10, 10], "size_mm": 1.0, "u_size_mm": 0.001},
     {"do": "calibrate", "kind": "bar", "box": [0, 0, 3, 3], "size_mm": 1.0, "u_size_mm": 0.001},
     {"do": "calibrate", "kind": "bar", "box": [0, 0, 640, 480], "size_mm": 0.0, "u_size_mm": 0.001},
@@ -117,7 +117,7 @@ def test_a_scale_is_stated_with_its_uncertainty_and_saved_with_it(session: Sessi
 
 
 TWENTY: list[Any] = [
-    None, True, "", " ", "1", "1,5", "ten", "<script>alert(1)</script>", "../../etc/passwd", "\0", "\u0661", "NaN",
+    None, True, "", " ", "1;5", "1,234", "ten", "<script>alert(1)</script>", "../../etc/passwd", "\0", "\u0661", "NaN",
     [], [1.0], {}, {"value": 1}, float("nan"), float("inf"), -float("inf"), -1.0, 1e308, 10**400,
 ]  # fmt: skip
 """What may be typed, or sent by a page that was changed, where a positive number is asked for."""

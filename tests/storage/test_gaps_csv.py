@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import FingervisionError, OutputError
+from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import COLUMNS, MM_PLACES, GapRow, GapsCsv
+from fingervision.storage.gaps_reader import GapsReader
 
 HEADER = (
     "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,left_x_px,left_y_px,right_x_px,right_y_px,"
@@ -80,3 +81,41 @@ def test_a_full_disk_leaves_whole_rows_and_a_sentence(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"could not be written .* name another folder with --out"):
         GapsCsv(tmp_path / "nowhere" / "gaps.csv")
+
+
+def test_a_growing_table_that_is_replaced_is_read_anew(tmp_path: Path) -> None:
+    path = tmp_path / "gaps.csv"
+    narrow = "frame,time_s,status,gap_mm\n" + "".join(f"{n},{n / 25},ok,{n}.5\n" for n in range(5))
+    wide = "frame,time_s,status,gap_mm,run,input_mm\n" + "".join(
+        f'{n},{n / 25},ok,{n}.5,"a,b",0.{n}\n' for n in range(7)
+    )
+    reader = GapsReader(path)
+    assert not reader.refresh()
+    path.write_text(narrow + "5,0.2,ok")
+    assert not reader.refresh()
+    assert [row.frame for row in reader.rows] == [0, 1, 2, 3, 4]
+    path.write_text(narrow + "5,0.2,ok,5.5\n")
+    assert not reader.refresh()
+    assert [row.gap_mm for row in reader.rows] == [0.5, 1.5, 2.5, 3.5, 4.5, 5.5]
+    for in_place in (False, True):
+        before = path.with_name("other.csv")
+        before.write_text(wide)
+        if in_place:
+            path.write_text(narrow)
+            assert reader.refresh()
+            path.write_text(wide)
+        else:
+            before.replace(path)
+        assert reader.refresh()
+        assert [(row.run, row.input_mm) for row in reader.rows] == [("a,b", n / 10) for n in range(7)]
+        assert not reader.refresh()
+    path.write_text(wide[: wide.index("3,")])  # truncated
+    assert reader.refresh()
+    assert len(reader.rows) == 3
+    path.unlink()
+    assert not reader.refresh()
+    path.write_text(wide + "7,0.28,ok\n")
+    for _ in range(2):  # nothing of a table that cannot be read is taken, however often it is tried
+        with pytest.raises(DataError, match="6 cells"):
+            reader.refresh()
+        assert len(reader.rows) == 3

@@ -16,6 +16,7 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.recipe import Recipe
 from fingervision.frames.received import Driven, Received
 from fingervision.frames.source import Description
+from fingervision.live.supervisor import Supervisor
 from fingervision.storage.samples_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
@@ -65,6 +66,8 @@ class Bench:
         self._sight = _eyes(bed)
         self.description: Description = self._sight.camera.description
         self.say: Say = lambda name, words: None
+        self.supervisor = Supervisor(lambda name, words: self.say(name, words))
+        """Supervisor of the bed's thread; a live view replaces it by its own."""
         self.doing, self.position_mm = "", 0.0
         self.force_n: float | None = None
         self.progress: tuple[float, float] | None = None
@@ -75,12 +78,12 @@ class Bench:
         self._controls: Controls | None = None
         self._run, self._index = 1, 0
         self._ending, self._stop_asked = Event(), False
-        self._thread = Thread(target=self._work, name="bed", daemon=True)
+        self._thread: Thread | None = None
 
     # ---- a live source
     def received(self) -> Iterator[Received]:
         """Yield frames with the stage's position at their exposure, until the test bed is closed or fails."""
-        self._thread.start()
+        self._thread = self.supervisor.start("The test bed", self._work, self._failed)
         while True:
             try:
                 following = self._frames.get(timeout=0.1)
@@ -98,7 +101,7 @@ class Bench:
             return
         self.stop()
         self._ending.set()
-        if self._thread.is_alive():
+        if self._thread is not None:
             self._thread.join(ENDS_WITHIN_S)
         self.bed.close()
 
@@ -145,20 +148,20 @@ class Bench:
 
     # ---- the thread
     def _work(self) -> None:
+        while not self._ending.is_set():
+            try:
+                task = self._asked.get_nowait()
+            except Empty:
+                self._look()
+                continue
+            self._do(task)
+
+    def _failed(self, why: str) -> None:
+        """Stop the motor, and end the source."""
         try:
-            while not self._ending.is_set():
-                try:
-                    task = self._asked.get_nowait()
-                except Empty:
-                    self._look()
-                    continue
-                self._do(task)
-        except FingervisionError as error:
             self.bed.actuator.stop()
-            self._hand_over(str(error))
-        except Exception as error:  # a programming error, here or in a driver, must stop the motor and be reported
-            self.bed.actuator.stop()
-            self._hand_over(f"The test bed failed ({type(error).__name__}: {error}).")
+        finally:
+            self._hand_over(why)
 
     def _do(self, task: Task) -> None:
         if self._stop_asked:

@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fingervision.domain.errors import StateError, UsageError
+from fingervision.domain.errors import FingervisionError, StateError, UsageError
+from fingervision.domain.numbers import stated_number
 from fingervision.domain.region import Region
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.view import View
@@ -12,8 +13,12 @@ from fingervision.live.view import View
 GREATEST = 10**12
 """Largest number in a request; the comparison with this limit is safe for any value, including NaN, whereas a
 conversion is not."""
+SIDES = ("column", "row", "width", "height")
 MOST_LETTERS = 1000
 """Largest length of a text in a request, such as a path or a name."""
+MOST_CHANGE = 2.0
+"""Largest factor by which a scale changes without a question: refocusing changes it by per cent, a wrong unit or a
+lost decimal mark by 10 or more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,15 +57,21 @@ def seen_of(view: View) -> Seen:
     return view.seen
 
 
+class QuestionError(FingervisionError):
+    """A request that is probably a mistake: the user is asked, and the page sends it again with `sure` if it is not."""
+
+
 def number(request: Request, name: str) -> float:
-    """Read a number from a request.
+    """Read a number from a request, also as a text with a decimal point or comma.
 
     Raises
     ------
     UsageError
-        The value is not a number.
+        The value is not a number, or a text that may be two different numbers.
     """
     value = request.get(name)
+    if isinstance(value, str) and 0 < len(value) <= MOST_LETTERS:
+        value = stated_number(value, name)
     if not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= GREATEST:
         return float(value)
     raise UsageError(f"{name} must be a number, but is {shown(value)}.")
@@ -68,7 +79,7 @@ def number(request: Request, name: str) -> float:
 
 def number_or_none(request: Request, name: str) -> float | None:
     """Read a number from a request; None if the number is missing."""
-    return None if request.get(name) is None else number(request, name)
+    return None if request.get(name) in (None, "") else number(request, name)
 
 
 def whole(request: Request, name: str) -> int:
@@ -79,10 +90,10 @@ def whole(request: Request, name: str) -> int:
     UsageError
         The value is not a whole number.
     """
-    value = request.get(name)
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= GREATEST:
-        return value
-    raise UsageError(f"{name} must be a whole number, but is {shown(value)}.")
+    value = number(request, name)
+    if value.is_integer():
+        return int(value)
+    raise UsageError(f"{name} must be a whole number, but is {value:g}.")
 
 
 def words(request: Request, name: str) -> str:
@@ -97,6 +108,25 @@ def words(request: Request, name: str) -> str:
     if isinstance(value, str) and 0 < len(value) <= MOST_LETTERS and value.isprintable():
         return value
     raise UsageError(f"{name} must be a text of 1 to {MOST_LETTERS} letters, but is {shown(value)}.")
+
+
+def check_scale(view: View, px_per_mm: float, request: Request) -> None:
+    """Ask about a scale that differs from the present one by more than a factor of `MOST_CHANGE`.
+
+    Raises
+    ------
+    QuestionError
+        The scale differs by more, and the user has not confirmed it.
+    """
+    before = view.choices.scale
+    if before is None or request.get("sure") is True:
+        return
+    change = px_per_mm / before.px_per_mm
+    if not 1.0 / MOST_CHANGE <= change <= MOST_CHANGE:
+        raise QuestionError(
+            f"The scale was {before.px_per_mm:g} px/mm and would be {px_per_mm:g} px/mm, so that all gaps would change "
+            f"by a factor of {1.0 / change:.3g}. Is the new scale right?"
+        )
 
 
 def shown(value: Any) -> str:
@@ -117,10 +147,7 @@ def box(request: Request) -> Region:
         The value is not of the required type.
     """
     sides = request.get("box")
-    if not (
-        isinstance(sides, list)
-        and len(sides) == 4
-        and all(isinstance(side, int) and not isinstance(side, bool) and abs(side) <= GREATEST for side in sides)
-    ):
-        raise UsageError("The region must be four whole numbers (column, row, width, height), but are not.")
-    return Region(*sides)
+    if not isinstance(sides, list) or len(sides) != len(SIDES):
+        raise UsageError(f"The region must be four whole numbers ({', '.join(SIDES)}), but is {shown(sides)}.")
+    named = dict(zip(SIDES, sides, strict=True))
+    return Region(*(whole(named, side) for side in SIDES))

@@ -13,13 +13,13 @@ from fingervision.storage.recipe_toml import read_recipe
 BED, MOTION = "bed", "allow_motion"
 LONGEST_JOG_S = 10.0
 """Longest duration of a jog, after which it ends even if the user's button release was not received."""
-READ_ONLY = "This page may only watch the test bed: to move its stage, start the live view with --allow-motion."
+READ_ONLY = "This page may only watch the test bed: whoever starts the live view can allow motions."
 
 
 def _bench(view: View) -> Bench:
     bench = view.features.get(BED)
     if not isinstance(bench, Bench):
-        raise StateError("This live view has no test bed: start the live view with --bed.")
+        raise StateError("This live view has no test bed: start the live view of a test bed.")
     return bench
 
 

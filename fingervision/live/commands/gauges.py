@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from fingervision.domain.errors import StateError, UsageError
+from fingervision.domain.errors import ArgumentError, StateError, UsageError
+from fingervision.domain.numbers import stated_number, to_number
 from fingervision.gauges.fields import fields_of
 from fingervision.gauges.kinds import kinds
 from fingervision.live.commands.asking import GREATEST, MOST_LETTERS, Answer, Request, shown, words
 from fingervision.live.live_gauges import put_live_gauges
-from fingervision.live.playback.gauge_board import USUAL_FILE, ChangedMeanwhileError, GaugeBoard
+from fingervision.live.playback.gauge_board import USUAL_FILE, ChangedMeanwhileError, FieldError, GaugeBoard
 from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.session import Session
@@ -37,12 +38,25 @@ def _table(request: Request, name: str, *, may_lack: bool = False) -> dict[str, 
     table = request.get(name)
     if not isinstance(table, dict) or len(table) > MOST_KEYS:
         raise UsageError("A gauge must be a table of settings (name, kind, position), but is not.")
+    table = {key: _value(key, value) for key, value in table.items()}
     for key, value in table.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= GREATEST
         is_word = isinstance(value, str) and len(value) <= MOST_LETTERS
         if not (is_number or is_word or (may_lack and value is None)):
             raise UsageError(f"{str(key)[:40]} must be a number or a text, but is {shown(value)}.")
     return table
+
+
+def _value(key: Any, value: Any) -> Any:
+    """Value of a setting as typed; a text that is a number, for a setting other than the name, becomes the number."""
+    if key == "name" or not isinstance(value, str) or len(value) > MOST_LETTERS:
+        return value
+    if all(to_number(value, mark) is None for mark in ".,"):
+        return value
+    try:
+        return stated_number(value, str(key))
+    except ArgumentError as error:
+        raise FieldError(str(key), str(error)) from error
 
 
 def _said(view: View, sentence: str = "") -> Answer:

@@ -12,7 +12,7 @@ from fingervision import __version__
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, OutputError, StateError, UsageError
 from fingervision.domain.gap import GapMeasurement
-from fingervision.live.commands.asking import Answer, Request, box, number, number_or_none, seen_of, shown
+from fingervision.live.commands.asking import Answer, Request, box, check_scale, number, number_or_none, seen_of, shown
 from fingervision.live.picture_calibration import calibrated
 from fingervision.live.view import View
 from fingervision.measuring.scale import stated_scale
@@ -91,6 +91,7 @@ def _scale(view: View, request: Request) -> Answer:
     px_per_mm, u_px_per_mm = number(request, "px_per_mm"), number_or_none(request, "u_px_per_mm")
     if px_per_mm <= 0.0:
         raise UsageError(f"px_per_mm must be positive, but is {px_per_mm:g}.")
+    check_scale(view, px_per_mm, request)
     view.choose(scale=stated_scale(px_per_mm, u_px_per_mm), scale_file=None)
     return Answer()
 
@@ -102,6 +103,7 @@ def _calibrate(view: View, request: Request) -> Answer:
     found = calibrated(
         seen_of(view).frame, box(request), str(kind), number(request, "size_mm"), number(request, "u_size_mm")
     )
+    check_scale(view, found.px_per_mm, request)
     made_at = datetime.now(UTC).isoformat(timespec="seconds")
     camera = dict(view.description.camera)
     found = replace(found, camera=camera, made_at=made_at, software=f"fingervision {__version__}")
@@ -127,7 +129,7 @@ def _free_name(folder: Path, stem: str) -> Path:
             continue
         except OSError as error:
             raise OutputError(
-                f"The folder {folder} cannot be written ({error.strerror}): name another folder with --out."
+                f"The folder {folder} cannot be written ({error.strerror}): record to another folder."
             ) from error
         return path
     raise AssertionError("an unused name is always found")

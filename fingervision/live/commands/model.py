@@ -14,9 +14,7 @@ MODEL, TYPED = "model", "typed_input"
 
 def _input(view: View, request: Request) -> Answer:
     if not isinstance(view, Session):
-        raise StateError(
-            "The input of a recording cannot be typed: it is read from the stage's log that --drive names."
-        )
+        raise StateError("The input of a recording cannot be typed: it is read from the log of the stage.")
     if "bed" in view.features:
         raise StateError(
             "The input cannot be typed while a test bed is connected: it is read from the test bed's stage."

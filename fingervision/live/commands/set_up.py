@@ -11,7 +11,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.errors import StateError, UsageError
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.region import Region
-from fingervision.live.commands.asking import Answer, Request, shown, words
+from fingervision.live.commands.asking import Answer, Request, check_scale, shown, words
 from fingervision.live.playback.playback import Playback
 from fingervision.live.set_up import SetUp
 from fingervision.live.view import View
@@ -50,7 +50,7 @@ def _save(view: View, request: Request) -> Answer:
             "fingers": {None: "auto", True: "dark", False: "light"}[choices.fingers_are_dark],
         },
     )
-    return Answer(f"Settings written to {path}; `measure`, `live` and `inspect` take them with --settings.")
+    return Answer(f"Settings written to {path}; `measure`, `live`, `inspect` and this page take them.")
 
 
 def _load(view: View, request: Request) -> Answer:
@@ -73,6 +73,8 @@ def _load(view: View, request: Request) -> Answer:
         changes["fingers_are_dark"] = {"auto": None, "dark": True, "light": False}[found["fingers"]]
     if "roi" in found:
         changes["region"] = Region(*(int(side) for side in found["roi"].split(",")))
+    if "scale" in changes:
+        check_scale(view, changes["scale"].px_per_mm, request)
     view.choose(**changes)
     return Answer(f"Settings of {path} are used{'; those of the camera at the next start' * ('camera' in found)}.")
 

@@ -42,7 +42,7 @@ class Comparison:
         model = read_model(path, kind)
         self.path, self.input_mm = path, None
         self._prediction = Prediction(model)
-        self.verdicts = VerdictSeeker(path, kind, model.input_range_mm, view.out / "verdicts", view.say)
+        self.verdicts = VerdictSeeker(path, kind, model.input_range_mm, view.out / "verdicts", view)
         self._rows: deque[GapRow] = deque(maxlen=MOST_ROWS)
         self._recent: deque[GapRow] = deque(maxlen=ROWS_SHOWN)
         self._total = self._moved = self._still = 0

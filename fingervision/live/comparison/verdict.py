@@ -2,14 +2,17 @@
 
 import csv
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
 from fingervision.live.background import BackgroundCommand
+from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.out_folder import out_folder
 
 # Smallest number of rows during motion: four seconds at 25 frames per second. Fewer rows say almost nothing about
 # effects with memory or with a period.
@@ -23,6 +26,7 @@ MORE_ROWS, MORE_AT_REST = 1.5, 1.1
 # Largest number of rows in a diagnosis, the newest two minutes at 25 frames per second; more rows would take longer.
 MOST_ROWS = 3000
 LOOK_EVERY_S = 0.1
+VERDICT = "Seeking a verdict"
 COLUMNS = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
 
 
@@ -65,14 +69,12 @@ class VerdictSeeker:
         Smallest and largest input of the model.
     out : Path
         Folder for tables and results.
-    tell : callable
-        Function that reports an event by a name and a sentence.
+    view : View
+        The view, which tells the verdict.
     """
 
-    def __init__(
-        self, model: Path, kind: str, range_mm: tuple[float, float], out: Path, tell: Callable[[str, str], None]
-    ) -> None:
-        self._model, self._kind, self._out, self._tell = model, kind, out, tell
+    def __init__(self, model: Path, kind: str, range_mm: tuple[float, float], out: Path, view: View) -> None:
+        self._model, self._kind, self._out, self._view = model, kind, out, view
         self._least_mm = LEAST_SHARE * (range_mm[1] - range_mm[0])
         self.newest: Verdict | None = None
         self._judged = 0
@@ -104,8 +106,7 @@ class VerdictSeeker:
         self._judged = moved
         self._number += 1
         kept = list(rows[-MOST_ROWS:])
-        self._thread = Thread(target=self._seek, args=(kept,), name="verdict", daemon=True)
-        self._thread.start()
+        self._thread = self._view.supervisor.start(VERDICT, partial(self._seek, kept))
 
     def stop(self) -> None:
         """Stop the running diagnosis, and start no further diagnosis."""
@@ -116,12 +117,8 @@ class VerdictSeeker:
     def _seek(self, rows: list[GapRow]) -> None:
         folder = self._out / f"verdict_{self._number}"
         table = folder / "live_samples.csv"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
+        with out_folder(folder):
             write_table(table, rows)
-        except OSError as error:
-            self._tell("verdict_failed", f"{table} could not be written ({error.strerror}): free disk space.")
-            return
         arguments = ("diagnose", str(table), "--model", str(self._model), "--kind", self._kind, "--out", str(folder))
         command = BackgroundCommand(*arguments)
         while command.exit_code is None and not self._ending.wait(LOOK_EVERY_S):
@@ -131,10 +128,10 @@ class VerdictSeeker:
         if code is None:
             return
         if code != 0:
-            self._tell("verdict_failed", complaint or f"diagnose ended with exit code {code}.")
+            self._view.supervisor.alarm(VERDICT, complaint or f"diagnose ended with exit code {code}.")
             return
         self.newest = read_verdict(folder, len(rows))
-        self._tell("verdict", f"After {len(rows)} samples: {self.newest.sentence}")
+        self._view.say("verdict", f"After {len(rows)} samples: {self.newest.sentence}")
 
 
 def turns(rows: Sequence[GapRow], least_mm: float) -> int:
@@ -165,10 +162,6 @@ def write_table(path: Path, rows: Sequence[GapRow]) -> None:
             writer.writerow(
                 ["" if each is None else f"{each:.9g}" if isinstance(each, float) else each for each in cells]
             )
-
-
-def _cell(value: float | str | None) -> str:
-    return "" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
 def read_verdict(folder: Path, rows: int) -> Verdict:

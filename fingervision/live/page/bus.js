@@ -29,8 +29,24 @@ export function say(id, words, kind) {
   if (kind !== undefined && at(id).className !== kind) at(id).className = kind;
 }
 export const on = (id, what, act) => at(id).addEventListener(what, act);
-export const number = (id) => (at(id).value === "" ? null : Number(at(id).value));
-// A refusal is shown beside the form that asked.
+// What is no plain number is left to the server, which reads a decimal comma, and asks where it may mean two numbers. A
+// field of type number would drop the comma: 34,0 would be 340.
+const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+export function typed(text) {
+  const word = text.trim();
+  return word === "" ? null : PLAIN.test(word) ? Number(word) : word;
+}
+export const number = (id) => typed(at(id).value);
+document.addEventListener("keydown", (event) => {
+  const input = event.target, sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+  if (!sign || input.inputMode !== "decimal") return;
+  const value = typed(input.value);
+  if (typeof value !== "number") return;
+  event.preventDefault();
+  input.value = String(Number((value + sign * Number(input.dataset.step || 1)).toFixed(6)));
+  input.dispatchEvent(new Event("change"));
+});
+// A refusal or a question is shown beside the form that asked.
 const askedBy = new Map();
 export function submit(id, act) {
   const form = at(id), words = document.createElement("p");
@@ -46,7 +62,14 @@ export function submit(id, act) {
 }
 listen("reply", (reply) => {
   const words = askedBy.get(reply.do);
-  if (words) words.textContent = reply.refused || "";
+  if (words) words.textContent = reply.refused || reply.question || "";
+  if (!words || !reply.question) return;
+  const yes = document.createElement("button");
+  yes.type = "button";
+  yes.className = "sure";
+  yes.textContent = "Yes, use it";
+  yes.addEventListener("click", () => { words.textContent = ""; ask(reply.request); });
+  words.append(" ", yes);
 });
 
 // A panel beside the bench; what is in it is the panel's own.

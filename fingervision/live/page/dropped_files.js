@@ -6,7 +6,7 @@ const holdsFiles = (event) => [...event.dataTransfer.types].includes("Files");
 
 function words(file) {
   const name = file.name || "What was dropped";
-  if (/\.toml$/i.test(name)) return `${name}: type its path under Set-up, Load settings, or give it to the command with --settings.`;
+  if (/\.toml$/i.test(name)) return `${name}: type its path under Set-up, Load settings.`;
   if (!VIDEOS.test(file.type) && !ENDINGS.test(name)) return `${name} is neither a video nor a picture that can be measured.`;
   return `${name} cannot be opened here, because a browser does not say where a file lies. In a terminal: fingervision live "${name}"`;
 }

@@ -16,7 +16,7 @@ listen("gone", () => stale("not connected"));
 listen("now", (now) => {
   const gap = at("gap_mm"), state = page.state;
   // What is old looks old: no value, and no green.
-  if (state && (state.silent_s > 0 || state.ended)) { stale(state.ended ? "ended" : "no picture"); return; }
+  if (state && (state.silent_s > 0 || state.ended)) { stale(state.ended ? (state.trouble ? "failed" : "ended") : "no picture"); return; }
   if (!now || now.gap_mm === null) {
     gap.textContent = "–";
     at("uncertainty").textContent = "\u00a0";
@@ -39,6 +39,7 @@ listen("now", (now) => {
 });
 
 listen("state", (state) => {
+  document.body.classList.toggle("trouble", Boolean(state.trouble));
   // Of a long path its end tells most; the whole is what the pointer shows.
   const parts = state.source.split(/[/\\]+/).filter(Boolean);
   const is_long = state.source.length > LONGEST_SOURCE && parts.length > 2 && !state.source.includes("://");

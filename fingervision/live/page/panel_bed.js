@@ -6,15 +6,15 @@ panel("bed", 'Bed: <span id="bed_at" class="quiet"></span>', `
   <p id="bed_limits" class="quiet"></p>
   <p id="bed_doing" role="status"></p>
   <progress id="bed_progress" max="1" value="0" aria-label="Progress of the recipe" hidden></progress>
-  <p id="bed_read_only" class="warning">Read only: start the live view with --allow-motion to move the bed.</p>
+  <p id="bed_read_only" class="warning">Read only: whoever starts the live view can allow motions.</p>
   <form id="bed_move_form" class="row">
-    <label>to <input id="bed_to" type="number" step="any" required> mm</label>
-    <label>at <input id="bed_speed" type="number" step="any" value="0.5" required> mm/s</label>
+    <label>to <input id="bed_to" type="text" inputmode="decimal" autocomplete="off" required> mm</label>
+    <label>at <input id="bed_speed" type="text" inputmode="decimal" autocomplete="off" value="0.5" required> mm/s</label>
     <button class="moves">Move</button>
     <button class="moves" id="bed_home" type="button">Home</button>
   </form>
   <form id="bed_jog_form" class="row">
-    <label>jog for <input id="bed_for" type="number" step="any" min="0" max="10" value="0.5" required> s</label>
+    <label>jog for <input id="bed_for" type="text" inputmode="decimal" autocomplete="off" value="0.5" required> s</label>
     <button class="moves" id="bed_jog_down" type="button" aria-label="Jog towards closing">Jog −</button>
     <button class="moves" id="bed_jog_up" type="button" aria-label="Jog towards opening">Jog +</button>
   </form>
@@ -33,7 +33,8 @@ submit("bed_move_form", () => ({ do: "bed_move", to_mm: number("bed_to"), speed_
 submit("bed_jog_form", () => null);
 submit("bed_recipe_form", () => ({ do: "bed_run", recipe: at("bed_recipe").value }));
 on("bed_home", "click", () => ask({ do: "bed_home" }));
-const jog = (sign) => () => ask({ do: "bed_jog", speed_mm_s: sign * number("bed_speed"), for_s: number("bed_for") });
+const signed = (sign, value) => (typeof value === "number" ? sign * value : sign < 0 ? `-${value}` : value);
+const jog = (sign) => () => ask({ do: "bed_jog", speed_mm_s: signed(sign, number("bed_speed")), for_s: number("bed_for") });
 on("bed_jog_down", "click", jog(-1));
 on("bed_jog_up", "click", jog(1));
 

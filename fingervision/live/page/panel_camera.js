@@ -1,6 +1,6 @@
 // Within the set-up: what the camera lets be set while it runs; what it refuses is said beside the field.
 import "/page/panel_set_up.js";
-import { ask, at, listen } from "/page/bus.js";
+import { ask, at, listen, typed } from "/page/bus.js";
 
 const TITLES = { exposure: "Exposure", gain: "Gain", focus: "Focus", "white balance": "White balance", "frame rate": "Frame rate" };
 at("set_up").insertAdjacentHTML("beforeend", '<fieldset id="camera_controls" hidden><legend>Camera, while it runs</legend></fieldset>');
@@ -21,7 +21,7 @@ function build(controls) {
     const about = document.createElement("span"), button = document.createElement("button"), words = document.createElement("p");
     form.className = "row";
     form.noValidate = true; // the server says in a sentence what the camera takes
-    Object.assign(input, { type: "number", step: "any", id: `camera_${number}` });
+    Object.assign(input, { inputMode: "decimal", autocomplete: "off", id: `camera_${number}` });
     input.setAttribute("aria-describedby", `camera_about_${number} camera_words_${number}`);
     Object.assign(about, { className: "quiet", id: `camera_about_${number}`, textContent: limits(control) });
     button.textContent = "Set";
@@ -33,7 +33,7 @@ function build(controls) {
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       words.textContent = "";
-      ask({ do: "set_camera", name: control.name, value: input.value === "" ? null : Number(input.value) });
+      ask({ do: "set_camera", name: control.name, value: typed(input.value) });
     });
     at("camera_controls").append(form, words);
     fields.set(control.name, { input, button, words, value: null });

@@ -1,5 +1,5 @@
 // Gauges of one's own on a recording: added, drawn, typed, named, removed, saved; what each says of the frame shown.
-import { ask, at, listen, on, page, panel, say } from "/page/bus.js";
+import { ask, at, listen, on, page, panel, say, typed as number } from "/page/bus.js";
 import { board, change, chosen, isFirst, request, tables, told, usual, works } from "/page/gauge_board.js";
 import { add, beginDrawing, draw, drawing, onChosen, stopDrawing } from "/page/gauge_drawing.js";
 
@@ -117,8 +117,8 @@ function one(field) {
   input.setAttribute("aria-describedby", words.id);
   if (field.choices.length) for (const choice of field.choices) input.add(new Option(choice));
   else if (field.isText) { input.maxLength = 100; input.autocomplete = "off"; } else {
-    input.type = "number";
-    input.step = "any";
+    input.inputMode = "decimal";
+    input.autocomplete = "off";
     if (field.default !== null) input.placeholder = String(field.default);
   }
   input.addEventListener("change", () => typed(field, input));
@@ -130,8 +130,12 @@ function typed(field, input) {
   const name = board.chosen;
   let value = input.value;
   if (!field.choices.length && !field.isText) {
-    if (input.validity.badInput) { refused(`${field.key} must be a number, but is none.`, field.key, field.key); return; }
-    value = value === "" ? null : Number(value);
+    value = number(value);
+    if (typeof value === "string") { // not drawn before the server has read it
+      refusedIn.add(field.key);
+      request({ do: "gauge_change", name, changes: { [field.key]: value } }, (reply) => refused(reply.refused || "", reply.field, field.key));
+      return;
+    }
   }
   if (field.choices.length && value === field.default && !(field.key in chosen())) return;
   refusedIn.add(field.key); // until the answer comes, what was typed stays

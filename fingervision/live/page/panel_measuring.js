@@ -7,31 +7,31 @@ panel("measuring", "Region and tips", `
     <button id="drag_region" aria-pressed="false">Drag region</button>
     <button id="whole">Whole picture</button>
     <label>Tips <select id="tips"><option>auto</option><option>up</option><option>down</option><option>left</option><option>right</option></select></label>
-    <label>Below tip <input id="below_tip" type="number" step="0.05" min="0.01" size="5"> mm</label>
+    <label>Below tip <input id="below_tip" type="text" inputmode="decimal" autocomplete="off" data-step="0.05" size="5"> mm</label>
   </div>
   <form id="region_form" class="row">
-    <label>x <input id="region_x" type="number" min="0" required></label>
-    <label>y <input id="region_y" type="number" min="0" required></label>
-    <label>w <input id="region_w" type="number" min="1" required></label>
-    <label>h <input id="region_h" type="number" min="1" required></label>
+    <label>x <input id="region_x" type="text" inputmode="decimal" autocomplete="off" required></label>
+    <label>y <input id="region_y" type="text" inputmode="decimal" autocomplete="off" required></label>
+    <label>w <input id="region_w" type="text" inputmode="decimal" autocomplete="off" required></label>
+    <label>h <input id="region_h" type="text" inputmode="decimal" autocomplete="off" required></label>
     <button>Set region</button>
   </form>`, { open: true, order: 10 });
 panel("tolerance", "Tolerance", `
   <form id="limits_form" class="row">
-    <label>from <input id="least" type="number" step="any"></label>
-    <label>to <input id="greatest" type="number" step="any"> mm</label>
+    <label>from <input id="least" type="text" inputmode="decimal" autocomplete="off"></label>
+    <label>to <input id="greatest" type="text" inputmode="decimal" autocomplete="off"> mm</label>
     <button>Set</button>
   </form>`, { open: true, order: 20 });
 panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
   <form id="scale_form" class="row">
-    <label><input id="px_per_mm" type="number" step="any" min="0" required> px/mm</label>
-    <label>u <input id="u_px_per_mm" type="number" step="any" min="0" placeholder="unknown"></label>
+    <label><input id="px_per_mm" type="text" inputmode="decimal" autocomplete="off" required> px/mm</label>
+    <label>u <input id="u_px_per_mm" type="text" inputmode="decimal" autocomplete="off" placeholder="unknown"></label>
     <button>Set</button>
   </form>
   <form id="calibrate_form" class="row">
     <select id="kind" aria-label="Kind of reference"><option>bar</option><option>slot</option></select>
-    <label>size <input id="size_mm" type="number" step="any" min="0" required> mm</label>
-    <label>u (k = 1) <input id="u_size_mm" type="number" step="any" min="0" value="0.001" required> mm</label>
+    <label>size <input id="size_mm" type="text" inputmode="decimal" autocomplete="off" required> mm</label>
+    <label>u (k = 1) <input id="u_size_mm" type="text" inputmode="decimal" autocomplete="off" value="0.001" required> mm</label>
     <button id="drag_reference" type="button" aria-pressed="false">Drag over it</button>
     <button>Calibrate</button>
   </form>`, { open: true, order: 30 });

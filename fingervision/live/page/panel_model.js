@@ -11,7 +11,7 @@ panel("against", 'Model: <span id="model_residual" class="quiet"></span>', `
   <div id="residual_chart" role="img" aria-label="Residual over time: measured less predicted, with its band"></div>
   <p id="model_words" class="quiet"></p>
   <form id="input_form" class="row">
-    <label>input now <input id="typed_input" type="number" step="any"> mm</label>
+    <label>input now <input id="typed_input" type="text" inputmode="decimal" autocomplete="off"> mm</label>
     <button>Set</button>
   </form>`, { open: true, order: 6 });
 at("against").hidden = true;

@@ -87,7 +87,7 @@ async function draw(bytes) {
 }
 
 function answer(reply) {
-  if (reply.refused) tell("message", reply.refused, "refused");
+  if (reply.refused || reply.question) tell("message", reply.refused || reply.question, "refused");
   else if (reply.words) tell("message", reply.words, reply.do);
   tell("reply", reply);
 }

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from threading import Event, Thread
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, StateError
+from fingervision.domain.errors import StateError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.gauges.gauge_file import Gauge
@@ -26,6 +26,7 @@ from fingervision.storage.lost_frames import lost_frames
 LOOK_EVERY_S = 0.02
 # Number of frames that are measured ahead of the displayed frame, so that the next readings are ready at once.
 AHEAD_FRAMES = 25
+FOLLOWING = "Reading the gauges"
 NO_SCALE = "The scale is not known: gauges can be drawn, and have readings as soon as the scale is given."
 
 
@@ -52,17 +53,21 @@ class GaugeFollowing:
         self._told: list[bytes] = []
         self.first: int | None = None
         """Number of the first frame that has a picture; None until it is known."""
-        self.trouble = ""
-        self._thread = Thread(target=self._follow, name="gauges", daemon=True)
+        self._thread: Thread | None = None
+
+    @property
+    def trouble(self) -> str:
+        """Reason why there are no readings; empty if there are."""
+        return NO_SCALE if self._playback.choices.task is None else self._playback.supervisor.trouble_of(FOLLOWING)
 
     def start(self) -> None:
         """Start the measuring thread."""
-        self._thread.start()
+        self._thread = self._playback.supervisor.start("Following the gauges", self._follow)
 
     def stop(self) -> None:
         """Stop the measuring thread."""
         self._stopped.set()
-        if self._thread.is_alive():
+        if self._thread is not None:
             self._thread.join()
 
     @property
@@ -82,21 +87,14 @@ class GaugeFollowing:
         while not self._stopped.is_set():
             version, gauges = self._board.snapshot()
             key = (version, self._playback.identity)
-            if key == self._key and not self.trouble:
+            if key == self._key:
                 self._stopped.wait(LOOK_EVERY_S)
                 continue
             task = self._playback.choices.task
             self._told, self._key = [], key
-            self.trouble = NO_SCALE if task is None else ""
-            try:
-                if task is not None:
+            if task is not None:
+                with self._playback.supervisor.watching(FOLLOWING):
                     self._read_all(key, gauges, task)
-            except (FingervisionError, OSError) as error:
-                self.trouble = f"The gauges cannot be read: {error}"
-            except Exception as error:  # a programming error must not look like a gauge that waits for its reading
-                self.trouble = f"The gauges cannot be read ({type(error).__name__}: {error})."
-            while self.trouble and key == self._now() and not self._stopped.wait(LOOK_EVERY_S):
-                pass
 
     def _now(self) -> tuple[int, str]:
         return self._board.version, self._playback.identity

@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from threading import Thread
 from time import sleep
 
 from fingervision.domain.errors import StateError
@@ -12,6 +11,7 @@ from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.track import WHOLE, arguments_of
 
 LOOK_EVERY_S = 0.1
+RANGE = "Measuring a range"
 
 
 class RangeMeasurement:
@@ -49,8 +49,7 @@ class RangeMeasurement:
         self._command = BackgroundCommand(
             *arguments, *more, *gauges, "--out", str(self.folder), "--json", niceness=WAITED_FOR
         )
-        self._thread = Thread(target=self._wait, name="measuring a range", daemon=True)
-        self._thread.start()
+        self._thread = playback.supervisor.start(RANGE, self._wait)
 
     @property
     def is_running(self) -> bool:
@@ -66,7 +65,7 @@ class RangeMeasurement:
             sleep(LOOK_EVERY_S)
         code, complaint = self._command.exit_code, self._command.complaint
         if code not in WHOLE:
-            self._playback.say("measure_failed", complaint or f"Measuring ended with exit code {code}.")
+            self._playback.supervisor.alarm(RANGE, complaint or f"Measuring ended with exit code {code}.")
         else:
             self._playback.say("measured", f"{_words(self._command.output)} {complaint} Written to {self.folder}.")
         self._command.stop()

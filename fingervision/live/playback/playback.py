@@ -8,7 +8,7 @@ from threading import Condition, Thread
 from time import monotonic
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, LimitError
+from fingervision.domain.errors import LimitError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
@@ -20,6 +20,7 @@ from fingervision.live.playback.recorded import Recorded
 from fingervision.live.playback.recorded_frame import recorded_frame
 from fingervision.live.playback.track import Track, arguments_of
 from fingervision.live.session_state import state_of_choices
+from fingervision.live.supervisor import Supervisor, told
 from fingervision.measuring.marked import marked
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
@@ -29,6 +30,7 @@ USUAL_RATE_HZ = 25.0
 # Time between two checks whether the displayed frame must change.
 LOOK_EVERY_S = 0.02
 SPEEDS = (0.01, 100.0)
+PLAYING, MEASURING = "Playing the recording", "Measuring the recording"
 
 
 class Playback:
@@ -49,7 +51,7 @@ class Playback:
         self.features: dict[str, Any] = {}
         self.seen: Seen | None = None
         self.range: tuple[int, int] | None = None
-        self.trouble = ""
+        self.supervisor = Supervisor(self.say)
         self.on_table: Callable[[Sequence[GapRow]], None] = lambda rows: None
         """Function that is called with all rows whenever the table of the recording is complete."""
         self.on_stop: list[Callable[[], None]] = []
@@ -71,14 +73,14 @@ class Playback:
         self._requests = 0
         self._stopped = False
         self._changed = Condition()
-        self._thread = Thread(target=self._play, name="playing", daemon=True)
+        self._thread: Thread | None = None
         for note in self.description.notes:
             self.say("recording", note)
 
     def start(self) -> None:
         """Start the measurement and the display."""
         self._measure_anew()
-        self._thread.start()
+        self._thread = self.supervisor.start(PLAYING, self._play)
 
     def stop(self) -> None:
         """Stop the measurement and the display."""
@@ -87,7 +89,8 @@ class Playback:
         with self._changed:
             self._stopped = True
             self._changed.notify_all()
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
         if self._track is not None:
             self._track.close()
 
@@ -217,8 +220,8 @@ class Playback:
             "damaged": counts[Status.DAMAGED],
             "exposure": "",
             "silent_s": 0.0,
-            "ended": False,
-            "trouble": self.trouble,
+            "ended": bool(self.supervisor.trouble_of(PLAYING)),
+            "trouble": self.supervisor.trouble,
             "recording": None,
             **state_of_choices(self.choices),
         }
@@ -239,6 +242,7 @@ class Playback:
                 self._track = Track(arguments)
             self._generation += 1
             self._shown = None
+            self.supervisor.clear(MEASURING)
             self._changed.notify_all()
 
     def _row(self, frame: int) -> GapRow | None:
@@ -254,7 +258,8 @@ class Playback:
     def _play(self) -> None:
         while not self._stopped:
             with self._changed:
-                self._follow_table()
+                with self.supervisor.watching("Reading the table of the recording"):
+                    self._follow_table()
                 self._advance()
                 frame, row = self.frame, self._row(self.frame)
                 wanted = (frame, row, self._generation, self._requests, self.choices)
@@ -270,9 +275,12 @@ class Playback:
             return
         if track.refresh():
             self._generation += 1
+        if track.failure and not track.is_whole:
+            self.supervisor.alarm(MEASURING, track.failure)
         if track.is_whole and self._told is not track:
             self._told = track
-            self.on_table(track.rows)
+            with self.supervisor.watching("Comparing with the model"):
+                self.on_table(track.rows)
 
     def _advance(self) -> None:
         """Advance the display according to the elapsed time; frames that cannot be shown in time are skipped."""
@@ -292,13 +300,13 @@ class Playback:
             if item is None:
                 item = LostFrame(frame, None, Status.DAMAGED, "The recording has no frame of this number.")
             self.seen = recorded_frame(item, row, self.choices, self.description)
-            self.trouble = ""
-        except (FingervisionError, OSError) as error:
+            self.supervisor.clear(PLAYING)
+        except Exception as error:  # a file that was changed or removed may make a decoder raise any error
             self.is_playing = False
-            self.trouble = (
-                f"The recording cannot be read any more: {error} Put the file back, and select the frame again."
+            self.supervisor.alarm(
+                PLAYING,
+                f"The recording cannot be read any more: {told(error)} Put the file back, and select the frame again.",
             )
-            self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
         """Time of a frame (s); None if the frame has no picture, or if a neighbouring frame has the same time."""

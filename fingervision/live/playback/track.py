@@ -56,7 +56,6 @@ class Track:
     def __init__(self, arguments: tuple[str, ...]) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="fingervision_")
         self.table = Path(self._folder.name) / GAPS
-        self.rows: list[GapRow] = []
         self.failure = ""
         self.is_whole = False
         self._reader = GapsReader(self.table)
@@ -64,24 +63,25 @@ class Track:
             *arguments, "--out", self._folder.name, niceness=WAITED_FOR
         )
 
+    @property
+    def rows(self) -> list[GapRow]:
+        """Rows of the table so far."""
+        return self._reader.rows
+
     def refresh(self) -> bool:
-        """Read new rows of the table; return True if inputs were added to all rows, so that all must be read again."""
+        """Read new rows of the table; return True if it was written anew, such as with inputs, so that all are new."""
         if self._command is None:
             return False
         ended = self._command.exit_code
-        self.rows += self._reader.fresh()
+        is_other = self._reader.refresh()
         if ended is None:
-            return False
+            return is_other
         complaint = self._command.complaint
         self._command.stop()
         self._command = None
-        self.is_whole = ended in WHOLE and bool(self.rows)
+        self.is_whole = ended in WHOLE and bool(self.rows) and self.table.is_file()
         if not self.is_whole or ended == 1:
             self.failure = complaint or f"Measuring ended with exit code {ended}."
-        # If `measure` has estimated the offset of the drive's clock, it writes the table a second time at its end.
-        rows = GapsReader(self.table).fresh()
-        is_other = rows != self.rows
-        self.rows = rows
         return is_other
 
     def close(self) -> None:
