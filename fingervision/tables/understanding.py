@@ -142,7 +142,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
             columns[role] = dated
             taken.append(Taken(column.name, role, DATE))
             continue
-        values = _numbers(raw, column, decimal, given, about)
+        values = _numbers(raw, column, role, decimal, given, about)
         unit = _unit(column, names[place], role, kind, given, about, values)
         taken.append(Taken(column.name, role, unit or ""))
         if unit is None:
@@ -232,7 +232,7 @@ def _filler(name: str, values: Numbers, filler: float, unit: str) -> Question:
     )
 
 
-def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about: Findings) -> Numbers:
+def _numbers(raw: RawTable, column: RawColumn, role: str, decimal: str, given: Entry, about: Findings) -> Numbers:
     """Read a column's cells as numbers; cells that are not numbers are reported."""
     if isinstance(column.content, Numbers):
         return _without_overflow(column.content)
@@ -245,9 +245,22 @@ def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about
             f"{raw.place(at)})"
         )
         if odd.size > max(1.0, MOST_UNREAD * len(column)) and "unreadable_cells" not in given.accept:
-            about.questions.append(Question(words, "accept=unreadable_cells"))
+            about.questions.append(_unreadable(words, column.content, role, decimal, values))
         about.left_out.append(words)
     return values
+
+
+def _unreadable(words: str, cells: Sequence[str], role: str, decimal: str, values: Numbers) -> Question:
+    """Question about cells that are not numbers: the other decimal mark, or to leave them out if most can be read."""
+    other = "," if decimal == "." else "."
+    ways = {f"decimal={other}": to_numbers(cells, other)[0], "accept=unreadable_cells": values}
+    rows = {key: int(np.count_nonzero(kept.present)) for key, kept in ways.items()}
+    readings = [
+        Reading(key, f"{rows[key]} of {len(cells)} rows, {span(kept.value[kept.present])}")
+        for key, kept in ways.items()
+        if rows[key] > (0.5 * len(cells) if kept is values else np.count_nonzero(values.present))
+    ]
+    return asked(words, readings) if readings else Question(f"{words}: name another column", f"columns.{role}=NAME")
 
 
 def _without_overflow(values: Numbers) -> Numbers:

@@ -12,6 +12,9 @@ from fingervision.tables.raw_table import RawColumn
 WIDEST = 200
 """Largest number of columns of a matrix; a wider matrix is considered as a picture."""
 
+MOST_ROWS, LEAST_RATIO = 12, 3
+"""Largest number of rows of a matrix with a row for each channel, and smallest ratio of its columns to its rows."""
+
 
 def is_numeric(value: Any) -> bool:
     """Whether a value is an array of real numbers."""
@@ -51,6 +54,9 @@ def tables_of(values: Mapping[str, Any]) -> dict[str, list[RawColumn]]:
             continue
         elif value.ndim == 1 or (value.ndim == 2 and 1 in value.shape):
             loose.setdefault(value.size, []).append(RawColumn(name, numbers(value)))
+        elif value.ndim == 2 and value.shape[0] <= MOST_ROWS and value.shape[1] >= LEAST_RATIO * value.shape[0]:
+            # Programs that append samples as columns write a row for each channel.
+            found[name] = [RawColumn(str(k + 1), numbers(row)) for k, row in enumerate(value)]
         elif value.ndim == 2 and value.shape[1] <= WIDEST:
             found[name] = [RawColumn(str(k + 1), numbers(value[:, k])) for k in range(value.shape[1])]
     for size, columns in loose.items():

@@ -13,6 +13,7 @@ from fingervision.tables import needed_library, text_file
 from fingervision.tables.formats import read_raw, xlsx
 from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry
+from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.read import read_drive, read_measured_table, read_model
 from tests.storage.foreign import binary
 
@@ -222,3 +223,43 @@ def test_a_text_with_a_table_in_it_is_no_table(tmp_path: Path) -> None:
     for read in (read_measured_table, read_drive, read_model):
         with pytest.raises(DataError, match=r"not a table|not a model"):
             read(path)
+
+
+def test_a_json_document_is_called_by_its_name(tmp_path: Path) -> None:
+    for number, document in enumerate(
+        ('{"time": [0, 1], "gap": [1, 2]}', '[{"time_s": 0.1,\n"gap_mm": 2}]', "[[0, 1], [1, 2]]")
+    ):
+        path = tmp_path / f"{number}.json"
+        path.write_text(document, encoding="utf-8")
+        assert "JSON" in refused(path)
+
+
+def test_a_matrix_with_a_row_for_each_channel_is_read_and_a_picture_is_named(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    time_s = 0.01 * np.arange(713)
+    savemat(tmp_path / "wide.mat", {"data": np.vstack([time_s, np.sin(time_s)])})
+    raw = read_raw(tmp_path / "wide.mat", Entry())
+    assert raw.rows == 713
+    assert len(raw.columns) == 2
+    savemat(tmp_path / "picture.mat", {"picture": np.zeros((300, 400))})
+    assert "picture (300 x 400)" in refused(tmp_path / "picture.mat")
+
+
+def test_what_a_reader_raises_becomes_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RecursionError("too deep")
+
+    monkeypatch.setattr("fingervision.tables.formats.text.table_of_lines", fail)
+    path = tmp_path / "table.csv"
+    path.write_text("time [s],position [mm],gap [mm]\n0,1,2\n", encoding="utf-8")
+    assert "RecursionError: too deep" in refused(path)
+
+
+def test_to_leave_cells_out_is_offered_only_if_most_can_be_read(tmp_path: Path) -> None:
+    path = tmp_path / "words.csv"
+    rows = [f"{0.1 * k:.1f};{k};{'ERR' if k % 9 else k}" for k in range(1, 121)]
+    path.write_text("\n".join(["Time [s];Position [mm];Gap [mm]", *rows]), encoding="utf-8")
+    with pytest.raises(OpenQuestionError) as caught:
+        read_measured_table(path)
+    assert "unreadable_cells" not in str(caught.value)

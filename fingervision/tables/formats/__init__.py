@@ -8,7 +8,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from fingervision.domain.errors import DataError, InputFileError
-from fingervision.tables.formats._apart import read_apart
+from fingervision.tables.formats._apart import read_apart, read_guarded
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawTable, check_columns
 
@@ -48,7 +48,7 @@ def formats() -> tuple[Format, ...]:
         if not module.name.startswith("_"):
             loaded = importlib.import_module(f"{__name__}.{module.name}")
             apart = getattr(loaded, "IN_OWN_PROCESS", False)
-            read = partial(read_apart, loaded.__name__) if apart else loaded.read
+            read = partial(read_apart if apart else read_guarded, loaded.__name__)
             found.append(Format(module.name, loaded.ORDER, loaded.recognises, read))
     return tuple(sorted(found, key=lambda each: each.order))
 

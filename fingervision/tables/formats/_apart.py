@@ -4,6 +4,7 @@ For example, scipy 1.17 ends with a segmentation fault on some MATLAB files with
 (tests/tables/test_bad_files.py).
 """
 
+import importlib
 import pickle
 import subprocess
 import sys
@@ -17,6 +18,28 @@ from fingervision.tables.raw_table import RawTable
 PROGRAM = "import sys; sys.path[:] = {path!r}; from fingervision.tables.formats._apart import serve; serve()"
 SHOWN = 300
 """Number of characters of the output of a failed process that the error message shows."""
+
+
+def read_guarded(name: str, path: Path, given: Entry) -> RawTable:
+    """Read a file with the format's module; whatever its libraries raise becomes one sentence.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read.
+    OpenQuestionError
+        The table can be interpreted in more than one way.
+    """
+    try:
+        table: RawTable = importlib.import_module(name).read(path, given)
+    except FingervisionError:
+        raise
+    except Exception as error:
+        raise DataError(
+            f"{path} could not be read as a table of the format {name.rpartition('.')[2]} ({type(error).__name__}: "
+            f"{error}): save it again, or the table as CSV."
+        ) from error
+    return table
 
 
 def read_apart(name: str, path: Path, given: Entry) -> RawTable:
@@ -63,12 +86,10 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
 
 def serve() -> None:
     """In the separate process: read one request from standard input and write the result to standard output."""
-    import importlib
-
     name, path, given = pickle.load(sys.stdin.buffer)
     answer: tuple[object, ...]
     try:
-        answer = ("table", importlib.import_module(name).read(path, given))
+        answer = ("table", read_guarded(name, path, given))
     except OpenQuestionError as error:
         answer = ("question", error.path, error.kind, error.questions)
     except FingervisionError as error:

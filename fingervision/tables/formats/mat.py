@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.tables.mapping import Entry
 from fingervision.tables.needed_library import needed_library
 from fingervision.tables.parts import chosen_part
 from fingervision.tables.raw_table import RawTable
-from fingervision.tables.vectors import is_numeric, tables_of
+from fingervision.tables.vectors import WIDEST, is_numeric, tables_of
 
 ORDER = 30
 IN_OWN_PROCESS = True
@@ -47,10 +47,12 @@ def read(path: Path, given: Entry) -> RawTable:
     tables = tables_of(values)
     note = (f"Not read, because they are not arrays of real numbers: {', '.join(sorted(passed))}.",) if passed else ()
     if not tables:
-        held = f"only {', '.join(sorted(passed))}" if passed else "none"
+        shapes = [f"{name} ({' x '.join(map(str, each.shape))})" for name, each in values.items() if is_numeric(each)]
+        held = f"only {', '.join([*shapes, *sorted(passed)])}" if shapes or passed else "none"
         raise DataError(
-            f"{path} must hold vectors or a matrix of real numbers, but holds {held} (tables, timetables, cells and "
-            "objects of MATLAB are not arrays): save vectors, save('run.mat', 'time', 'position', 'gap')."
+            f"{path} must hold vectors of equal length or a matrix of at most {WIDEST} columns, but holds {held} "
+            "(tables, timetables, cells and objects of MATLAB are not arrays): save vectors, save('run.mat', 'time', "
+            "'position', 'gap')."
         )
     part = chosen_part(path, {name: [c.name for c in columns] for name, columns in tables.items()}, given, "variable")
     columns = tables[part]
@@ -69,26 +71,19 @@ def _older(path: Path, passed: list[str]) -> dict[str, Any]:
     """Read versions 4 to 7 with scipy, which builds numbers, texts and structures and executes no code."""
     from scipy.io import loadmat, whosmat
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            listed = whosmat(str(path))
-            wanted = []
-            for name, shape, kind in listed:
-                size = int(np.prod([max(0, int(n)) for n in shape], dtype=np.float64)) if shape else 0
-                _check_size(path, name, size)
-                if kind in ("cell", "function", "opaque", "object", "char", "sparse", "unknown"):
-                    passed.append(f"{name} ({kind})")
-                else:
-                    wanted.append(name)
-            # The sizes stated in a damaged or malicious file may be wrong: every variable is checked before it is read.
-            content = loadmat(str(path), variable_names=wanted, simplify_cells=True) if wanted else {}
-    except FingervisionError:
-        raise
-    except Exception as error:
-        raise DataError(
-            f"{path} must be a MATLAB file, but could not be read ({type(error).__name__}: {error}): save it again."
-        ) from error
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        listed = whosmat(str(path))
+        wanted = []
+        for name, shape, kind in listed:
+            size = int(np.prod([max(0, int(n)) for n in shape], dtype=np.float64)) if shape else 0
+            _check_size(path, name, size)
+            if kind in ("cell", "function", "opaque", "object", "char", "sparse", "unknown"):
+                passed.append(f"{name} ({kind})")
+            else:
+                wanted.append(name)
+        # The sizes stated in a damaged or malicious file may be wrong: every variable is checked before it is read.
+        content = loadmat(str(path), variable_names=wanted, simplify_cells=True) if wanted else {}
     return {name: _plain(content[name], name, passed) for name in wanted if name in content}
 
 
@@ -107,15 +102,8 @@ def _plain(value: Any, name: str, passed: list[str], deep: int = 0) -> Any:
 def _hdf5(path: Path, passed: list[str]) -> dict[str, Any]:
     """Read version 7.3: data sets in the file itself; links to other files are not followed."""
     library = needed_library("h5py", path, "a MATLAB 7.3 file (HDF5)")
-    try:
-        with library.File(path, "r") as file:
-            return _group(library, file, "", passed, 0)
-    except FingervisionError:
-        raise
-    except Exception as error:
-        raise DataError(
-            f"{path} must be a MATLAB 7.3 file, but could not be read ({type(error).__name__}: {error}): save it again."
-        ) from error
+    with library.File(path, "r") as file:
+        return _group(library, file, "", passed, 0)
 
 
 def _group(library: Any, group: Any, prefix: str, passed: list[str], deep: int) -> dict[str, Any]:

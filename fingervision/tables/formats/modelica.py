@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
@@ -29,18 +29,10 @@ def read(path: Path, given: Entry) -> RawTable:
     """Read the variables that change in time."""
     from scipy.io import loadmat
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            content = loadmat(str(path), chars_as_strings=False)
-        return _table(path, content)
-    except FingervisionError:
-        raise
-    except Exception as error:
-        raise DataError(
-            f"{path} must be a result of Dymola or OpenModelica, but could not be read ({type(error).__name__}: "
-            f"{error}): simulate again, or export it as CSV."
-        ) from error
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        content = loadmat(str(path), chars_as_strings=False)
+    return _table(path, content)
 
 
 def _table(path: Path, content: dict[str, Any]) -> RawTable:

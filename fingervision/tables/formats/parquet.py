@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.needed_library import needed_library
@@ -28,19 +28,12 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, given: Entry) -> RawTable:
     """Read all columns that are not nested."""
     parquet = needed_library("pyarrow.parquet", path, "a Parquet file")
-    try:
-        file = parquet.ParquetFile(path)
-        about = file.metadata
-        size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
-        _check_size(path, about.num_rows, size)
-        table = file.read()
-        columns = [_column(table.schema.field(k), table.column(k).combine_chunks()) for k in range(table.num_columns)]
-    except FingervisionError:
-        raise
-    except Exception as error:
-        raise DataError(
-            f"{path} must be a Parquet file, but could not be read ({type(error).__name__}: {error}): save it again."
-        ) from error
+    file = parquet.ParquetFile(path)
+    about = file.metadata
+    size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
+    _check_size(path, about.num_rows, size)
+    table = file.read()
+    columns = [_column(table.schema.field(k), table.column(k).combine_chunks()) for k in range(table.num_columns)]
     kept = tuple(column for column in columns if column is not None)
     passed = [table.schema.field(k).name for k, column in enumerate(columns) if column is None]
     if not kept or not len(kept[0]):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import column_name
 from fingervision.tables.mapping import Entry
@@ -33,19 +33,12 @@ def read(path: Path, given: Entry) -> RawTable:
     """Read the channels of a group; times are a channel, or follow from the sampling rate of the waveform."""
     library = needed_library("nptdms", path, "a TDMS file")
     warned: list[str] = []
-    try:
-        with _warnings(warned), path.open("rb") as opened, library.TdmsFile.open(opened) as file:
-            groups = {group.name: group.channels() for group in file.groups() if group.channels()}
-            total = sum(len(channel) for channels in groups.values() for channel in channels)
-            _check_size(path, total)
-            name = chosen_part(path, {each: [c.name for c in cs] for each, cs in groups.items()}, given, "group")
-            columns, passed = _columns(groups[name])
-    except FingervisionError:
-        raise
-    except Exception as error:
-        raise DataError(
-            f"{path} must be a TDMS file, but could not be read ({type(error).__name__}: {error}): save it again."
-        ) from error
+    with _warnings(warned), path.open("rb") as opened, library.TdmsFile.open(opened) as file:
+        groups = {group.name: group.channels() for group in file.groups() if group.channels()}
+        total = sum(len(channel) for channels in groups.values() for channel in channels)
+        _check_size(path, total)
+        name = chosen_part(path, {each: [c.name for c in cs] for each, cs in groups.items()}, given, "group")
+        columns, passed = _columns(groups[name])
     lengths = {len(column) for column in columns}
     if len(lengths) != 1:
         listed = ", ".join(f"{column.name} {len(column)}" for column in columns) or "none"

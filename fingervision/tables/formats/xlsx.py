@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import column_name
 from fingervision.tables.formats._text_numbers import decimal_of_texts, is_number_text
@@ -45,28 +45,21 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, given: Entry) -> RawTable:
     """Read the selected sheet of the workbook."""
     library = needed_library("openpyxl", path, "an Excel workbook")
+    _check_archive(path)
+    book = library.load_workbook(path, read_only=True, data_only=True, keep_links=False)
     try:
-        _check_archive(path)
-        book = library.load_workbook(path, read_only=True, data_only=True, keep_links=False)
-        try:
-            sheets = {sheet.title: sheet for sheet in book.worksheets}
-            names = {
-                title: named
-                for title, sheet in sheets.items()
-                if (named := _best_names(list(sheet.iter_rows(max_row=HEADER_ROWS, values_only=True))))
-            }
-            title = chosen_part(path, names, given, "sheet")
-            rows = list(sheets[title].iter_rows(values_only=True))
-            place = book.sheetnames.index(title)
-        finally:
-            book.close()
-        return _table(path, rows, title, given, _Sheet(path, title, place, library))
-    except FingervisionError:
-        raise
-    except Exception as error:
-        raise DataError(
-            f"{path} must be an Excel workbook, but could not be read ({type(error).__name__}: {error}): save it again."
-        ) from error
+        sheets = {sheet.title: sheet for sheet in book.worksheets}
+        names = {
+            title: named
+            for title, sheet in sheets.items()
+            if (named := _best_names(list(sheet.iter_rows(max_row=HEADER_ROWS, values_only=True))))
+        }
+        title = chosen_part(path, names, given, "sheet")
+        rows = list(sheets[title].iter_rows(values_only=True))
+        place = book.sheetnames.index(title)
+    finally:
+        book.close()
+    return _table(path, rows, title, given, _Sheet(path, title, place, library))
 
 
 def _check_archive(path: Path) -> None:
