@@ -9,7 +9,7 @@ from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
 from fingervision.diagnosis.inference.answer import judged, without_names
 from fingervision.diagnosis.inference.explanation_candidates import Progress
-from fingervision.diagnosis.inference.plausibility import gross_mistake, mixed_rows, swapped_directions
+from fingervision.diagnosis.inference.plausibility import mistaken_column, mixed_rows, swapped_directions
 from fingervision.diagnosis.inference.refitted_search import Refitted, refitted_search
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
@@ -126,9 +126,9 @@ def _explained(
     begin_s = time.perf_counter()
     rng = np.random.default_rng(seed)
     data = prepare(table, model, without)
-    mistake = gross_mistake(data)
     refitted = _searched(data, rng, forced, without, progress)
     data, found = refitted.data, refitted.found
+    mistake = mistaken_column(data, found)
     if mistake is None and (found.unknown is not None or not found.best.names):
         mistake = swapped_directions(data, found.problem)
     if mistake is None and found.unknown is None:

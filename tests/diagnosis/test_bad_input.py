@@ -109,7 +109,7 @@ def test_a_model_of_reversed_sign_is_said_and_nothing_is_named(tmp_path: Path) -
     assert "is mirrored" in (report.unknown or "")
 
 
-@pytest.mark.parametrize("scale", [1e3, 1e-3])
+@pytest.mark.parametrize("scale", [1e3, 1.0 / 25.4])
 def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, scale: float) -> None:
     report = asked(tmp_path, stage("+-", 2, play_mm=0.0), scale=scale)
     assert report.verdict is Verdict.UNKNOWN

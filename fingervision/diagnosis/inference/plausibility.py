@@ -1,26 +1,27 @@
-"""Plausibility checks for mistakes in a table: a mirrored or rescaled column, or exchanged directions."""
+"""Mistakes in a table as hypotheses beside the effects: a mirrored or rescaled column, or exchanged directions."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import binom
 
+from fingervision.diagnosis.inference.ambiguity_set import STRONG, choices
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
-from fingervision.domain.effect import Array, DriveEffect, Flags
+from fingervision.domain.effect import Array, Flags
 from fingervision.effects.play_operator import play
 
-LEAST_CORRELATION = 0.5
-"""Least correlation of measured and predicted gap; below it the model does not describe the motion at all."""
+UNITS = (10.0, 25.4, 100.0, 1000.0, 1e6)
+"""Ratios of units of length that are confused: powers of ten, and inches."""
 LARGEST_RATIO = 3.0
-"""Largest ratio of measured to predicted motion (or its inverse) before a wrong unit or model is reported: the
-catalogue's scale, lever and input errors together reach 1.3 * 1.3 * 1.2 = 2.03."""
-ENDS = (0.05, 0.95)
-"""Quantiles of the gap whose difference is taken as its motion."""
-DELAYS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
-"""Delays at which the measured motion is compared."""
+"""Largest ratio of measured to predicted motion (or its inverse) that effects may cause: the catalogue's scale, lever
+and input errors together reach 1.3 * 1.3 * 1.2 = 2.03."""
+HALF = 0.5
+"""Largest share of the variance, both of the disagreement and of the gap itself, that a mistake in the table may leave,
+if it is the mistake and not an effect that explains the table."""
 SWAPPED_SIGMAS = 6.0
 """Standard errors by which the gap must lead at reversals before exchanged directions are suspected: the residual of
 any other effect leads by far less."""
@@ -62,35 +63,95 @@ class Finding:
     blocks: bool
 
 
-def gross_mistake(data: Observations) -> Finding | None:
-    """Compare measured and predicted motion as a whole: sign, unit, and whether they are related at all."""
-    gap, predicted = data.table.gap_mm, data.chain.respond({}).gap_mm
-    if np.ptp(predicted) == 0.0:
+def mistaken_column(data: Observations, found: Findings) -> Finding | None:
+    """Ask about sign or unit of a column, if that alone explains the table far better than any physical explanation.
+
+    A mistaken column is a hypothesis beside the effects: the gap follows the model with a gain of -1, of a ratio of
+    units, or of any size that no effect has, and no effect acts. It is asked about if it leaves less than half of the
+    variance and if its odds against the most probable explanation by effects are 20 to 1 or more.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    found : Findings
+        Result of the search for effects, with its noise.
+    """
+    units = [each for unit in UNITS for each in (unit, 1.0 / unit)]
+    gains = [(gain, 0) for gain in (-1.0, *units, *(-each for each in units))]
+    free = _free_gain(data, found.problem)
+    if free is not None and (free < 0.0 or not 1.0 / LARGEST_RATIO < free < LARGEST_RATIO):
+        gains.append((free, 1))
+    tried = [(_cost(data, found.problem, *each), each[0]) for each in gains if _leaves_less(data, found, each[0])]
+    if not tried:
         return None
-    # Ranks and quantiles are robust against wrong rows; for a stage with a delay, several delays are tried.
-    order = max((_order(gap, late) for late in _later(data)), key=abs)
-    way, predicted_way = (float(np.diff(np.quantile(values, ENDS))[0]) for values in (gap, predicted))
-    if order < -LEAST_CORRELATION:
-        return Finding(
-            "the measured gap falls where the model predicts a rise: input_mm or the gap is mirrored (its sign is "
-            "wrong), or the model belongs to another test bed.",
-            blocks=True,
+    price = 2.0 * float(np.log(len(gains)))
+    rows = max(2, int(found.problem.measured.size - found.problem.whitener.aside.sum()))
+    rivals = (found.nothing, found.nearest, found.best, *found.alternatives)
+    physical = min(rival.bic(rows) + choices(found.problem, rival) for rival in rivals)
+    cost, gain = min(tried)
+    if cost + price > physical - STRONG:
+        return None
+    if gain < 0.0:
+        far = "" if 1.0 / LARGEST_RATIO < -gain < LARGEST_RATIO else f", and {-gain:.3g} times as far"
+        words = (
+            f"the measured gap falls where the model predicts a rise{far}: input_mm or the gap is mirrored (its sign "
+            "is wrong), or the model belongs to another test bed."
         )
-    if abs(order) < LEAST_CORRELATION:
-        return Finding(
-            f"the measured gap does not follow the model (rank correlation {order:.2f}): the model does not belong to "
-            "these data, or most rows are wrong; check the columns first.",
-            blocks=True,
+    else:
+        words = (
+            f"the measured gap moves {gain:.3g} times as far as the model predicts: check the units of the gap, the "
+            "input and the model (a factor of 1000 means micrometres instead of millimetres, 25.4 means inches), "
+            "because no effect of the catalogue is so large."
         )
-    ratio = way / max(predicted_way, 1e-300)
-    if not 1.0 / LARGEST_RATIO < ratio < LARGEST_RATIO:
-        return Finding(
-            f"the measured gap moves {ratio:.3g} times as far as the model predicts: check the units of the gap and of "
-            "the model (a factor of 1000 means micrometres instead of millimetres), because no effect of the "
-            "catalogue is so large.",
-            blocks=True,
-        )
-    return None
+    return Finding(words, blocks=True)
+
+
+def _moved(data: Observations) -> Array:
+    """Predicted motion about the mean of each channel, shape (channels * n,); zero for a force."""
+    parts = data.chain.stacked({}).reshape(-1, data.chain.history.input_mm.size).copy()
+    parts -= parts.mean(axis=1, keepdims=True)
+    if data.chain.history.force:
+        parts[-1] = 0.0
+    return parts.ravel()
+
+
+def _constants(data: Observations, problem: Problem) -> Array:
+    """Whitened constant of each channel, shape (channels * n, channels)."""
+    channels = data.stacked_mm.size // data.chain.history.input_mm.size
+    columns: Array = np.kron(np.eye(channels), np.ones((data.chain.history.input_mm.size, 1))).astype(np.float64)
+    return problem.whitener.columns(columns)[0]
+
+
+def _beside_constants(data: Observations, problem: Problem, values: Array) -> Array:
+    """Project the constants of the channels off a column, which is then whitened."""
+    constants, whitened = _constants(data, problem), problem.whitener.one(values)
+    return np.asarray(whitened - constants @ np.linalg.lstsq(constants, whitened, rcond=1e-10)[0])
+
+
+def _free_gain(data: Observations, problem: Problem) -> float | None:
+    """Ratio of measured to predicted motion, by least squares; None if the model does not move."""
+    column = _beside_constants(data, problem, _moved(data))
+    power = float(column @ column)
+    return float(column @ _beside_constants(data, problem, data.stacked_mm)) / power if power > 0.0 else None
+
+
+def _cost(data: Observations, problem: Problem, gain: float, fitted: int) -> float:
+    """BIC of the model with another gain and without effects; the constant of each channel is fitted."""
+    residual = _beside_constants(data, problem, data.stacked_mm - gain * _moved(data))
+    sigma, penalty = problem.offsets.spread(residual)
+    free = fitted + data.stacked_mm.size // data.chain.history.input_mm.size
+    score = problem.offsets.squared(residual, problem.offsets.metric(sigma)) + penalty
+    return score + free * float(np.log(max(2, residual.size)))
+
+
+def _leaves_less(data: Observations, found: Findings, gain: float) -> bool:
+    """Whether a gain leaves less than half of the variance of the disagreement, and of the gap itself."""
+    n = data.chain.history.input_mm.size
+    kept = ~found.problem.whitener.aside[:n]
+    gap, moved = data.table.gap_mm[kept], _moved(data)[:n][kept]
+    left, disagreement, all_of_it = (float(np.var(each)) for each in (gap - gain * moved, gap - moved, gap))
+    return left < HALF * min(disagreement, all_of_it)
 
 
 def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Finding | None:
@@ -220,19 +281,3 @@ def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) 
     """Project whitened values off the given columns; the shape is unchanged."""
     moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
     return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])
-
-
-def _later(data: Observations) -> list[Array]:
-    """Predicted gap for a stage without delay, and for delays up to a second."""
-    late = [name for name, effect in data.effects.items() if isinstance(effect, DriveEffect) and effect.act_curved]
-    if not late:
-        return [data.chain.respond({}).gap_mm]
-    return [data.chain.respond({late[0]: {"delay_s": delay_s}}).gap_mm for delay_s in DELAYS_S]
-
-
-def _order(gap: Array, predicted: Array) -> float:
-    return float(np.corrcoef(_ranks(gap), _ranks(predicted))[0, 1]) if np.ptp(predicted) > 0.0 else 0.0
-
-
-def _ranks(values: Array) -> Array:
-    return np.argsort(np.argsort(values, kind="stable"), kind="stable").astype(np.float64)
