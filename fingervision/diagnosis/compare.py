@@ -9,6 +9,7 @@ from fingervision.diagnosis.bodies.body_evidence import body_evidence, drawing_o
 from fingervision.diagnosis.bodies.place_diagnosis import without_places
 from fingervision.diagnosis.bodies.place_words import body_places
 from fingervision.diagnosis.inference.cross_validation import rms_mm
+from fingervision.diagnosis.inference.plausibility import mistaken_column
 from fingervision.diagnosis.inference.verdict import isolated
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
@@ -152,6 +153,9 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         evidence, notes = body_evidence(table, answers, history.input_mm, np.random.default_rng(seed))
         found = (*found, *(() if evidence is None else body_places(evidence, answers)))
         data = replace(data, notes=(*data.notes, *notes))
+    mistake = mistaken_column(data, problem, (problem.nothing(),))
+    if mistake is not None:
+        data = replace(data, notes=(*data.notes, mistake.words))
     n, both = history.input_mm.size, history.both_edges
     aside = isolated(residual[:n], problem.whitener.aside[:n], history.runs)
     counted = np.concatenate([part[~aside] for part in np.split(residual, len(data.channels))])

@@ -128,7 +128,7 @@ def _explained(
     data = prepare(table, model, without)
     refitted = _searched(data, rng, forced, without, progress)
     data, found = refitted.data, refitted.found
-    mistake = mistaken_column(data, found)
+    mistake = mistaken_column(data, found.problem, (found.nothing, found.nearest, found.best, *found.singles))
     if mistake is None and (found.unknown is not None or not found.best.names):
         mistake = swapped_directions(data, found.problem)
     if mistake is None and found.unknown is None:

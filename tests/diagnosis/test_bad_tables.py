@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
+from fingervision.diagnosis.compare import compare
 from fingervision.diagnosis.inference.hypothesis import Explanation
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.plausibility import mixed_rows
@@ -142,3 +143,15 @@ def test_a_warming_slower_than_the_data_show_is_open_ended(tmp_path: Path, u_s: 
     assert [(name, parameter.name) for name, parameter in open_parameters(found, problem)] == (
         [("thermal_drift", "tau_s")] if is_open else []
     )
+
+
+@pytest.mark.parametrize("unit", [1.0, 10.0, 25.4])
+def test_a_comparison_asks_about_a_unit_of_the_gap(tmp_path: Path, unit: float) -> None:
+    rng = np.random.default_rng(6)
+    at = np.linspace(-0.9, 1.9, 40)
+    gap = (4.0 + 7.7 * at + 0.005 * rng.standard_normal(40)) / unit
+    table = write(tmp_path, "input_mm,gap_mm\n" + "\n".join(f"{u:.6f},{g:.8f}" for u, g in zip(at, gap, strict=True)))
+    found = compare(
+        read_measured_table(table), read_model(write(tmp_path, "input_mm,gap_mm\n-1,-3.7\n2,19.4", "sim.csv"))
+    )
+    assert any(f"{1.0 / unit:.3g} times" in note for note in found.data.notes) == (unit != 1.0)

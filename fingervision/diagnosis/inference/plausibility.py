@@ -1,5 +1,6 @@
 """Mistakes in a table as hypotheses beside the effects: a mirrored or rescaled column, or exchanged directions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,6 @@ from scipy.stats import binom
 
 from fingervision.diagnosis.inference.ambiguity_set import STRONG, choices
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
@@ -63,7 +63,7 @@ class Finding:
     blocks: bool
 
 
-def mistaken_column(data: Observations, found: Findings) -> Finding | None:
+def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Explanation]) -> Finding | None:
     """Ask about sign or unit of a column, if that alone explains the table far better than any physical explanation.
 
     A mistaken column is a hypothesis beside the effects: the gap follows the model with a gain of -1, of a ratio of
@@ -74,21 +74,25 @@ def mistaken_column(data: Observations, found: Findings) -> Finding | None:
     ----------
     data : Observations
         Measurement and model.
-    found : Findings
-        Result of the search for effects, with its noise.
+    problem : Problem
+        Estimation problem with its noise.
+    rivals : sequence of Explanation
+        Explanations by effects. If there is none but the model without effects, only gains are asked about that no
+        effect has; a delay, for example, can mirror a motion.
     """
     units = [each for unit in UNITS for each in (unit, 1.0 / unit)]
     gains = [(gain, 0) for gain in (-1.0, *units, *(-each for each in units))]
-    free = _free_gain(data, found.problem)
+    free = _free_gain(data, problem)
     if free is not None and (free < 0.0 or not 1.0 / LARGEST_RATIO < free < LARGEST_RATIO):
         gains.append((free, 1))
-    tried = [(_cost(data, found.problem, *each), each[0]) for each in gains if _leaves_less(data, found, each[0])]
+    searched = any(rival.names for rival in rivals)
+    able = [each for each in gains if (searched or each[0] > 0.0) and _leaves_less(data, problem, each[0])]
+    tried = [(_cost(data, problem, *each), each[0]) for each in able]
     if not tried:
         return None
     price = 2.0 * float(np.log(len(gains)))
-    rows = max(2, int(found.problem.measured.size - found.problem.whitener.aside.sum()))
-    rivals = (found.nothing, found.nearest, found.best, *found.alternatives)
-    physical = min(rival.bic(rows) + choices(found.problem, rival) for rival in rivals)
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    physical = min(rival.bic(rows) + choices(problem, rival) for rival in rivals)
     cost, gain = min(tried)
     if cost + price > physical - STRONG:
         return None
@@ -145,10 +149,10 @@ def _cost(data: Observations, problem: Problem, gain: float, fitted: int) -> flo
     return score + free * float(np.log(max(2, residual.size)))
 
 
-def _leaves_less(data: Observations, found: Findings, gain: float) -> bool:
+def _leaves_less(data: Observations, problem: Problem, gain: float) -> bool:
     """Whether a gain leaves less than half of the variance of the disagreement, and of the gap itself."""
     n = data.chain.history.input_mm.size
-    kept = ~found.problem.whitener.aside[:n]
+    kept = ~problem.whitener.aside[:n]
     gap, moved = data.table.gap_mm[kept], _moved(data)[:n][kept]
     left, disagreement, all_of_it = (float(np.var(each)) for each in (gap - gain * moved, gap - moved, gap))
     return left < HALF * min(disagreement, all_of_it)
