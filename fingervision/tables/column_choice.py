@@ -85,7 +85,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     if "input" in roles:
         free = [k for k in range(len(names)) if k not in fixed and names[k].role in (None, "input", "target")]
         roles["input"] = _one_axis(raw, names, roles["input"], free, decimal, about)
-        roles["input"] = _with_followers(raw, names, roles["input"], free, decimal)
+        roles["input"] = _with_followers(raw, names, roles["input"], free, decimal, about)
     suggested: set[int] = set()
 
     def readings(role: str, candidates: Sequence[int]) -> list[Reading]:
@@ -157,7 +157,7 @@ def _one_axis(
 
 
 def _with_followers(
-    raw: RawTable, names: Sequence[ColumnName], inputs: list[int], free: Sequence[int], decimal: str
+    raw: RawTable, names: Sequence[ColumnName], inputs: list[int], free: Sequence[int], decimal: str, about: Findings
 ) -> list[int]:
     """Add to a set-point the columns of lengths that make the same motion: one may be the position reached."""
     if not all(names[k].role == "target" for k in inputs):
@@ -171,7 +171,10 @@ def _with_followers(
             return False
         return bool(np.std(values - lead) < SAME_MOTION * np.ptp(lead) or rows_behind(values, lead) != 0)
 
-    return inputs + [k for k in free if k not in inputs and follows(k)]
+    found = inputs + [k for k in free if k not in inputs and follows(k)]
+    if len(found) == 1:
+        about.notes.append(f"'{raw.columns[found[0]].name}' is a set-point: the position that was reached may differ.")
+    return found
 
 
 def _lone_u(

@@ -128,11 +128,13 @@ def _points(column: RawColumn, name: ColumnName, role: str, decimal: str) -> int
     found = mentions(name.base)
     points = BY_NAME if role in found else -BY_NAME if found else 0
     unit = spelled(column.unit) or name.unit
+    values = values_of(column, decimal)[:LOOKED_AT]
+    is_constant = values.size > 0 and bool(np.ptp(values) == 0.0)
     is_sized = unit != "" and factor(unit, DIMENSION.get(role, "length")) is not None
     if is_sized or known_unit(unit) is not None:
         points += BY_UNIT if is_sized else -2 * BY_UNIT
     points += BY_READING * (role == "input" and bool(READINGS & set(tokens(name.base))))
-    points -= BY_READING * (role == "input" and "target" in found) + BY_READING * _is_constant(column)
+    points -= BY_READING * (role == "input" and "target" in found) + BY_READING * is_constant
     is_clock = increases(column, decimal)
     if role == "time":
         return points + (BY_CLOCK if is_clock else -2 * BY_CLOCK)
@@ -148,13 +150,6 @@ def _has_values(column: RawColumn, decimal: str) -> bool:
         return True
     numbers, odd = to_numbers(content[:LOOKED_AT], decimal)
     return int(np.count_nonzero(numbers.present)) > odd.size
-
-
-def _is_constant(column: RawColumn) -> bool:
-    content = column.content
-    if isinstance(content, Numbers):
-        return bool(np.ptp(content.value[:LOOKED_AT]) == 0.0) if content.value.size else True
-    return len(set(content[:LOOKED_AT])) < 2
 
 
 def increases(column: RawColumn, decimal: str) -> bool:

@@ -22,6 +22,9 @@ LEAST_INPUT_MM, GREATEST_INPUT_MM = 0.002, 300.0
 a metre."""
 GREATEST_GAP_MM = 500.0
 """Largest plausible gap, beyond the field of view of any such set-up."""
+USUAL_INPUT_MM, USUAL_GAP_MM = (0.02, 20.0), (0.1, 100.0)
+"""Ranges of which at least one holds for a micro-gripper's input or gap. If both are smaller (or both larger), a
+measurement in metres (or micrometres) that is called millimetres is by far more probable."""
 LEAST_SPEED_MM_S, GREATEST_SPEED_MM_S = 2e-3, 50.0
 USUAL_STEPS_S = (1e-3, 1.0)
 """Usual time between rows (s), judged together with the usual speed of the input during motions (mm/s). Usual set-ups
@@ -91,15 +94,19 @@ def _gap(columns: Mapping[str, Numbers]) -> NDArray[np.float64] | None:
 def _sizes(columns: Mapping[str, Numbers], travel: float, given_units: set[str]) -> list[Question]:
     """State a doubt if the range of the input, or of the gap beside that of the input, is implausible."""
     inputs = columns["input"].value[columns["input"].present]
-    if "input" not in given_units and not LEAST_INPUT_MM <= travel <= GREATEST_INPUT_MM:
-        words = f"with the stated unit, the input ranges over {travel:g} mm"
-        return [asked(words, _other_units("input", inputs, lambda size: LEAST_INPUT_MM <= size <= GREATEST_INPUT_MM))]
     gap = _gap(columns)
     sides = given_units & {"gap", "left", "right"}
+    largest = float(np.max(np.abs(gap))) if gap is not None and gap.size and not sides else 1.0
+    sizes = ((travel, *USUAL_INPUT_MM), (largest, *USUAL_GAP_MM))
+    unusual = all(size < low for size, low, _ in sizes) or all(size > high for size, _, high in sizes)
+    if "input" not in given_units and (unusual or not LEAST_INPUT_MM <= travel <= GREATEST_INPUT_MM):
+        words = f"with the stated unit, the input ranges over {travel:g} mm"
+        plausible = _other_units("input", inputs, lambda size: LEAST_INPUT_MM <= size <= GREATEST_INPUT_MM)
+        return [asked(words, plausible)]
     if gap is None or not gap.size or (sides and "input" in given_units):
         return []
     opening = float(np.ptp(gap))
-    if "gap" in columns and not sides and float(np.max(np.abs(gap))) > GREATEST_GAP_MM:
+    if "gap" in columns and not sides and largest > GREATEST_GAP_MM:
         words = f"with the stated unit, the gap is {span(gap, 'mm')}"
         return [asked(words, _other_units("gap", gap, lambda size: size < opening))]
     if opening == 0.0 or LEAST_RATIO <= opening / travel <= GREATEST_RATIO:

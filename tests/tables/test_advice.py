@@ -37,3 +37,14 @@ def test_the_axis_that_moves_is_the_input_and_two_moving_axes_are_asked_about(tm
         read_measured_table(table)
     keys = [each.key for each in caught.value.questions[0].readings]
     assert {"columns.input=Z [mm]", "columns.input=Y [mm]"} == set(keys[:2])
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_metres_or_micrometres_called_millimetres_are_asked_about_even_if_both_columns_are(
+    size: float, tmp_path: Path
+) -> None:
+    rows = [f"{0.1 * k:.1f},{size * 0.05 * k:.9g},{size * (0.3 + 0.2 * k):.9g}" for k in range(40)]
+    table = tmp_path / "wrong.csv"
+    table.write_text("\n".join(["Time [s],Position [mm],Gap [mm]", *rows]), encoding="utf-8")
+    with pytest.raises(OpenQuestionError, match=r"0 to 1\.95 mm"):
+        read_measured_table(table)
