@@ -217,7 +217,7 @@ def memory(folder: Path, sizes: list[str]) -> None:
                 if (frames := decode(path)) != count:
                     raise RuntimeError(f"{path.name} must hold as many frames as its name says, but holds {frames}.")
                 if size == sizes[0] and not peaks:
-                    peak_mb(path, folder / "built")  # the very first run of a source tree builds its loops
+                    peak_mb(path, folder / f"{kind}.built")  # the very first run of a source tree builds its loops
                 peaks.append(peak_mb(path, folder / f"{size}-{path.name}.out"))
                 path.unlink()
             print(f"{f'{size}, {kind}':46}{peaks[0]:7.0f}{peaks[1]:7.0f}{peaks[1] / peaks[0]:7.2f}", flush=True)
