@@ -1,5 +1,6 @@
 """Folder of a recorded run: video, gaps, events and settings, which are valid even if the program is killed."""
 
+import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -14,12 +15,16 @@ from fingervision.frames.received import OwnPacket
 from fingervision.frames.source import Description
 from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import write_calibration
+from fingervision.storage.durable import remove_empty
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.storage.lost_frames import LOST, LostFrames
 from fingervision.storage.recorded_video import RecordedVideo
-from fingervision.storage.run_files import CALIBRATION, EVENTS, SCHEMA, VIDEO, RunFiles
+from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles
 
 GAPS = "gaps.csv"
+RUNS = "????-??-??T??-??-??Z*"
+OF_OUT = ("calibration_*.json", "snapshot_*.png", "live_gaps.csv", "settings.toml")
+"""Names of the folders of runs, and of the files that a live view writes beside them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +115,26 @@ class RunFolder:
         self._about["sha256"] = {VIDEO: self._files.sha256(VIDEO)} if there else {}
         self._about["frames"] = self.frames
         self._files.write_about(self._about, complete=True)
+
+
+def remove_leftovers(out: Path) -> None:
+    """Remove the empty files that a power failure left in the output folder and in its runs.
+
+    A file that was changed last before the computer was started belongs to no program that still writes it; the moment
+    of the start is known on Linux only.
+    """
+    clock = getattr(time, "CLOCK_BOOTTIME", None)
+    if clock is None:
+        return
+    started_s = time.time() - time.clock_gettime(clock)
+    with suppress(OSError):  # what cannot be removed does not prevent a live view
+        for folder in (out, *out.glob(RUNS)):
+            files = [file for file in folder.iterdir() if file.is_file()]
+            old = [file for file in files if file.stat().st_mtime < started_s]
+            if folder == out:
+                remove_empty(out, [file.name for file in old if any(map(file.match, OF_OUT))])
+            elif len(old) == len(files):
+                remove_empty(folder, (RUN, CALIBRATION, EVENTS, VIDEO, GAPS, LOST))
 
 
 def _new_folder(out: Path) -> Path:

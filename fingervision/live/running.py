@@ -21,6 +21,7 @@ from fingervision.live.outlet import Outlet
 from fingervision.live.playback.gauges_beside import put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import Recorded
+from fingervision.live.run_folder import remove_leftovers
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines, StatusLine, told
@@ -99,6 +100,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
     except BaseException:
         capture.source.close()
         raise
+    remove_leftovers(out)
     with _printing(session, showing) as (out_there, said):
         lines = JsonLines(out_there) if showing.json_lines else None
         status = (
