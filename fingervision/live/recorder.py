@@ -105,24 +105,31 @@ class Recorder:
             f"{advice}."
         )
 
+    @property
+    def _gone(self) -> str:
+        return (
+            f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: put "
+            "the disk back, or record to another folder."
+        )
+
     def _look_at_the_disk(self) -> None:
         """Check whether the folder was deleted, which writing does not report, and how long the disk space suffices."""
         if monotonic() - self._looked_s < DISK_EVERY_S:
             return
         self._looked_s = monotonic()
         if not self.run.is_there:
-            raise OutputError(
-                f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: "
-                "put the disk back, or record to another folder."
-            )
+            raise OutputError(self._gone)
         self.minutes_left = minutes_left(self.run.path, monotonic() - self.began_s)
 
     def _write(self) -> None:
         try:
             self._write_all()
         except Exception as error:  # the run is closed with the reason, whatever ended it
-            self.fail(told(error))
-        self.run.close(self.failure or self._why)
+            self.fail(told(error) if self.run.is_there else self._gone)
+        try:
+            self.run.close(self.failure or self._why)
+        except Exception as error:  # a first failure is the cause
+            self.fail(self.failure or told(error))
 
     def _write_all(self) -> None:
         while True:
