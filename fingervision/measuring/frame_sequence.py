@@ -15,8 +15,11 @@ light, leave these places where they are.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from math import hypot
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,7 +43,7 @@ BAND_PX, BELOW, BEYOND, COVERED_SHARE = 8, 12, 6, 0.2
 # Permitted difference between the outlines of one finger in two frames: for coarse coding (pixels), and for bending, as
 # a share of the finger's displacement, up to a limit (pixels).
 CODED_PX, BENT_SHARE, MOST_BENT_PX = 0.2, 0.1, 1.0
-# Distance (pixels) within which the outline in a band is searched from that in the band before.
+# Distance (pixels) within which the outline in a band is searched from the finger's straight side.
 SEARCH_PX = 40
 # Largest share of the bands that may differ, because a part between the fingers may hide most of the inner sides; and
 # least number of bands for a judgement.
@@ -52,14 +55,6 @@ WORDS = (
     "The fingers would have jumped in this frame alone, and their outlines are not those of the frames before and "
     "after it: the picture is damaged, or something passed in front of the fingers."
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
-    """A frame with its gap."""
-
-    frame: Frame
-    gap: GapMeasurement
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,44 +73,57 @@ class _Look:
     beyond: Floats
 
 
+class _Seen:
+    """A frame with its gap, and how its two fingers look."""
+
+    def __init__(self, frame: Frame, gap: GapMeasurement) -> None:
+        self.frame, self.gap = frame, gap
+        self.fingers = (gap.left, gap.right)
+
+    @cached_property
+    def looks(self) -> tuple[_Look, _Look]:
+        """How the left and the right finger look, computed when first asked for."""
+        return _look(self, self.gap.left, is_left=True), _look(self, self.gap.right, is_left=False)
+
+    @cached_property
+    def positions(self) -> tuple[tuple[float, float], ...]:
+        """Edge and tip of both fingers, each with its standard uncertainty (pixels)."""
+        vertical = self.gap.direction.is_vertical
+        edges = [(one.x_px if vertical else one.y_px, one.u_across_px) for one in self.fingers]
+        return (*edges, *((one.tip_px, one.u_tip_px) for one in self.fingers))
+
+
 class FrameSequence:
     """Judges the frames of one recording in order; at most `MOST_WAITING` frames wait for those behind them."""
 
     def __init__(self) -> None:
         self._sound: list[_Seen] = []
         self._waiting: list[Judged] = []
+        self._suspects: list[_Seen] = []
 
     def add(self, item: Frame | LostFrame, outcome: Outcome) -> list[Judged]:
         """Take the next frame with its result, and return the frames on which the judgement is complete."""
         self._waiting.append((item, outcome))
-        suspects = self._suspects()
-        if not suspects:
-            return self._released(None)
-        now = suspects[-1]
-        if item is now.frame:
+        suspects = self._suspects
+        # Pictures without times are not known to be successive.
+        if isinstance(item, Frame) and isinstance(outcome, GapMeasurement) and item.time_s is not None:
+            now = _Seen(item, outcome)
+            suspects.append(now)
             if self._sound and (not _jumps(self._sound, now) or _is_alike(self._sound[-1], now)):
                 return self._released(now)
             if len(suspects) > 1 and _is_alike(suspects[-2], now):
                 return self._released(now)
             if len(suspects) > MOST_UNLIKE:
                 return self._released(None)
-        return self.finish() if len(self._waiting) > MOST_WAITING else []
+        return self.finish() if not suspects or len(self._waiting) > MOST_WAITING else []
 
     def finish(self) -> list[Judged]:
         """Return the frames that wait, judged by the last sound frame, because no frame behind them can."""
         return self._released(self._sound[-1] if self._sound else None)
 
-    def _suspects(self) -> list[_Seen]:
-        # Pictures without times are not known to be successive.
-        return [
-            _Seen(item, outcome)
-            for item, outcome in self._waiting
-            if isinstance(item, Frame) and isinstance(outcome, GapMeasurement) and item.time_s is not None
-        ]
-
     def _released(self, judge: _Seen | None) -> list[Judged]:
         """Return the frames that wait, and refuse those unlike the judge; without one, none is refused."""
-        suspects = self._suspects()
+        suspects, self._suspects = self._suspects, []
         sound = [one for one in suspects if judge is None or one.frame is judge.frame or _is_alike(judge, one)]
         refused = {one.frame.index for one in suspects} - {one.frame.index for one in sound}
         waiting, self._waiting = self._waiting, []
@@ -137,21 +145,16 @@ def in_sequence(judged: Iterable[Judged]) -> Iterator[Judged]:
 def _jumps(sound: list[_Seen], now: _Seen) -> bool:
     """Whether a finger is not where the motion in the last two frames leads it."""
     last, before = sound[-1], sound[-2] if len(sound) > 1 else sound[-1]
-    (here, u), (there, u_there), (earlier, u_earlier) = (_positions(each.gap) for each in (now, last, before))
+    if now.gap.direction is not last.gap.direction:
+        return True
     gone, steps = last.frame.index - before.frame.index, now.frame.index - last.frame.index
     share = steps / gone if gone else 0.0
-    u_all = np.sqrt(u**2 + ((1.0 + share) * u_there) ** 2 + (share * u_earlier) ** 2)
-    beyond = np.abs(here - there - share * (there - earlier))
-    return now.gap.direction is not last.gap.direction or bool(np.any(beyond > JUMP_U * u_all + LEAST_JUMP_PX))
-
-
-def _positions(gap: GapMeasurement) -> tuple[Floats, Floats]:
-    """Edge and tip of both fingers (pixels), with their standard uncertainties."""
-    sides = (gap.left, gap.right)
-    across = [side.x_px if gap.direction.is_vertical else side.y_px for side in sides]
-    return (
-        np.array([*across, *(side.tip_px for side in sides)]),
-        np.array([*(side.u_across_px for side in sides), *(side.u_tip_px for side in sides)]),
+    return any(
+        abs(here - there - share * (there - earlier))
+        > JUMP_U * hypot(u, (1.0 + share) * u_there, share * u_earlier) + LEAST_JUMP_PX
+        for (here, u), (there, u_there), (earlier, u_earlier) in zip(
+            now.positions, last.positions, before.positions, strict=True
+        )
     )
 
 
@@ -159,19 +162,13 @@ def _is_alike(first: _Seen, second: _Seen) -> bool:
     """Whether both fingers have the same outlines in two frames, as far as these can be followed."""
     if first.gap.direction is not second.gap.direction or first.frame.pixels.shape != second.frame.pixels.shape:
         return False
-    moved = np.abs(_positions(first.gap)[0] - _positions(second.gap)[0])
-    pairs = zip(_fingers(first), _fingers(second), strict=True)
-    for number, (one, other) in enumerate(pairs):
-        u_px = float(np.hypot(one.u_across_px, other.u_across_px))
-        bent_px = min(MOST_BENT_PX, BENT_SHARE * float(moved[[number, number + 2]].max()))
-        looks = (_look(first, one, number == 0), _look(second, other, number == 0))
-        if not _agree(*looks, JUMP_U * u_px + CODED_PX + bent_px):
+    moved_px = [abs(one - other) for (one, _), (other, _) in zip(first.positions, second.positions, strict=True)]
+    for k, (one, other) in enumerate(zip(first.fingers, second.fingers, strict=True)):
+        bent_px = min(MOST_BENT_PX, BENT_SHARE * max(moved_px[k], moved_px[k + 2]))
+        tolerance_px = JUMP_U * hypot(one.u_across_px, other.u_across_px) + CODED_PX + bent_px
+        if not _agree(first.looks[k], second.looks[k], tolerance_px):
             return False
     return True
-
-
-def _fingers(seen: _Seen) -> tuple[FingerEdge, FingerEdge]:
-    return seen.gap.left, seen.gap.right
 
 
 def _agree(one: _Look, other: _Look, tolerance_px: float) -> bool:
@@ -215,13 +212,14 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     if first < 0 or count == 0:
         return _Look(np.empty((2, 0)), np.empty(0))
     rows = to_grey(np.ascontiguousarray(upright[first : first + count * BAND_PX]))
-    below = rows.reshape(count, BAND_PX, -1).mean(axis=1)
+    size = (rows.shape[1], count)
+    below = np.asarray(cv2.resize(rows.astype(np.float32), size, interpolation=cv2.INTER_AREA), dtype=np.float64)
     # The edge is measured at the measuring height, and the first band is centred half a band towards the root.
     inner_px = across_px + end.slope * (first - along_px + 0.5 * (BAND_PX - 1))
     level = float(np.interp(inner_px, np.arange(below.shape[1]), below[0]))
     inwards = 1 if is_left else -1
     rises = (inwards > 0) is seen.gap.light_gap
-    opposite = _crossings(below[0], level, not rises)
+    _, opposite = _crossings(below[:1], level, not rises)
     outside = opposite[inwards * (inner_px - opposite) > 0.0]
     outer_px = float(outside.max() if is_left else outside.min()) if outside.size else float("nan")
     sides = ((rises, inner_px), (not rises, outer_px))
@@ -237,21 +235,20 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
 
 
 def _followed(bands: Floats, level: float, rises: bool, start_px: float, slope: float) -> Floats:
-    """Places at which the profiles of the bands pass through a level, each next to that in the band before."""
-    found, near_px = np.full(len(bands), np.nan), start_px
-    for number, band in enumerate(bands):
-        if np.isnan(near_px):
-            break
-        begin = max(0, int(near_px) - SEARCH_PX)
-        places = begin + _crossings(band[begin : max(0, int(near_px)) + SEARCH_PX + 2], level, rises)
-        if places.size:
-            found[number] = near_px = places[np.argmin(np.abs(places - near_px))]
-        near_px += slope * BAND_PX
+    """Places at which the profiles of the bands pass through a level, in each that next to a finger's straight side."""
+    found = np.full(len(bands), np.nan)
+    number, places = _crossings(bands, level, rises)
+    apart = np.abs(places - (start_px + slope * BAND_PX * number))
+    # Written from the farthest to the nearest, so that the nearest stays; none is near an unknown start.
+    order = np.argsort(-apart)
+    order = order[apart[order] < SEARCH_PX]
+    found[number[order]] = places[order]
     return found
 
 
-def _crossings(profile: Floats, level: float, rises: bool) -> Floats:
-    """Places at which a profile passes through a level upwards (or downwards), linear between pixels."""
-    above = profile > level
-    at = np.flatnonzero(above[1:] & ~above[:-1] if rises else above[:-1] & ~above[1:])
-    return np.asarray(at + (level - profile[at]) / (profile[at + 1] - profile[at]))
+def _crossings(bands: Floats, level: float, rises: bool) -> tuple[NDArray[np.intp], Floats]:
+    """Bands and places at which profiles pass through a level upwards (or downwards), linear between pixels."""
+    above = bands > level
+    number, at = np.nonzero(above[:, 1:] & ~above[:, :-1] if rises else above[:, :-1] & ~above[:, 1:])
+    before = bands[number, at]
+    return number, np.asarray(at + (level - before) / (bands[number, at + 1] - before))
