@@ -60,25 +60,26 @@ def dropped_out(values: Numbers) -> NDArray[np.bool_]:
     """
     known = np.flatnonzero(values.present)
     number = values.value[known]
-    none, sure, likely = (np.zeros(values.value.size, dtype=np.bool_) for _ in range(3))
-    rest = np.flatnonzero(number != 0.0)
-    if rest.size < 2 or rest.size == number.size:
-        return none
+    out = np.zeros(values.value.size, dtype=np.bool_)
+    rest, zeros = np.flatnonzero(number != 0.0), np.flatnonzero(number == 0.0)
+    if rest.size < 2 or not zeros.size:
+        return out
     steps = np.abs(np.diff(number[rest]))
     usual = float(np.max(steps[np.diff(rest) == 1], initial=0.0))
-    ends = np.concatenate([[-1], rest, [number.size]])
-    longest = 1
-    # Zeros stand before the row `place` of those that are not zero.
-    for place in np.flatnonzero(np.diff(ends) > 1).tolist():
-        rows = known[ends[place] + 1 : ends[place + 1]]
-        beside = np.abs(number[rest[max(place - 1, 0) : place + 1]])
-        near = np.concatenate([steps[max(place - 2, 0) : max(place - 1, 0)], steps[place : place + 1]])
-        leaps = float(np.min(beside)) > 2.0 * usual > 0.0
-        sure[rows] = leaps and beside.size == 2
-        longest = max(longest, rows.size if leaps else 0)
-        off = beside.size == 2 and float(np.mean(beside)) > 0.5 * float(np.max(near, initial=0.0))
-        likely[rows] = leaps or (off and rows.size <= longest)
-    return likely if sure.any() and np.count_nonzero(likely) <= MOST_ROWS * number.size else none
+    # `lengths[k]` zeros stand before row k of those that are not zero; the last, behind all of them.
+    lengths = np.diff(np.concatenate([[-1], rest, [number.size]])) - 1
+    inner = np.flatnonzero(lengths[1:-1]) + 1
+    before, after = np.abs(number[rest[inner - 1]]), np.abs(number[rest[inner]])
+    leaps = np.minimum(before, after) > 2.0 * usual
+    if usual == 0.0 or not leaps.any():
+        return out
+    padded = np.concatenate([[0.0], steps, [0.0]])
+    near = np.maximum(padded[inner - 1], padded[inner + 1])
+    off = (before + after > near) & (lengths[inner] <= np.max(lengths[inner[leaps]]))
+    ends = np.array([0, rest.size])[np.abs(number[rest[[0, -1]]]) > 2.0 * usual]
+    dropped = zeros[np.isin(np.searchsorted(rest, zeros), np.concatenate([inner[leaps | off], ends]))]
+    out[known[dropped]] = dropped.size <= MOST_ROWS * number.size
+    return out
 
 
 def without_filler(values: Numbers, stated: str) -> Numbers:
