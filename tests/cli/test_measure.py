@@ -283,7 +283,7 @@ def write_endless(path: Path) -> None:
     once = path.with_stem("once")
     write_clip(once, [frame], Ffv1())
     with av.open(once) as first, av.open(path, "w") as container:
-        stream = container.add_stream_from_template(first.streams.video[0], opaque=True)
+        stream = container.add_stream_from_template(first.streams.video[0])
         stream.time_base = Fraction(1, 1000)
         (picture,) = [bytes(packet) for packet in first.demux(video=0) if packet.size]
         for k in range(ENDLESS):

@@ -23,5 +23,7 @@ def test_a_title_that_is_no_text_costs_no_frame(tmp_path: Path, suffix: str) -> 
                 new.mux(packet)
     content = path.read_bytes()
     assert b"Spalt 7" in content
+    whole = len(list(open_source(str(path))))
+    assert whole >= 3  # PyAV 14 loses the last picture when it copies an MP4
     path.write_bytes(content.replace(b"Spalt 7", b"Sp\xe4lt 7"))
-    assert len(list(open_source(str(path)))) == 4
+    assert len(list(open_source(str(path)))) == whole
