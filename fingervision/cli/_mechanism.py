@@ -1,6 +1,6 @@
 """`fingervision model mechanism.toml`: model a planar mechanism with finite elements and with lumped flexures."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -65,46 +65,15 @@ def predict(
         raise UsageError(
             f"A mechanism.toml can be computed by the kinds of model {', '.join(_KINDS)}, but --kind is {kind}."
         )
-    wanted = _KINDS if kind == "all" else (kind,)
-    models: dict[str, MechanismModel] = {}
-    refusals: dict[str, FingervisionError] = {}
-    table: dict[str, dict[str, float]] = {}
-    for name in wanted:
-        try:
-            with _naming(path):
-                model = _built(name, mechanism)
-                table[name] = mechanism_figures(model)
-        except FingervisionError as error:
-            # If one kind of model fails, the results of the other kinds are still written.
-            if kind != "all":
-                raise
-            refusals[name] = error
-            continue
-        models[name] = model
-    if not models:
-        raise next(iter(refusals.values()))
-    for name, refusal in refusals.items():
-        click.echo(f"{name} could not be computed: {refusal}", err=True)
+    models, table = _figures(path, mechanism, _KINDS if kind == "all" else (kind,))
     chief = next(iter(models))
     at_yield_mm = table[chief]["input_at_yield_mm"]
-    if drive is None:
-        inputs = np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
-    else:
-        inputs = _inputs_mm(np.unique(read_drive(drive, columns).input_mm))
-        if large_rotation or contact:
-            # A table is interpolated linearly between its rows, but these results are curved.
-            touches = [at for at in models[chief].touch_input_mm().values() if contact and inputs[0] < at < inputs[-1]]
-            inputs = np.union1d(inputs, np.concatenate([np.linspace(inputs[0], inputs[-1], _ROWS), touches]))
+    driven = None if drive is None else np.unique(read_drive(drive, columns).input_mm)
+    touching = models[chief].touch_input_mm().values() if contact and driven is not None else ()
+    inputs = _inputs_mm(driven, at_yield_mm, touching, is_curved=large_rotation or contact)
     states = {name: [model.state(float(value), large_rotation=large_rotation, contact=contact) for value in inputs]
               for name, model in models.items()}  # fmt: skip
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"--out must be a folder that can be written, but {out}: {error.strerror}.") from error
-    for name, rows in states.items():
-        folder = out if name == chief else out / name
-        folder.mkdir(exist_ok=True)
-        write_states(rows, folder)
+    _write_states(states, chief, out)
     plate = models.get("finite_element")
     if isinstance(plate, MechanismPlate):
         shown = max(states["finite_element"], key=lambda state: abs(state.input_mm))
@@ -151,11 +120,55 @@ def _naming(path: Path) -> Iterator[None]:
         raise type(error)(f"In {path}: {error}") from error
 
 
-def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _write_states(states: dict[str, list[MechanismState]], chief: str, out: Path) -> None:
+    """Write the tables of every kind: the chief one's into the folder itself, the others' into folders of their own."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"--out must be a folder that can be written, but {out}: {error.strerror}.") from error
+    for name, rows in states.items():
+        folder = out if name == chief else out / name
+        folder.mkdir(exist_ok=True)
+        write_states(rows, folder)
+
+
+def _figures(
+    path: Path, mechanism: Mechanism, kinds: tuple[str, ...]
+) -> tuple[dict[str, MechanismModel], dict[str, dict[str, float]]]:
+    """Models of several kinds with their figures; if one of several kinds fails, the others are still computed."""
+    models: dict[str, MechanismModel] = {}
+    table: dict[str, dict[str, float]] = {}
+    refusals: dict[str, FingervisionError] = {}
+    for name in kinds:
+        try:
+            with _naming(path):
+                model = _built(name, mechanism)
+                table[name] = mechanism_figures(model)
+        except FingervisionError as error:
+            refusals[name] = error
+        else:
+            models[name] = model
+    if not models:
+        raise next(iter(refusals.values()))
+    for name, refusal in refusals.items():
+        click.echo(f"{name} could not be computed: {refusal}", err=True)
+    return models, table
+
+
+def _inputs_mm(
+    driven: NDArray[np.float64] | None, at_yield_mm: float, touching: Iterable[float], *, is_curved: bool
+) -> NDArray[np.float64]:
     """Inputs of the static table (mm): those of the drive table, or enough evenly spaced inputs for a smooth curve."""
-    if inputs.size < 2:
-        raise UsageError(f"--drive must hold at least two different inputs, but holds {inputs.size}.")
-    return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
+    if driven is None:
+        return np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
+    if driven.size < 2:
+        raise UsageError(f"--drive must hold at least two different inputs, but holds {driven.size}.")
+    inputs = driven if driven.size <= _MOST_ROWS else np.linspace(driven[0], driven[-1], _MOST_ROWS)
+    if not is_curved:
+        return inputs
+    # A table is interpolated linearly between its rows, but these results are curved.
+    touches = [at for at in touching if inputs[0] < at < inputs[-1]]
+    return np.union1d(inputs, np.concatenate([np.linspace(inputs[0], inputs[-1], _ROWS), touches]))
 
 
 def _curve(states: list[MechanismState]) -> PchipInterpolator:

@@ -50,6 +50,7 @@ MORE_THAN_TWO = NoGap(
     Status.NO_FINGERS,
     "More than two objects in the picture look like fingers: give the region of the two fingers (--roi).",
 )
+SHALLOW = NoGap(Status.TOUCHING, "The fingers touch above the measuring height.")
 UNLIKE = NoGap(
     Status.ONE_FINGER,
     "The two objects in the picture differ too much in width to be fingers of one gripper: give the region of the two "
@@ -118,49 +119,19 @@ def _best_pair(
     in_view = [top for top in tops if top.along_px > 0]
     best: CoarseFingers | None = None
     two: tuple[Top, Top] | None = None
-    shallow = unlike = False
+    reasons: list[NoGap] = []
     across = [top.across_px for top in in_view]
     for i, j in combinations(range(len(in_view)), 2):
         left, right = (in_view[i], in_view[j]) if across[i] <= across[j] else (in_view[j], in_view[i])
-        prominence = min(left.prominence_px, right.prominence_px)
         is_rooted = left.is_rooted or right.is_rooted
-        score = prominence * (ROOTED_BONUS if is_rooted else 1.0)
+        score = min(left.prominence_px, right.prominence_px) * (ROOTED_BONUS if is_rooted else 1.0)
         if best is not None and score <= best.score:
             continue
-        if left.is_rooted != right.is_rooted and left.outline is not right.outline:
-            continue  # one object extends from the border, the other lies in view: a finger and another object
-        if not is_rooted and prominence < LYING_HEIGHTS * below_tip_px:
-            continue
-        if not is_rooted and _has_company(left.outline, outlines):
-            continue
-        if prominence < below_tip_px + 1.0:
-            deeper = max(left.prominence_px, right.prominence_px)
-            is_notch = prominence > SMALLEST_NOTCH_SHARE * below_tip_px and deeper > LEAST_LENGTH_SHARE * below_tip_px
-            shallow = shallow or (is_notch and all(has_straight_flanks(top, below_tip_px) for top in (left, right)))
-            continue
-        if not _end_alike(left, right, below_tip_px) or not _stand_side_by_side(left, right, below_tip_px):
-            continue
-        pair = (_follow(left, 1, below_tip_px, reach_px), _follow(right, -1, below_tip_px, reach_px))
-        if pair[0] is None or pair[1] is None or pair[0].outline[0, 0] > pair[1].outline[0, 0]:
-            continue  # inner sides of the left and of the right finger
-        builds = (build(left, 1, orientation.across_size), build(right, -1, orientation.across_size))
-        if not are_alike(*builds):
-            unlike = unlike or (is_rooted and all(has_straight_flanks(top, below_tip_px) for top in (left, right)))
-            continue
-        if not _end_alike(left, right, below_tip_px, builds):
-            continue
-        is_lying = not is_rooted and left.outline is not right.outline
-        if is_lying and any(
-            top.prominence_px < LYING_SLENDER * one.width_px for top, one in zip((left, right), builds, strict=True)
-        ):
-            continue
-        step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
-        is_far = apart_px - 0.5 * sum(one.width_px for one in builds) > LYING_APART * prominence
-        if is_lying and (is_far or not lie_level(step_px, apart_px, below_tip_px, builds)):
-            continue
-        if _is_open(mask, pair[0], pair[1], orientation, below_tip_px, builds):
-            are_cut = builds[0].is_cut and builds[1].is_cut
-            best, two = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted, are_cut), (left, right)
+        found = _as_pair(mask, outlines, orientation, (left, right), score, below_tip_px, reach_px)
+        if isinstance(found, NoGap):
+            reasons.append(found)
+        elif found is not None:
+            best, two = found, (left, right)
     if best is not None and two is not None:
         for top in in_view:
             if top not in two and _is_third(top, best, below_tip_px):
@@ -169,9 +140,58 @@ def _best_pair(
             return MORE_THAN_TWO
         if best.is_rooted or best.is_joined or len(_standing(in_view, below_tip_px)) != 1:
             return best
-    if shallow:
-        return NoGap(Status.TOUCHING, "The fingers touch above the measuring height.")
-    return UNLIKE if unlike else _why_none(tops, below_tip_px)
+    if SHALLOW in reasons:
+        return SHALLOW
+    return UNLIKE if UNLIKE in reasons else _why_none(tops, below_tip_px)
+
+
+def _as_pair(
+    mask: NDArray[np.uint8],
+    outlines: Outlines,
+    orientation: Orientation,
+    pair_of_tops: tuple[Top, Top],
+    score: float,
+    below_tip_px: float,
+    reach_px: float,
+) -> CoarseFingers | NoGap | None:
+    """Two objects as a pair of fingers; None if they are none, or why two fingers cannot be measured."""
+    left, right = pair_of_tops
+    prominence = min(left.prominence_px, right.prominence_px)
+    is_rooted = left.is_rooted or right.is_rooted
+    if left.is_rooted != right.is_rooted and left.outline is not right.outline:
+        return None  # one object extends from the border, the other lies in view: a finger and another object
+    if not is_rooted and (prominence < LYING_HEIGHTS * below_tip_px or _has_company(left.outline, outlines)):
+        return None
+    if prominence < below_tip_px + 1.0:
+        deeper = max(left.prominence_px, right.prominence_px)
+        is_notch = prominence > SMALLEST_NOTCH_SHARE * below_tip_px and deeper > LEAST_LENGTH_SHARE * below_tip_px
+        return SHALLOW if is_notch and all(has_straight_flanks(top, below_tip_px) for top in pair_of_tops) else None
+    if not _end_alike(left, right, below_tip_px) or not _stand_side_by_side(left, right, below_tip_px):
+        return None
+    pair = (_follow(left, 1, below_tip_px, reach_px), _follow(right, -1, below_tip_px, reach_px))
+    if pair[0] is None or pair[1] is None or pair[0].outline[0, 0] > pair[1].outline[0, 0]:
+        return None  # inner sides of the left and of the right finger
+    builds = (build(left, 1, orientation.across_size), build(right, -1, orientation.across_size))
+    if not are_alike(*builds):
+        return UNLIKE if is_rooted and all(has_straight_flanks(top, below_tip_px) for top in pair_of_tops) else None
+    if not _end_alike(left, right, below_tip_px, builds):
+        return None
+    is_lying = not is_rooted and left.outline is not right.outline
+    if is_lying and not _lie_as_a_pair(pair_of_tops, builds, prominence, below_tip_px):
+        return None
+    if not _is_open(mask, pair[0], pair[1], orientation, below_tip_px, builds):
+        return None
+    return CoarseFingers(pair[0], pair[1], orientation, score, is_rooted, builds[0].is_cut and builds[1].is_cut)
+
+
+def _lie_as_a_pair(tops: tuple[Top, Top], builds: tuple[Build, Build], prominence: float, below_tip_px: float) -> bool:
+    """Whether two objects that lie in view without reaching the border are slender, near, and level with each other."""
+    left, right = tops
+    if any(top.prominence_px < LYING_SLENDER * one.width_px for top, one in zip(tops, builds, strict=True)):
+        return False
+    step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
+    is_far = apart_px - 0.5 * sum(one.width_px for one in builds) > LYING_APART * prominence
+    return not is_far and lie_level(step_px, apart_px, below_tip_px, builds)
 
 
 def _has_company(own: Outline, outlines: Outlines) -> bool:

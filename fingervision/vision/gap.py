@@ -1,6 +1,6 @@
 """Step 8, the gap: the distance between the two measuring points, with its uncertainty."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import atan, degrees, hypot, nan, sqrt
 
 import numpy as np
@@ -35,9 +35,9 @@ from fingervision.vision.residuals import (
     top_aside_variance,
 )
 from fingervision.vision.rough_corner import with_corner_doubt
-from fingervision.vision.roughness import best_linear, roughness, with_roughness
+from fingervision.vision.roughness import Roughness, best_linear, roughness, with_roughness
 from fingervision.vision.third_tone import THIRD_TONE
-from fingervision.vision.unlike_fingers import NO_CHAINS, chain_of_one, explains_roughness, polygonal
+from fingervision.vision.unlike_fingers import NO_CHAINS, Chains, chain_of_one, explains_roughness, polygonal
 
 Floats = NDArray[np.float64]
 
@@ -111,9 +111,75 @@ def measure_gap(
     behind = _gripping(fingers, below_tip_px)
     if min(len(p.x) for p in points) < FEWEST_LINES:
         return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view for a measurement.")
+    shape = _described(points, below_tip_px, max(SHARED_POINTS[coding], edges.shared_lines))
+    points, rough, noise_shared = shape.points, shape.rough, shape.noise_shared
+    left, right = shape.ends
+    shared = max(shared_points(points, (left, right), coding), noise_shared)
+    fitted = [
+        measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
+    ]
+    if rough is not None:
+        fitted = with_corner_doubt(list(points), [left, right], fitted, below_tip_px, rough.shared_px)
+    stray = 1.0 if rough is None else rough.shared_px
+    holds = [shape_holds(*one, below_tip_px, stray) for one in zip(points, (left, right), fitted, strict=True)]
+    refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
+    if refusal is not None:
+        return refusal
+    held = None
+    if fingers.held_along_px is not None and (all(holds) or behind is not None):
+        held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared), light_gap)
+    if behind is not None:
+        return replace(behind, held=held)
+    chains, measured = _measuring_points(shape, fitted, holds, below_tip_px, shared, coding)
+    if isinstance(measured, NoGap):
+        return measured
+    is_straight = chains is not None and None not in chains
+    has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
+    least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
+    largest_variance = least_px**2 * SHARED_POINTS[coding]
+    roughness_px = nan if shape.is_untold and not is_straight else 0.0  # fitting straight sides have no roughness
+    roughness_px = roughness_px if rough is None else rough.deviation_px
+    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
+    if outcome is TOO_ROUGH:
+        outcome = _why_too_rough(edges, measured, has_part)
+    if isinstance(outcome, NoGap):
+        return replace(outcome, held=held) if held is not None else outcome
+    return outcome
+
+
+@dataclass(frozen=True, slots=True)
+class _Shapes:
+    """Shapes fitted to the outlines of both fingers.
+
+    Parameters
+    ----------
+    points : (OutlinePoints, OutlinePoints)
+        Points of the outlines, with the roughness of the flanks among their variances.
+    ends : (FingerEnd, FingerEnd)
+        Sides with fillets.
+    chains : (MeasuringPoint or None, MeasuringPoint or None), or None
+        Measuring points of chains of straight sides, where these were tried.
+    rough : Roughness or None
+        Roughness of the flanks, if there is any.
+    are_corners, is_untold : bool
+        Whether corners explain what seemed to be roughness; whether the flanks are too short to determine it.
+    noise_shared : float
+        Number of neighbouring points with a common error.
+    """
+
+    points: tuple[OutlinePoints, OutlinePoints]
+    ends: tuple[FingerEnd, FingerEnd]
+    chains: Chains | None
+    rough: Roughness | None
+    are_corners: bool
+    is_untold: bool
+    noise_shared: float
+
+
+def _described(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, noise_shared: float) -> _Shapes:
+    """Fit the shape of each finger's end, and tell rough flanks from corners."""
     guesses = [first_guess(p, below_tip_px) for p in points]
     fits = [fit_from_any_radius(p, *guess) for p, guess in zip(points, guesses, strict=True)]
-    noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
     rough = roughness(points, (fits[0], fits[1]))
     is_untold = rough is not None and not rough.is_told
     rough = None if is_untold else rough
@@ -131,85 +197,75 @@ def measure_gap(
             for p, guess, own in zip(points, guesses, bare, strict=True)
         ]
         noise_shared = max(noise_shared, rough.shared_px)
-    left, right = squared(fits[0]), squared(fits[1])
-    shared = max(shared_points(points, (left, right), coding), noise_shared)
-    fitted = [
-        measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
-    ]
-    if rough is not None:
-        fitted = with_corner_doubt(list(points), [left, right], fitted, below_tip_px, rough.shared_px)
-    stray = 1.0 if rough is None else rough.shared_px
-    holds = [shape_holds(*one, below_tip_px, stray) for one in zip(points, (left, right), fitted, strict=True)]
-    refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
-    if refusal is not None:
-        return refusal
-    held = None
-    if fingers.held_along_px is not None and (all(holds) or behind is not None):
-        held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared), light_gap)
-    if behind is not None:
-        return replace(behind, held=held)
+    ends = (squared(fits[0]), squared(fits[1]))
+    return _Shapes(points, ends, chains, rough, are_corners, is_untold, noise_shared)
+
+
+def _measuring_points(
+    shape: _Shapes,
+    fitted: list[MeasuringPoint],
+    holds: list[bool],
+    below_tip_px: float,
+    shared: float,
+    coding: Coding,
+) -> tuple[Chains | None, list[MeasuringPoint] | NoGap]:
+    """Measuring points of both fingers by the shape that describes them best, and the chains that were tried."""
+    points, (left, right), chains = shape.points, shape.ends, shape.chains
     aside = [
         set_aside_variance(p, end, found.edge, found.tip + below_tip_px)
         for p, end, found in zip(points, (left, right), fitted, strict=True)
     ]
     cuts_px = [corner_aside_px(*one, below_tip_px) for one in zip(points, (left, right), fitted, strict=True)]
-    are_cut = all(cuts_px)
     if chains is None and (not all(holds) or any(aside) or any(cuts_px)):
-        chains = polygonal(points, below_tip_px, noise_shared)
-    if are_cut:  # the corners are not fillets, so that the edge lies between the fitted shape and the rejected points
+        chains = polygonal(points, below_tip_px, shape.noise_shared)
+    if all(cuts_px):  # the corners are no fillets, so that the edge lies between the fitted shape and rejected points
         aside = [beyond + 2.0 / 3.0 * cut_px**2 for beyond, cut_px in zip(aside, cuts_px, strict=True)]
     measured = [] if chains is None else [chain for chain in chains if chain is not None]
     if len(measured) == len(fitted) and all(holds):  # what knows its points better
         variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]
         measured = measured if sum(own.covariance[1, 1] for own in measured) < sum(variances) else []
-    if len(measured) < len(fitted):
-        own_chains = chains or NO_CHAINS
-        if not are_corners or len(measured) != 1:
-            own_chains = chain_of_one(own_chains, (left, right), holds, cuts_px)
-        are_known = all(does_hold or chain is not None for does_hold, chain in zip(holds, own_chains, strict=True))
-        measured = []
-        for p, end, found, does_hold, beyond, chain in zip(
-            points, (left, right), fitted, holds, aside, own_chains, strict=True
-        ):
-            own = chain if are_known else local_measuring_point(p, below_tip_px, noise_shared)
-            # If there is no other description of the outline, residuals that common errors of neighbouring points may
-            # cause do not reject the shape.
-            if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, noise_shared)):
-                if found.apex < p.x.min() - 1.0:
-                    return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
-                covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
-                covariance[1, 1] += beyond
-                if top_aside := top_aside_variance(p, end):
-                    covariance += top_aside * np.outer((1.0, found.slope), (1.0, found.slope))
-                own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
-            if own is None:
-                return NoGap(Status.NO_FINGERS, BROKEN_BY[coding])
-            measured.append(own)
-    is_straight = chains is not None and None not in chains
-    has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
-    least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
-    largest_variance = least_px**2 * SHARED_POINTS[coding]
-    roughness_px = nan if is_untold and not is_straight else 0.0  # fitting straight sides have no roughness
-    roughness_px = roughness_px if rough is None else rough.deviation_px
-    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
-    if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
+    if len(measured) == len(fitted):
+        return chains, measured
+    own_chains = chains or NO_CHAINS
+    if not shape.are_corners or len(measured) != 1:
+        own_chains = chain_of_one(own_chains, (left, right), holds, cuts_px)
+    are_known = all(does_hold or chain is not None for does_hold, chain in zip(holds, own_chains, strict=True))
+    measured = []
+    for p, end, found, does_hold, beyond, chain in zip(
+        points, (left, right), fitted, holds, aside, own_chains, strict=True
+    ):
+        own = chain if are_known else local_measuring_point(p, below_tip_px, shape.noise_shared)
+        # If there is no other description of the outline, residuals that common errors of neighbouring points may
+        # cause do not reject the shape.
+        if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, shape.noise_shared)):
+            if found.apex < p.x.min() - 1.0:
+                return chains, NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
+            covariance = found.covariance * (spread(end) * shared if shape.rough is None else 1.0)
+            covariance[1, 1] += beyond
+            if top_aside := top_aside_variance(p, end):
+                covariance += top_aside * np.outer((1.0, found.slope), (1.0, found.slope))
+            own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
+        if own is None:
+            return chains, NoGap(Status.NO_FINGERS, BROKEN_BY[coding])
+        measured.append(own)
+    return chains, measured
+
+
+def _why_too_rough(edges: EdgePoints, measured: list[MeasuringPoint], has_part: bool) -> NoGap:
+    """Reason why the position of an edge is too uncertain."""
+    if (way_px := _way_px(edges)) > SMEARED_PX:
         words = (
             f"{SMEARED}, by about {way_px:.0f} px: shorten the exposure, or move more slowly while frames are taken."
         )
-        outcome = NoGap(Status.BLURRED, words)
-    elif outcome is TOO_ROUGH and max(abs(m.slope) for m in measured) > FLATTEST:
-        outcome = NoGap(
+        return NoGap(Status.BLURRED, words)
+    if max(abs(m.slope) for m in measured) > FLATTEST:
+        return NoGap(
             Status.NO_FINGERS,
             "The measuring height crosses the top of a finger instead of its inner side: turn the camera until the "
             "tips are level, or measure farther below the tips (--below-tip-mm).",
         )
-    if has_part and outcome is TOO_ROUGH:
-        return NoGap(
-            Status.GRIPPING, "A part between the fingers leaves too little of their inner edges in view.", held
-        )
-    if isinstance(outcome, NoGap):
-        return replace(outcome, held=held) if held is not None else outcome
-    return outcome
+    words = "A part between the fingers leaves too little of their inner edges in view."
+    return NoGap(Status.GRIPPING, words) if has_part else TOO_ROUGH
 
 
 def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:

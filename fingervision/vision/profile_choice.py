@@ -115,15 +115,7 @@ def with_profile(
     curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
     inner = [mean_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
-        flanks, tips = squared_blurs(edges)
-        is_none = edges.noise > NO_STEP * edges.noise_flat and bool(np.any(flanks > NO_EDGE * tips))
-        # A shadow on one side only, so wide that some rows follow its far edge and others the finger's.
-        is_wider = flanks.max() > flanks.min() + max(ONE_SIDED * flanks.min(), ONE_SIDED_PX**2)
-        is_none |= edges.noise > NO_MOTION * edges.noise_flat and bool(is_wider)
-        # A dark shadow with sharp borders was taken for the finger: what lies inside the edges differs.
-        apart = abs(edges.inside[0] - edges.inside[1]) / np.abs(edges.contrast[:, :INNER]).max()
-        is_none |= edges.noise > NO_STEP * edges.noise_flat and bool(apart > UNLIKE_TONES)
-        return replace(edges, beside=STRIP) if is_none else _unsure_of_width(edges, displaced_px)
+        return _without_profiles(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # the models do not describe a flank that is clipped at the end of the scale
     if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
@@ -138,65 +130,144 @@ def with_profile(
         return trail.edges
     weight = 1.0 / edges.noise_flat**2
     profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
-    fits = FlankFits(profiles)
-    bins, steps, left = fits.bins, fits.of(STEP), fits.squares
-    all_around = np.hypot(1.0, edges.lines.slope)
-    is_step = fits.is_step()
-    # A profile that symmetric optics of any shape explain (a disc of defocus, a halo) is neither shadow nor glare.
-    is_lopsided = not is_step and not _is_symmetric(profiles, steps)
-    # Models are fitted where they are needed, because most of the time is spent in these fits.
-    may_be_shadow, may_be_glare = is_lopsided and fits.explains(SHADOW), not is_step and fits.explains(GLARE)
-    if may_be_shadow and left(SHADOW) + fits.margin(SHADOW) < min(left(WALL), left(GLARE)):
-        shadow = fits.of(SHADOW)
-        if are_of_size(shadow, -1.0):
-            return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
-    if is_lopsided and may_be_glare and left(GLARE) + fits.margin(GLARE) < left(WALL):
-        glare = fits.of(GLARE)
-        if are_of_size(glare, 1.0):
-            moved = moved_edges(edges, glare, U_GLARE, all_around, "glare")
-            return without_additions(upright, moved, light, GLARE, glare)
+    seen = _Seen(upright, edges, light, is_outline, displaced_px, is_unlike_tip, profiles, FlankFits(profiles))
+    if (found := _inner_shadow_or_glare(seen)) is not None:
+        return found
     if outer[0] is None or outer[1] is None:
-        wall = fits.of(WALL)
-        is_wall = not is_step and fits.explains(WALL) and are_of_size(wall, -1.0)
-        is_strip = [
-            step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
-            for step, fit, (profile, _, _) in zip(steps, wall, profiles, strict=True)
+        return _by_inner_flanks(seen)
+    if (found := _by_outer_flanks(seen, [outer[0], outer[1]])) is not None:
+        return found
+    if trail is not None:
+        return trail.edges
+    flanks, tips = squared_blurs(edges)
+    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
+    if np.any(widened):
+        widened *= is_surely_broader(edges, displaced_px)
+    if np.any(widened):
+        return unsure_edges(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
+    return _faint_glare(seen)
+
+
+class _Seen:
+    """What the edges of a picture show: the profiles of both inner flanks, and the models that explain them.
+
+    Parameters
+    ----------
+    upright, edges, light, is_outline, displaced_px
+        As for `with_profile`.
+    is_unlike_tip : bool
+        Whether the flanks are more blurred than the tips.
+    profiles : list of Flank
+        Mean profiles of both inner flanks.
+    fits : FlankFits
+        Models fitted to these profiles, each when it is first asked for.
+    """
+
+    def __init__(
+        self,
+        upright: GreyImage,
+        edges: EdgePoints,
+        light: Floats,
+        is_outline: bool,
+        displaced_px: Displacement,
+        is_unlike_tip: bool,
+        profiles: list[Flank],
+        fits: FlankFits,
+    ) -> None:
+        self.upright, self.edges, self.light = upright, edges, light
+        self.is_outline, self.displaced_px, self.is_unlike_tip = is_outline, displaced_px, is_unlike_tip
+        self.profiles, self.fits = profiles, fits
+        self.steps = fits.of(STEP)
+        self.is_step = fits.is_step()
+        # A profile that symmetric optics of any shape explain (a disc of defocus, a halo) is neither shadow nor glare.
+        self.is_lopsided = not self.is_step and not _is_symmetric(profiles, self.steps)
+        # Models are fitted where they are needed, because most of the time is spent in these fits.
+        self.may_be_shadow = self.is_lopsided and fits.explains(SHADOW)
+        self.may_be_glare = not self.is_step and fits.explains(GLARE)
+
+    def without_shadow(self) -> EdgePoints:
+        """Edges corrected for a soft shadow."""
+        fading = [best_fit(FADING, *seen) for seen in self.profiles]
+        return _without_shadow(self.upright, self.edges, self.light, self.fits.of(SHADOW), fading, self.fits.bins)
+
+    def without_glare(self) -> EdgePoints:
+        """Edges corrected for a bright line on the fingers."""
+        glare = self.fits.of(GLARE)
+        moved = moved_edges(self.edges, glare, U_GLARE, np.hypot(1.0, self.edges.lines.slope), "glare")
+        return without_additions(self.upright, moved, self.light, GLARE, glare)
+
+
+def _without_profiles(edges: EdgePoints, displaced_px: Displacement) -> EdgePoints:
+    """State what can be known where the flanks have no mean profile."""
+    flanks, tips = squared_blurs(edges)
+    is_none = edges.noise > NO_STEP * edges.noise_flat and bool(np.any(flanks > NO_EDGE * tips))
+    # A shadow on one side only, so wide that some rows follow its far edge and others the finger's.
+    is_wider = flanks.max() > flanks.min() + max(ONE_SIDED * flanks.min(), ONE_SIDED_PX**2)
+    is_none |= edges.noise > NO_MOTION * edges.noise_flat and bool(is_wider)
+    # A dark shadow with sharp borders was taken for the finger: what lies inside the edges differs.
+    apart = abs(edges.inside[0] - edges.inside[1]) / np.abs(edges.contrast[:, :INNER]).max()
+    is_none |= edges.noise > NO_STEP * edges.noise_flat and bool(apart > UNLIKE_TONES)
+    return replace(edges, beside=STRIP) if is_none else _unsure_of_width(edges, displaced_px)
+
+
+def _inner_shadow_or_glare(seen: _Seen) -> EdgePoints | None:
+    """Correct a shadow or glare that the inner flanks alone distinguish from a wall; None if they do not."""
+    fits, left = seen.fits, seen.fits.squares
+    is_shadow = seen.may_be_shadow and left(SHADOW) + fits.margin(SHADOW) < min(left(WALL), left(GLARE))
+    if is_shadow and are_of_size(fits.of(SHADOW), -1.0):
+        return seen.without_shadow()
+    is_glare = seen.is_lopsided and seen.may_be_glare and left(GLARE) + fits.margin(GLARE) < left(WALL)
+    if is_glare and are_of_size(fits.of(GLARE), 1.0):
+        return seen.without_glare()
+    return None
+
+
+def _by_inner_flanks(seen: _Seen) -> EdgePoints:
+    """State how far a wall may have displaced the edges, where the outer flanks are not in view."""
+    fits, edges, profiles = seen.fits, seen.edges, seen.profiles
+    wall = fits.of(WALL)
+    is_wall = not seen.is_step and fits.explains(WALL) and are_of_size(wall, -1.0)
+    is_strip = [
+        step.squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * fit.squares)
+        for step, fit, (profile, _, _) in zip(seen.steps, wall, profiles, strict=True)
+    ]
+    if is_strip[0] != is_strip[1]:
+        return replace(edges, beside=STRIP)
+    if not is_wall and seen.is_unlike_tip:
+        # The flanks are more blurred than the tips, because of a wall or of motion, which cannot be distinguished
+        # here.
+        wall = [
+            best_fit(WALL, *each[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
+            for each, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
         ]
-        if is_strip[0] != is_strip[1]:
-            return replace(edges, beside=STRIP)
-        if not is_wall and is_unlike_tip:
-            # The flanks are more blurred than the tips, because of a wall or of motion, which cannot be distinguished
-            # here.
-            wall = [
-                best_fit(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
-                for seen, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
-            ]
-            is_wall = sum(fit.squares for fit in wall) < left(STEP) - SIGNIFICANT and are_of_size(wall, -1.0)
-        chosen = [beyond_wall(fit) for fit in wall] if is_outline else wall
-        # There is a wall, so that the edge may be displaced by the fitted distance plus its uncertainty.
-        farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
-        unsure = _unsure_of_width(edges, displaced_px)
-        if not is_wall:
-            return unsure
-        # The profile of a wall narrower than the blur does not determine its tone, so that only its width is used.
-        is_narrow = any(fit.breadth < RESOLVED_BLURS * fit.blur for fit in wall)
-        return unsure_edges(unsure if is_narrow else edges, farthest, "wall")
-    if may_be_shadow:
+        is_wall = sum(fit.squares for fit in wall) < fits.squares(STEP) - SIGNIFICANT and are_of_size(wall, -1.0)
+    unsure = _unsure_of_width(edges, seen.displaced_px)
+    if not is_wall:
+        return unsure
+    chosen = [beyond_wall(fit) for fit in wall] if seen.is_outline else wall
+    # There is a wall, so that the edge may be displaced by the fitted distance plus its uncertainty.
+    farthest = [abs(fit.position) + 2.0 * fit.u_position for fit in chosen]
+    # The profile of a wall narrower than the blur does not determine its tone, so that only its width is used.
+    is_narrow = any(fit.breadth < RESOLVED_BLURS * fit.blur for fit in wall)
+    return unsure_edges(unsure if is_narrow else edges, farthest, "wall")
+
+
+def _by_outer_flanks(seen: _Seen, outer: list[MeanProfile]) -> EdgePoints | None:
+    """Tell shadow, strip and wall by the outer flanks, which face the light and the camera otherwise; None if none."""
+    fits, edges, steps = seen.fits, seen.edges, seen.steps
+    flanks = [(profile, *seen.profiles[k][1:]) for k, profile in enumerate(outer)]
+    if seen.may_be_shadow:
         # A shadow, which the inner flanks cannot distinguish from a wall, is also visible on the outer side.
-        beyond = np.array(
-            [[best_fit(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
-        )
-        both = np.array([left(kind) for kind in range(3)]) + beyond.sum(axis=0)
+        beyond = np.array([[best_fit(kind, *flank).squares for kind in range(3)] for flank in flanks])
+        both = np.array([fits.squares(kind) for kind in range(3)]) + beyond.sum(axis=0)
         is_likelier = both[SHADOW] + fits.margin(SHADOW) < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
-        shadow = fits.of(SHADOW)
-        if is_likelier and are_of_size(shadow, -1.0):
-            return _without_shadow(upright, edges, light, shadow, [best_fit(FADING, *seen) for seen in profiles], bins)
-    widths = [best_fit(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
+        if is_likelier and are_of_size(fits.of(SHADOW), -1.0):
+            return seen.without_shadow()
+    widths = [best_fit(STEP, *flank).blur for flank in flanks]
     is_one_sided = [
         step.blur**2 > width**2 + max(ONE_SIDED * width**2, ONE_SIDED_PX**2)
         and step.squares > MODEL_LEAVES * profile.t.size
-        for step, width, profile in zip(steps, widths, inner, strict=True)
-        if profile
+        for step, width, (profile, _, _) in zip(steps, widths, seen.profiles, strict=True)
     ]
     if is_one_sided[0] != is_one_sided[1]:
         return replace(edges, beside=STRIP)
@@ -206,36 +277,27 @@ def with_profile(
     if min(wider) < -ONE_SIDED * min(step.blur for step in steps) ** 2 and max(wider) > ONE_SIDED * min(widths) ** 2:
         return unsure_edges(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
     if all(step.blur**2 > (1.0 + WIDER) * width**2 for step, width in zip(steps, widths, strict=True)):
-        walled = with_narrow_wall(edges, profiles, [p for p in outer if p], fits.enough, is_outline, displaced_px)
-        if walled is not None:
-            return walled
-    if trail is not None:
-        return trail.edges
-    flanks, tips = squared_blurs(edges)
-    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0)
-    if np.any(widened):
-        widened *= is_surely_broader(edges, displaced_px)
-    if np.any(widened):
-        return unsure_edges(edges, (0.5 * widened / MOTION_RADIUS_PX).tolist(), "motion")
-    if not may_be_glare:
+        return with_narrow_wall(edges, seen.profiles, outer, fits.enough, seen.is_outline, seen.displaced_px)
+    return None
+
+
+def _faint_glare(seen: _Seen) -> EdgePoints:
+    """Correct or state a bright line that is no more likely than a wall or than the optics."""
+    fits, edges = seen.fits, seen.edges
+    if not seen.may_be_glare or not are_of_size(glare := fits.of(GLARE), 1.0):
         return edges
-    glare = fits.of(GLARE)
-    if not is_lopsided and are_of_size(glare, 1.0):
+    if not seen.is_lopsided:
         if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of glare may be hidden by such optics
             return unsure_edges(edges, [abs(fit.position) for fit in glare], "glare")
-        return edges
-    if not is_lopsided or not are_of_size(glare, 1.0):
         return edges
     wall = fits.of(WALL)
     if not all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall):
         return edges
     # The bright line is glare on the finger, or a bevel around it; the outline lies between the two positions.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
-    moved = moved_edges(edges, glare, U_GLARE, all_around, "glare")
-    moved = without_additions(upright, moved, light, GLARE, glare)
-    return replace(
-        moved, marks=stated_marks(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)])
-    )
+    moved = seen.without_glare()
+    u_px = [max(mark.shift_px, u) for mark, u in zip(moved.marks, bevel, strict=True)]
+    return replace(moved, marks=stated_marks(moved, u_px))
 
 
 def _without_shadow(
