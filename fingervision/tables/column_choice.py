@@ -1,6 +1,6 @@
 """Assign roles to the columns of a table: as stated by the user, otherwise by the columns' names."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,27 +65,11 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
         Object that collects questions and notes.
     """
     chosen = {role: _named_column(raw, role, name, given) for role, name in given.columns.items()}
-    fixed = set(chosen.values())
-    roles: dict[str, list[int]] = {}
-    for place, name in enumerate(names):
-        role = name.role
-        if place in fixed or role is None:
-            continue
-        # A target without a direction is a commanded position.
-        roles.setdefault("input" if role == "target" else role, []).append(place)
-    sources = [k for k, name in enumerate(names) if name.source == kind and k not in fixed]
-    if "gap" not in roles and sources:
-        roles["gap"] = sources
-    if kind == "simulation" and not {"input", "time", "u_gap"} & {*roles, *chosen}:
-        _lone_u(raw, names, roles, fixed, about)
-    if "gap" not in chosen and "time" in roles and kind == "simulation":
-        roles.pop("time")
-    sides = all(side in chosen or len(roles.get(side, ())) == 1 for side in ("left", "right"))
     decimal = given.words.get("decimal") or str(raw.settings.get("decimal", "."))
-    if "input" in roles:
-        free = [k for k in range(len(names)) if k not in fixed and names[k].role in (None, "input", "target")]
-        roles["input"] = _one_axis(raw, names, roles["input"], free, decimal, about)
-        roles["input"] = _with_followers(raw, names, roles["input"], free, decimal, about)
+    fixed = set(chosen.values())
+    sources = [k for k, name in enumerate(names) if name.source == kind and k not in fixed]
+    roles = _possible_roles(raw, names, kind, chosen, sources, decimal, about)
+    sides = all(side in chosen or len(roles.get(side, ())) == 1 for side in ("left", "right"))
     suggested: set[int] = set()
 
     def readings(role: str, candidates: Sequence[int]) -> list[Reading]:
@@ -126,6 +110,35 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             found = readings(role, free) or [Reading(f"columns.{role}=NAME", "the table of this file holds none")]
             about.questions.append(asked(words, found, CANONICAL[role]))
     return chosen
+
+
+def _possible_roles(
+    raw: RawTable,
+    names: Sequence[ColumnName],
+    kind: str,
+    chosen: Mapping[str, int],
+    sources: list[int],
+    decimal: str,
+    about: Findings,
+) -> dict[str, list[int]]:
+    """Columns that may have each role by their names and, for the input, by their numbers."""
+    fixed = set(chosen.values())
+    roles: dict[str, list[int]] = {}
+    for place, name in enumerate(names):
+        if place not in fixed and name.role is not None:
+            # A target without a direction is a commanded position.
+            roles.setdefault("input" if name.role == "target" else name.role, []).append(place)
+    if "gap" not in roles and sources:
+        roles["gap"] = sources
+    if kind == "simulation" and not {"input", "time", "u_gap"} & {*roles, *chosen}:
+        _lone_u(raw, names, roles, fixed, about)
+    if "gap" not in chosen and "time" in roles and kind == "simulation":
+        roles.pop("time")
+    if "input" in roles:
+        free = [k for k in range(len(names)) if k not in fixed and names[k].role in (None, "input", "target")]
+        roles["input"] = _one_axis(raw, names, roles["input"], free, decimal, about)
+        roles["input"] = _with_followers(raw, names, roles["input"], free, decimal, about)
+    return roles
 
 
 def _axis_and_stem(name: ColumnName) -> tuple[frozenset[str], tuple[str, ...]]:

@@ -108,15 +108,7 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
     if given.header_line == 0:
         return Header()
     if given.header_line is not None:
-        at = given.header_line - 1
-        names = names_in(lines[at], dialect) if at < len(lines) else None
-        if names is None:
-            raise DataError(
-                f"header_line must be the number of the line with the {dialect.wide} column names, but line {at + 1} "
-                f"is '{lines[at][:80] if at < len(lines) else 'not there'}': correct it."
-            )
-        units = names_in(lines[at + 1], dialect) if at + 1 < first else None
-        return Header(names, units if units is not None and _all_units(units) else (), at)
+        return _stated_header(lines, first, dialect, given.header_line - 1)
     for listed in (_one_a_line(lines[:first], dialect.wide), labelled_pairs(lines[:first], dialect)):
         if listed is not None:
             return listed
@@ -147,14 +139,33 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
             continue
         known = sum(column_name(name).role is not None or column_name(name).source is not None for name in names)
         found.append((known, at, names))
-    if not found and units and not all(known_unit(cell) for cell in units if cell):
+    if found:
+        # The line with the most known words is chosen; among equal lines, the line nearest to the numbers.
+        _, at, names = max(found, key=lambda item: (item[0], item[1]))
+        return Header(names, units or (), at)
+    return _without_names(lines, first, dialect, units, units_at)
+
+
+def _without_names(
+    lines: Sequence[str], first: int, dialect: Dialect, units: tuple[str, ...] | None, units_at: int
+) -> Header:
+    """Header of a table above whose numbers there is at most a line of units."""
+    if units and not all(known_unit(cell) for cell in units if cell):
         # `a,b` could mean ares and bits, but names are more probable above numbers than a line of rare units.
         return Header(units, (), units_at)
-    if not found:
-        return _names_beside_index(lines, first, dialect) or Header((), units or (), -1)
-    # The line with the most known words is chosen; among equal lines, the line nearest to the numbers.
-    _, at, names = max(found, key=lambda item: (item[0], item[1]))
-    return Header(names, units or (), at)
+    return _names_beside_index(lines, first, dialect) or Header((), units or (), -1)
+
+
+def _stated_header(lines: Sequence[str], first: int, dialect: Dialect, at: int) -> Header:
+    """Column names on the line that the user states, and the units below them."""
+    names = names_in(lines[at], dialect) if at < len(lines) else None
+    if names is None:
+        raise DataError(
+            f"header_line must be the number of the line with the {dialect.wide} column names, but line {at + 1} "
+            f"is '{lines[at][:80] if at < len(lines) else 'not there'}': correct it."
+        )
+    units = names_in(lines[at + 1], dialect) if at + 1 < first else None
+    return Header(names, units if units is not None and _all_units(units) else (), at)
 
 
 def _names_beside_index(lines: Sequence[str], first: int, dialect: Dialect) -> Header | None:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -161,78 +161,65 @@ class _Rows:
         return number_block(body, self._dialect.separator, self._dialect.wide)
 
     def _cell_by_cell(self, body: Sequence[str]) -> tuple[list[RawColumn], Sequence[int], list[str], list[int]]:
+        found = self._sorted(body)
+        if found.other is not None and not self._is_part:
+            raise OpenQuestionError(self._path, "table", [other_header(self._header.line + 1, found.other)])
+        rows, wide = found.rows, self._dialect.wide
+        statistics = statistics_below(rows)
+        del rows[len(rows) - statistics :], found.numbers[len(found.numbers) - statistics :]
+        if len(found.odd) > max(1.0, MOST_ODD * len(rows)):
+            raise self._too_many_odd(body, found)
+        cleaned = ([row[k].strip() for row in rows] for k in range(wide))
+        if not all(map(str.isascii, body)):
+            cleaned = ([cell.translate(MINUS) for cell in cells] for cells in cleaned)
+        columns = [self._column(k, cells) for k, cells in enumerate(cleaned)]
+        restarts = sorted({row for row in found.restarts if 0 < row < len(rows)})
+        return columns, found.numbers, found.left_out(statistics, wide), restarts
+
+    def _sorted(self, body: Sequence[str]) -> "_Lines":
+        """Tell rows from comments, repeated headers and lines with another number of cells."""
         separator, wide = self._dialect.separator, self._dialect.wide
-        names = [name.strip() for name in self._names]
-        rows: list[list[str]] = []
-        numbers: list[int] = []
-        restarts: list[int] = []
-        other: int | None = None
-        comments: list[int] = []
-        headers: list[int] = []
-        odd: list[tuple[int, int]] = []
-        units = list(self._units)
+        names, units = [name.strip() for name in self._names], list(self._units)
+        found = _Lines()
         plain = separator is not None and not any('"' in text for text in body)
-        ascii_only = all(map(str.isascii, body))
         for line, text in enumerate(body, start=self._first + 1):
             cells = text.split(separator) if plain else split(text, separator)
             if len(cells) == wide and text[0] not in "#%/!'" and any(cells):
                 if text[0] not in NUMBER_BEGINS and not is_number(cells[0].strip(), self._dialect.decimal):
                     if self._is_header(cells, names, units):
-                        headers.append(line)
-                        restarts.append(len(rows))
+                        found.header(line)
                         continue
                     if self._header.names and is_other_header(cells, names, units, self._dialect.decimal):
-                        other = line
+                        found.other = line
                         break
-                rows.append(cells)
-                numbers.append(line)
+                found.rows.append(cells)
+                found.numbers.append(line)
             elif not text.strip():
                 continue
             elif is_comment(text):
-                comments.append(line)
+                found.comments.append(line)
                 if self._header.names and names_in(text, self._dialect) == self._header.names:
-                    restarts.append(len(rows))
+                    found.restarts.append(len(found.rows))
             elif cells == names or cells[:wide] == names:
-                headers.append(line)
-                restarts.append(len(rows))
+                found.header(line)
             else:
-                odd.append((line, len(cells)))
-        if other is not None and not self._is_part:
-            raise OpenQuestionError(self._path, "table", [other_header(self._header.line + 1, other)])
-        statistics = statistics_below(rows)
-        del rows[len(rows) - statistics :], numbers[len(numbers) - statistics :]
-        if len(odd) > max(1.0, MOST_ODD * len(rows)):
-            told = [text for text in body if text.strip() and not is_comment(text)]
-            prose = sum(_is_prose(text, self._dialect.decimal) for text in told)
-            if prose > MOST_PROSE * len(told):
-                raise DataError(
-                    f"{self._path} is not a table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
-                    "words, and a table has rows of two numbers or more. Name the file that holds the table."
-                )
-            raise DataError(
-                f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
-                f"{len(rows) + len(odd)} rows do not (line {odd[0][0]} has {odd[0][1]}): correct them, or state the "
-                "key separator in columns.toml."
+                found.odd.append((line, len(cells)))
+        return found
+
+    def _too_many_odd(self, body: Sequence[str], found: "_Lines") -> DataError:
+        """Return the error of a text in which too many lines have another number of cells."""
+        told = [text for text in body if text.strip() and not is_comment(text)]
+        prose = sum(_is_prose(text, self._dialect.decimal) for text in told)
+        if prose > MOST_PROSE * len(told):
+            return DataError(
+                f"{self._path} is not a table: {prose} of its {len(told)} lines from line {self._first + 1} on are "
+                "words, and a table has rows of two numbers or more. Name the file that holds the table."
             )
-        left_out = []
-        if comments:
-            left_out.append(f"{_count(len(comments), 'line')} of comment (the first is line {comments[0]})")
-        if headers:
-            left_out.append(f"{_count(len(headers), 'repeated header line')} (the first is line {headers[0]})")
-        if statistics:
-            left_out.append(f"{_count(statistics, 'row')} of statistics below the values")
-        if other is not None:
-            left_out.append(f"everything from line {other} on, where other column names begin")
-        if odd:
-            left_out.append(
-                f"{_count(len(odd), 'line')} with another number of cells (line {odd[0][0]} has {odd[0][1]}, not "
-                f"{wide})"
-            )
-        cleaned = ([row[k].strip() for row in rows] for k in range(wide))
-        if not ascii_only:
-            cleaned = ([cell.translate(MINUS) for cell in cells] for cells in cleaned)
-        columns = [self._column(k, cells) for k, cells in enumerate(cleaned)]
-        return columns, numbers, left_out, sorted({row for row in restarts if 0 < row < len(rows)})
+        return DataError(
+            f"{self._path} must have {self._dialect.wide} cells in each row below line {self._first}, but "
+            f"{len(found.odd)} of {len(found.rows) + len(found.odd)} rows do not (line {found.odd[0][0]} has "
+            f"{found.odd[0][1]}): correct them, or state the key separator in columns.toml."
+        )
 
     def _is_header(self, cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
         """Whether a row repeats the header, even in another spelling, or the row of units."""
@@ -243,6 +230,58 @@ class _Rows:
             return False
         same = sum(a.lower() == b.lower() for a, b in zip(cells, names, strict=True))
         return same > len(cells) // 2 and not any(is_number(cell, self._dialect.decimal) for cell in cells)
+
+
+@dataclass(slots=True)
+class _Lines:
+    """Lines of a text, sorted by what they hold.
+
+    Parameters
+    ----------
+    rows : list of list of str
+        Cells of each row.
+    numbers : list of int
+        Number of the line of each row.
+    restarts : list of int
+        Rows before which the header was repeated.
+    comments, headers : list of int
+        Numbers of the lines of comment and of repeated headers.
+    odd : list of (int, int)
+        Lines with another number of cells: number of the line, and of its cells.
+    other : int or None
+        Number of the line on which the header of another table begins.
+    """
+
+    rows: list[list[str]] = field(default_factory=list)
+    numbers: list[int] = field(default_factory=list)
+    restarts: list[int] = field(default_factory=list)
+    comments: list[int] = field(default_factory=list)
+    headers: list[int] = field(default_factory=list)
+    odd: list[tuple[int, int]] = field(default_factory=list)
+    other: int | None = None
+
+    def header(self, line: int) -> None:
+        """Add a line that repeats the header."""
+        self.headers.append(line)
+        self.restarts.append(len(self.rows))
+
+    def left_out(self, statistics: int, wide: int) -> list[str]:
+        """Say which lines are not read as rows."""
+        said = []
+        if self.comments:
+            said.append(f"{_count(len(self.comments), 'line')} of comment (the first is line {self.comments[0]})")
+        if self.headers:
+            said.append(f"{_count(len(self.headers), 'repeated header line')} (the first is line {self.headers[0]})")
+        if statistics:
+            said.append(f"{_count(statistics, 'row')} of statistics below the values")
+        if self.other is not None:
+            said.append(f"everything from line {self.other} on, where other column names begin")
+        if self.odd:
+            said.append(
+                f"{_count(len(self.odd), 'line')} with another number of cells (line {self.odd[0][0]} has "
+                f"{self.odd[0][1]}, not {wide})"
+            )
+        return said
 
 
 def _is_prose(text: str, decimal: str) -> bool:

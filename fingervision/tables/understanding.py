@@ -156,14 +156,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
             known = values.value[values.present]
             about.questions.append(wrong_unit(column.name, role, DIMENSION[role], unit, known))
             continue
-        if role == "time":
-            values = _from_epoch(values, column, unit, about)
-        elif "missing" in given.words:
-            values = without_filler(values, given.words["missing"])
-        elif "sizes" not in given.accept and DIMENSION[role] == "length":
-            filler = 0.0 if dropped_out(values).any() else filler_value(values)
-            if filler is not None:
-                about.questions.append(_filler(column.name, values, filler, unit))
+        values = _with_values_only(values, column, role, unit, given, about)
         columns[role] = values if size == 1.0 else Numbers(values.value * size, values.present)
         if column.since and role == "time":
             taken[-1] = Taken(column.name, role, DATE)
@@ -184,6 +177,21 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
         raw, kind, tuple(taken), columns, run_cells, tuple(about.notes), tuple(about.left_out),
         tuple(about.questions), channels,
     )  # fmt: skip
+
+
+def _with_values_only(
+    values: Numbers, column: RawColumn, role: str, unit: str, given: Entry, about: Findings
+) -> Numbers:
+    """Numbers of a column without those that stand for a missing value, and times from their epoch."""
+    if role == "time":
+        return _from_epoch(values, column, unit, about)
+    if "missing" in given.words:
+        return without_filler(values, given.words["missing"])
+    if "sizes" not in given.accept and DIMENSION[role] == "length":
+        filler = 0.0 if dropped_out(values).any() else filler_value(values)
+        if filler is not None:
+            about.questions.append(_filler(column.name, values, filler, unit))
+    return values
 
 
 def _is_dispensable(role: str, kind: str, chosen: Mapping[str, int]) -> bool:

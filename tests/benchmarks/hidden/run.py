@@ -184,16 +184,7 @@ def main() -> None:
     if chosen.tables < 1 or chosen.jobs < 1:
         options.error(f"--tables and --jobs must be at least 1, but are {chosen.tables} and {chosen.jobs}.")
     begun = time.perf_counter()
-    tasks = [
-        Task(row, index, chosen.seed, method, chosen.out.absolute())
-        for index in range(chosen.first, chosen.first + chosen.tables)
-        for row in rows
-        for method in methods
-    ]
-    for task in tasks:
-        if task.method == chosen.again:
-            (task.folder / f"{task.method}.json").unlink(missing_ok=True)
-            task.kept.unlink(missing_ok=True)
+    tasks = _tasks(chosen, rows, methods)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # All methods for one table run in one process, so that the table is simulated once.
     results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
@@ -219,6 +210,21 @@ def main() -> None:
     for method in methods:
         print("\n".join(report_of(method, results[method])))
     print(f"seed {chosen.seed}, {time.perf_counter() - begun:.0f} s")
+
+
+def _tasks(chosen: argparse.Namespace, rows: list[str], methods: list[str]) -> list[Task]:
+    """Tables by methods, without the kept answers of the method that is to run again."""
+    tasks = [
+        Task(row, index, chosen.seed, method, chosen.out.absolute())
+        for index in range(chosen.first, chosen.first + chosen.tables)
+        for row in rows
+        for method in methods
+    ]
+    for task in tasks:
+        if task.method == chosen.again:
+            (task.folder / f"{task.method}.json").unlink(missing_ok=True)
+            task.kept.unlink(missing_ok=True)
+    return tasks
 
 
 def _batch(tasks: list[Task]) -> list[dict[str, object]]:

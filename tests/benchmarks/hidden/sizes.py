@@ -1,5 +1,7 @@
 """Sizes of simulated effects: random ordinary sizes, and scaling of an effect by one factor."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tests.benchmarks.hidden.design import Design
@@ -28,73 +30,104 @@ def draw_hidden(
     rng: np.random.Generator, name: str, table: GripperTable, inputs: InputRange, design: Design, total_s: float
 ) -> Hidden:
     """Draw an effect with an ordinary size for a gripper and its runs."""
-    width, sign = inputs.width_mm, float(rng.choice([-1.0, 1.0]))
+    sign = float(rng.choice([-1.0, 1.0]))
     opening = float(np.max(np.abs(table.gap(np.array([inputs.lower_mm, inputs.upper_mm])) - table.rest_gap_mm)))
 
     def about(size: float) -> float:
         return float(sign * size * rng.uniform(0.5, 2.0))
 
+    p = (
+        _of_the_drive(rng, name, inputs, about)
+        or _of_the_mechanism(rng, name, inputs, opening, design, total_s, about)
+        or _of_the_camera(name, total_s, about)
+    )
+    if p is None:
+        raise ValueError(f"hidden effect must be one of {NAMES} or of those of the rows, but is {name}.")
+    return Hidden(name, p)
+
+
+def _of_the_drive(
+    rng: np.random.Generator, name: str, inputs: InputRange, about: Callable[[float], float]
+) -> dict[str, float] | None:
+    width = inputs.width_mm
     match name:
         case "drive_lag" | "camera_latency":
-            p = {"delay_s": abs(about(0.15))}
+            return {"delay_s": abs(about(0.15))}
         case "input_offset":
-            p = {"offset_mm": about(0.02)}
+            return {"offset_mm": about(0.02)}
         case "input_scale" | "lever_ratio_error" | "scale_error":
-            p = {"ratio": about(0.03)}
+            return {"ratio": about(0.03)}
         case "encoder_cyclic_error":
             period = width * rng.uniform(0.12, 0.35)
-            p = {"amplitude_mm": abs(about(0.01)), "period_mm": period, "phase_rad": rng.uniform(0, 2 * np.pi)}
+            return {"amplitude_mm": abs(about(0.01)), "period_mm": period, "phase_rad": rng.uniform(0, 2 * np.pi)}
         case "end_stop":
             depth = width * rng.uniform(0.05, 0.2)
             upper = rng.random() < 0.5
-            p = {"upper_mm": inputs.upper_mm - depth} if upper else {"lower_mm": inputs.lower_mm + depth}
+            return {"upper_mm": inputs.upper_mm - depth} if upper else {"lower_mm": inputs.lower_mm + depth}
         case "position_error_map":
             heights = rng.standard_normal(MAP_HEIGHTS) * 0.01
-            p = {f"height_{k}_mm": float(h) for k, h in enumerate(heights)}
+            return {f"height_{k}_mm": float(h) for k, h in enumerate(heights)}
         case "slew_limit":
-            p = {"speed_mm_s": width * rng.uniform(0.1, 0.4)}
+            return {"speed_mm_s": width * rng.uniform(0.1, 0.4)}
         case "backlash":
-            p = {"play_mm": abs(about(0.015))}
+            return {"play_mm": abs(about(0.015))}
+    return None
+
+
+def _of_the_mechanism(
+    rng: np.random.Generator,
+    name: str,
+    inputs: InputRange,
+    opening: float,
+    design: Design,
+    total_s: float,
+    about: Callable[[float], float],
+) -> dict[str, float] | None:
+    width = inputs.width_mm
+    match name:
         case "stick_slip":
-            p = {"jump_mm": width * rng.uniform(0.04, 0.12)}
+            return {"jump_mm": width * rng.uniform(0.04, 0.12)}
         case "friction_hysteresis":
             reach = width * rng.uniform(0.1, 0.4)
-            p = {"fraction": rng.uniform(0.1, 0.5), "reach_mm": reach, "dahl": float(rng.random() < 0.5)}
+            return {"fraction": rng.uniform(0.1, 0.5), "reach_mm": reach, "dahl": float(rng.random() < 0.5)}
         case "large_deflection":
-            p = {"reach_mm": opening * rng.uniform(0.8, 2.0), "cross": rng.uniform(-1, 1)}
+            return {"reach_mm": opening * rng.uniform(0.8, 2.0), "cross": rng.uniform(-1, 1)}
         case "viscoelastic_creep":
             total = rng.uniform(0.05, 0.3)
             shares = rng.dirichlet([1.0] * 5) * total
-            p = {f"share_{k}": float(s) for k, s in enumerate(shares)}
+            return {f"share_{k}": float(s) for k, s in enumerate(shares)}
         case "structural_resonance":
             top = max(0.3 * design.rate_hz, 0.7)
-            p = {"frequency_hz": rng.uniform(0.6, top), "damping_ratio": rng.uniform(0.02, 0.4)}
+            return {"frequency_hz": rng.uniform(0.6, top), "damping_ratio": rng.uniform(0.02, 0.4)}
         case "rest_gap_error":
-            p = {"offset_mm": about(0.1)}
+            return {"offset_mm": about(0.1)}
         case "assembly_asymmetry":
-            p = {"share": about(0.05)}
+            return {"share": about(0.05)}
         case "finger_contact":
             floor = rng.uniform(0.3, 0.8)
-            p = {"floor_mm": floor, "remaining_slope": rng.uniform(0, 0.4), "softness_mm": 0.01}
+            return {"floor_mm": floor, "remaining_slope": rng.uniform(0, 0.4), "softness_mm": 0.01}
         case "thermal_drift":
-            p = {"amplitude_mm": about(0.1), "tau_s": total_s * rng.uniform(0.15, 1.0)}
+            return {"amplitude_mm": about(0.1), "tau_s": total_s * rng.uniform(0.15, 1.0)}
         case "hinge_stiffness_error":
-            p = {"ratio": about(0.2)}
+            return {"ratio": about(0.2)}
+    return None
+
+
+def _of_the_camera(name: str, total_s: float, about: Callable[[float], float]) -> dict[str, float] | None:
+    match name:
         case "camera_drift":
-            p = {"rate_mm_per_s": about(0.1 / total_s)}
+            return {"rate_mm_per_s": about(0.1 / total_s)}
         case "camera_scale_drift":
-            p = {"rate_per_s": about(0.02 / total_s)}
+            return {"rate_per_s": about(0.02 / total_s)}
         case "out_of_plane_motion":
-            p = {"relative_per_mm": about(0.004)}
+            return {"relative_per_mm": about(0.004)}
         case "lens_distortion":
-            p = {"k_per_mm2": about(0.002)}
+            return {"k_per_mm2": about(0.002)}
         case "camera_tilt":
-            p = {"k_per_mm": about(0.005)}
+            return {"k_per_mm": about(0.005)}
         case "edge_bias":
-            p = {"offset_mm": about(0.03)}
-        case _:
-            raise ValueError(f"hidden effect must be one of {NAMES} or of those of the rows, but is {name}.")
-    return Hidden(name, p)
+            return {"offset_mm": about(0.03)}
+    return None
 
 
 def scaled(effect: Hidden, factor: float, inputs: InputRange, table: GripperTable) -> Hidden:
