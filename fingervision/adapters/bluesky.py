@@ -13,15 +13,69 @@ https://blueskyproject.io/bluesky/main/hardware.html. The adapter needs the extr
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from fingervision.adapters.thread_status import ThreadStatus
 from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.run.synchronised_acquisition import Sight
+
+# Status of work in a thread, following bluesky.protocols.Status: done, callbacks, exception.
+
+
+class ThreadStatus:
+    """Status of work in a thread; done when the thread has ended.
+
+    Parameters
+    ----------
+    work : callable
+        Function that does the work; the status reports an exception that it raises.
+    """
+
+    def __init__(self, work: Callable[[], None]) -> None:
+        self._ended, self._lock = threading.Event(), threading.Lock()
+        self._callbacks: list[Callable[[ThreadStatus], None]] = []
+        self._error: BaseException | None = None
+
+        def run() -> None:
+            try:
+                work()
+            except BaseException as error:
+                self._error = error
+            with self._lock:
+                self._ended.set()
+                callbacks = list(self._callbacks)
+            for callback in callbacks:
+                callback(self)
+
+        threading.Thread(target=run, name="fingervision-bluesky", daemon=True).start()
+
+    @property
+    def done(self) -> bool:
+        """Whether the work in the thread has ended."""
+        return self._ended.is_set()
+
+    @property
+    def success(self) -> bool:
+        """Whether the work in the thread has ended without an error."""
+        return self.done and self._error is None
+
+    def exception(self, timeout: float | None = 0.0) -> BaseException | None:
+        """Wait until the thread has ended; return the exception that it raised, if any, or raise TimeoutError."""
+        if not self._ended.wait(timeout):
+            raise TimeoutError
+        return self._error
+
+    def add_callback(self, callback: Callable[["ThreadStatus"], None]) -> None:
+        """Call `callback` when the thread has ended; immediately if it already has."""
+        with self._lock:
+            if not self._ended.is_set():
+                self._callbacks.append(callback)
+                return
+        callback(self)
+
 
 POLL_S = 0.005
 FRAMES_TO_JOIN = 5

@@ -1,20 +1,123 @@
 """A batch from start to finish: planning, execution, and the overview of all results."""
 
+import glob
+import hashlib
 import json
+import mimetypes
 import os
-from collections.abc import Callable, Generator, Sequence
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.batch.fingerprint import stamp_of
-from fingervision.batch.inputs import inputs_of
-from fingervision.batch.naming import folder_names
 from fingervision.batch.overview import write_overview
 from fingervision.batch.result_folder import Record, is_whole, read_record, remove_left_parts, replace_text
 from fingervision.batch.task import Outcome, Task, failure
 from fingervision.batch.work import outcome_of
-from fingervision.domain.errors import ExitCode, OutputError
+from fingervision.domain.errors import ExitCode, InputFileError, OutputError, UsageError
+
+# Names of result folders: the file name of the input, with as much of its path as makes the name unique.
+
+BETWEEN = "__"
+LONGEST = 200
+"""Largest length of a name in characters; file systems allow 255 bytes, and the temporary name of a folder is
+longer."""
+
+
+def folder_names(inputs: Sequence[Path], taken: Collection[str]) -> tuple[str, ...]:
+    """Choose a folder name for each input; names are unique even without distinction of upper and lower case.
+
+    Parameters
+    ----------
+    inputs : sequence of Path
+        Absolute paths of the inputs, all different.
+    taken : collection of str
+        Names that are already in use.
+    """
+    parts = [path.parts[1:] or path.parts for path in inputs]
+    depth = [1] * len(inputs)
+    reserved = {name.casefold() for name in taken}
+    while True:
+        names = [BETWEEN.join(part[-deep:]) for part, deep in zip(parts, depth, strict=True)]
+        count = Counter(name.casefold() for name in names)
+        clashing = [
+            number for number, name in enumerate(names) if count[name.casefold()] > 1 or name.casefold() in reserved
+        ]
+        longer = [number for number in clashing if depth[number] < len(parts[number])]
+        if not longer:
+            break
+        for number in longer:
+            depth[number] += 1
+    # Part of a hash is added if the path does not make a name unique (a name may contain the separator) or is too long.
+    for number, name in enumerate(names):
+        if number in set(clashing) or len(name) > LONGEST:
+            code = hashlib.sha256(str(inputs[number]).encode("utf-8", "surrogateescape")).hexdigest()[:12]
+            names[number] = f"{name[-LONGEST:]}{BETWEEN}{code}"
+    return tuple(names)
+
+
+# List the recordings or tables that a user names by paths and by patterns in quotes.
+
+
+def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
+    """List every input once, in natural order within each name (run2 before run10).
+
+    A folder is a single input (a sequence of images), and the files in this folder are then not inputs. Files inside
+    `out` are not inputs, because videos written by an earlier call may match a pattern. A missing path is kept, so that
+    it is listed with its error; if other names match, a pattern without a match is kept too.
+
+    Raises
+    ------
+    InputFileError
+        No file matches any of the names.
+    UsageError
+        All matching files are in `out`.
+    """
+    found: dict[str, str] = {}
+    matched = inside = False
+    results = _absolute(out)
+    for name in names:
+        is_pattern = glob.has_magic(name) and not Path(name).exists()
+        # Path.glob knows no absolute patterns.
+        matches = sorted(glob.iglob(name, recursive=True), key=_natural) if is_pattern else [name]  # noqa: PTH207
+        matches = [m for m in matches if not (is_pattern and Path(m).is_dir() and not _holds_images(m))]
+        outside = [match for match in matches if not (_absolute(match) + os.sep).startswith(results + os.sep)]
+        inside = inside or len(outside) < len(matches)
+        matches = outside
+        matched = matched or any(Path(match).exists() for match in matches)
+        for match in matches or [name]:
+            found.setdefault(_absolute(match), match)
+    if not matched and inside:
+        raise UsageError(
+            f"--out must not be a folder that contains the inputs, but they are in {out}: name another folder."
+        )
+    if not matched:
+        words = ", ".join(names)
+        raise InputFileError(
+            f"No file matches {words}: check the path, and put patterns in quotes ('recordings/**/*.mp4')."
+        )
+    folders = {path for path in found if Path(path).is_dir()}
+    return tuple(
+        name for path, name in found.items() if not any(str(parent) in folders for parent in Path(path).parents)
+    )
+
+
+def _absolute(path: str | Path) -> str:
+    return os.path.abspath(path)  # noqa: PTH100 - without following links: a link's own name is what the user gave
+
+
+def _holds_images(folder: str) -> bool:
+    with os.scandir(folder) as entries:
+        return any((mimetypes.guess_type(entry.name)[0] or "").startswith("image/") for entry in entries)
+
+
+def _natural(name: str) -> list[tuple[int, int, str]]:
+    parts = re.split(r"(\d+)", name)
+    return [(1, int(part), "") if number % 2 else (0, 0, part) for number, part in enumerate(parts)]
+
 
 MARK = "batch.json"
 SCHEMA = 1

@@ -1,7 +1,9 @@
 """Cameras of this machine through OpenCV (V4L2, Media Foundation, AVFoundation), with settings read back."""
 
+import os
+import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
@@ -14,12 +16,140 @@ import cv2
 
 from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame, LostFrame, Pixels
-from fingervision.frames.camera_controls import control_list, request_of
-from fingervision.frames.camera_settings import READ, V4L2, coding_of, requests, settled
-from fingervision.frames.controls import CameraControl
+from fingervision.frames.camera_settings import (
+    EXPOSURE,
+    FOCUS,
+    GAIN,
+    MSMF,
+    READ,
+    V4L2,
+    WHITE_BALANCE,
+    Control,
+    coding_of,
+    is_there,
+    of_camera,
+    of_user,
+    requests,
+    settled,
+)
+from fingervision.frames.controls import FRAME_RATE, CameraControl
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
-from fingervision.frames.v4l2_ranges import ranges
+
+# Limits of a V4L2 camera's settings, as stated by the driver (Linux).
+#
+# Source: `struct v4l2_queryctrl` and `VIDIOC_QUERYCTRL` in linux/videodev2.h; numbers of the controls in
+# linux/v4l2-controls.h.
+
+QUERY = 0xC0445624  # _IOWR('V', 36, 68 bytes)
+LAYOUT = struct.Struct("II32siiiiI8x")
+DISABLED = 0x0001
+NUMBERS: Mapping[int, int] = {
+    cv2.CAP_PROP_EXPOSURE: 0x009A0902,
+    cv2.CAP_PROP_GAIN: 0x00980913,
+    cv2.CAP_PROP_FOCUS: 0x009A090A,
+    cv2.CAP_PROP_TEMPERATURE: 0x0098091A,
+}
+"""Numbers of V4L2's controls, by OpenCV's properties."""
+
+Ioctl = Callable[[int, int, bytes], Any]
+
+
+def ranges(name: str, ioctl: Ioctl | None = None) -> dict[int, tuple[int, int]]:
+    """Smallest and largest value of each setting of a camera, in the driver's units, by OpenCV's property.
+
+    Parameters
+    ----------
+    name : str
+        Number or device file of the camera.
+    ioctl : callable, optional
+        Function to use in place of the system's `ioctl`.
+
+    Returns
+    -------
+    dict of int to (int, int)
+        Limits by OpenCV's property; empty if the driver does not state them.
+    """
+    if ioctl is None:
+        if sys.platform != "linux":
+            return {}
+        import fcntl
+
+        ioctl = fcntl.ioctl
+    path = Path(f"/dev/video{name}" if name.isdigit() else name)
+    try:
+        device = os.open(path, os.O_RDWR | os.O_NONBLOCK)
+    except OSError:
+        return {}
+    found = {}
+    try:
+        for what, number in NUMBERS.items():
+            try:
+                answer = ioctl(device, QUERY, LAYOUT.pack(number, 0, b"", 0, 0, 0, 0, 0))
+            except OSError:
+                continue  # the camera does not have this setting
+            _, _, _, least, greatest, _, _, flags = LAYOUT.unpack(answer)
+            if not flags & DISABLED and least < greatest:
+                found[what] = (least, greatest)
+    finally:
+        os.close(device)
+    return found
+
+
+# Settings of this computer's cameras that can be changed while a camera runs, in the user's units and in OpenCV's.
+
+WHILE_RUNNING = (EXPOSURE, GAIN, FOCUS, WHITE_BALANCE)
+
+
+def control_list(
+    backend: str, read: Mapping[int, float], ranges: Mapping[int, tuple[int, int]]
+) -> tuple[CameraControl, ...]:
+    """List the settings of a camera that can be changed while it runs.
+
+    Parameters
+    ----------
+    backend : str
+        OpenCV's name of the backend; AVFoundation has no such settings.
+    read : mapping of int to float
+        Values that the camera reports, by OpenCV's property.
+    ranges : mapping of int to (int, int)
+        Smallest and largest value by property, in the camera's units, as far as known.
+    """
+    return tuple(_controls(backend, read, ranges)) if backend in (V4L2, MSMF) else ()
+
+
+def _controls(
+    backend: str, read: Mapping[int, float], ranges: Mapping[int, tuple[int, int]]
+) -> Iterator[CameraControl]:
+    for control in WHILE_RUNNING:
+        if is_there(read, control.what):
+            limits = [of_user(backend, control, float(each)) for each in ranges.get(control.what, ())]
+            least, greatest = limits or (None, None)
+            yield CameraControl(
+                control.name, of_user(backend, control, read[control.what]), control.unit, least, greatest
+            )
+    rate_hz = read.get(cv2.CAP_PROP_FPS, 0.0)
+    if rate_hz > 0.0:
+        yield CameraControl(FRAME_RATE, rate_hz, "Hz")
+
+
+def request_of(backend: str, name: str, value: float) -> tuple[int, float]:
+    """OpenCV's property and value for a setting of `control_list`.
+
+    Parameters
+    ----------
+    backend : str
+        OpenCV's name of the backend.
+    name : str
+        Name of the setting.
+    value : float
+        Requested value, in the user's unit.
+    """
+    if name == FRAME_RATE:
+        return cv2.CAP_PROP_FPS, value
+    control: Control = next(each for each in WHILE_RUNNING if each.name == name)
+    return control.what, of_camera(backend, control, value)
+
 
 BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_MSMF, "darwin": cv2.CAP_AVFOUNDATION}
 DEVICES = Path("/sys/class/video4linux")

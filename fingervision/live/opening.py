@@ -1,14 +1,59 @@
 """Open a source by name; cameras and streams are opened again after an interruption, files are not."""
 
+from collections.abc import Iterator
+from threading import Event
+from time import monotonic
 from typing import cast
+
+import av
 
 from fingervision.domain.errors import UsageError
 from fingervision.frames import camera
 from fingervision.frames.network_stream import without_password
-from fingervision.frames.received import LiveSource
-from fingervision.frames.source import CameraWish, Wish, open_source
+from fingervision.frames.received import LiveSource, Received
+from fingervision.frames.source import CameraWish, Description, FrameSource, Wish, open_source
 from fingervision.live.capture import Capture
-from fingervision.live.paced import PacedRecording
+
+# Playback of a recording in real time, as if the frames came from a camera.
+
+
+class PacedRecording:
+    """Yields each frame of a recording at its time; frames without times are yielded as fast as they are measured.
+
+    Parameters
+    ----------
+    source : FrameSource
+        The recording.
+    """
+
+    has_own_clock = True
+    template: av.VideoStream | None = None
+
+    def __init__(self, source: FrameSource) -> None:
+        self._source = source
+        self._closed = Event()
+
+    @property
+    def description(self) -> Description:
+        """Description of the recording."""
+        return self._source.description
+
+    def received(self) -> Iterator[Received]:
+        """Yield the frames, from the first to the last, at their times."""
+        started_s = monotonic()
+        first_s: float | None = None
+        for item in self._source:
+            if item.time_s is not None:
+                first_s = item.time_s if first_s is None else first_s
+                if self._closed.wait(max(0.0, started_s + item.time_s - first_s - monotonic())):
+                    return
+            if self._closed.is_set():
+                return
+            yield Received(item, monotonic())
+
+    def close(self) -> None:
+        """End the iteration over frames."""
+        self._closed.set()
 
 
 def opened(name: str, wish: Wish) -> Capture:

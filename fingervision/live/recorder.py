@@ -1,13 +1,41 @@
 """Recording in a separate thread, so that a slow disk does not delay the measurement."""
 
+import shutil
+from pathlib import Path
 from queue import Empty, Full, Queue
 from time import monotonic
 
 from fingervision.domain.errors import OutputError
-from fingervision.live.free_space import minutes_left
 from fingervision.live.processor_use import of_process_s, of_this_thread_s
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.supervisor import Supervisor, told
+
+# Time for which the disk space suffices for a recording at its present data rate (minutes).
+
+
+# Shorter or smaller recordings give no data rate: the first frames differ in size, and the file is buffered.
+LEAST_S, LEAST_BYTES = 2.0, 1_000_000
+
+
+def minutes_left(folder: Path, seconds: float) -> float | None:
+    """Minutes until the disk of a recording is full; None until the data rate is known.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the recording.
+    seconds : float
+        Duration of the recording so far.
+    """
+    try:
+        written = sum(file.stat().st_size for file in folder.iterdir())
+        free = shutil.disk_usage(folder).free
+    except OSError:
+        return None
+    if seconds < LEAST_S or written < LEAST_BYTES:
+        return None
+    return free / (written / seconds) / 60.0
+
 
 # Largest number of frames that wait for the disk: ten seconds at 25 frames per second. The recording ends if more
 # frames would have to wait.

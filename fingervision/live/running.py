@@ -1,13 +1,17 @@
 """Operation of a live view: measurement, browser page or terminal, and an orderly end at any signal."""
 
+import json
+import os
 import signal
 import sys
 import webbrowser
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from queue import Empty, Full, Queue
 from threading import Event
+from time import monotonic
 from types import FrameType
 from typing import TextIO
 
@@ -17,14 +21,165 @@ from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.comparison.comparison import Comparison
-from fingervision.live.outlet import Outlet
+from fingervision.live.messages import Message
 from fingervision.live.playback.gauges_beside import put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import Recorded
 from fingervision.live.run_folder import remove_leftovers
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
-from fingervision.live.terminal import JsonLines, StatusLine, told
+from fingervision.live.supervisor import Supervisor
+from fingervision.storage.gaps_csv import GapRow
+
+# Print in a separate thread, so that a slow or missing reader delays neither measurement nor recording.
+
+
+# Largest number of queued lines: ten minutes at 25 frames per second. Further lines are left out and counted.
+LINES_WAITING = 15_000
+# Longest time that a reader may take at the end for the queued lines.
+PATIENCE_S = 2.0
+
+
+class Outlet:
+    """Prints text to one output stream in a separate thread.
+
+    Parameters
+    ----------
+    stream : text stream or None
+        Standard output or standard error; None if the stream was closed before the program began.
+    supervisor : Supervisor
+        Supervisor of the live view.
+    waiting : int
+        Largest number of queued lines.
+    """
+
+    def __init__(self, stream: TextIO | None, supervisor: Supervisor, waiting: int = LINES_WAITING) -> None:
+        self.left_out = 0
+        self.broken = stream is None
+        """Whether the stream is closed, so that text cannot be printed any more."""
+        self._stream = stream
+        self._waiting: Queue[str] = Queue(waiting)
+        self._ending = Event()
+        self._thread = supervisor.start("Printing", self._print)
+
+    def put(self, text: str) -> None:
+        """Queue text for printing; never waits."""
+        if self.broken:
+            return
+        try:
+            self._waiting.put_nowait(text)
+        except Full:
+            self.left_out += 1
+
+    def close(self) -> None:
+        """Print the queued text, as far as the reader accepts it in time."""
+        self._ending.set()
+        self._thread.join(PATIENCE_S)
+        if self._thread.is_alive():
+            self.left_out += self._waiting.qsize()
+            self.broken = True
+        if self.broken:
+            self._let_go()
+
+    def _print(self) -> None:
+        while not (self._ending.is_set() and self._waiting.empty()):
+            try:
+                text = self._waiting.get(timeout=0.1)
+            except Empty:
+                continue
+            if self._stream is None:
+                return
+            try:
+                self._stream.write(text)
+                self._stream.flush()
+            except (OSError, ValueError):
+                self.broken = True
+                return
+
+    def _let_go(self) -> None:
+        """Redirect the stream to the null device, so that Python neither fails nor waits at the final flush."""
+        if self._stream is None:
+            return
+        with suppress(OSError, ValueError):
+            nothing = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nothing, self._stream.fileno())
+            os.close(nothing)
+
+
+# The live measurement in a terminal: one line that is overwritten, or one line of JSON per frame.
+
+
+# Time between two lines: on a terminal, where the line is overwritten, and elsewhere.
+EVERY_S, EVERY_S_ELSEWHERE = 0.1, 1.0
+CLEARED = "\r\x1b[2K"
+DRIVE_COLUMNS = ("run", "input_mm", "force_n")
+
+
+class JsonLines:
+    """Prints one line of JSON per frame, with the columns of gaps.csv; null represents an empty cell.
+
+    Parameters
+    ----------
+    outlet : Outlet
+        Standard output.
+    """
+
+    def __init__(self, outlet: Outlet) -> None:
+        self._outlet = outlet
+
+    def add(self, row: GapRow, arrived_s: float) -> None:
+        """Print one row."""
+        cells = {name: cell for name, cell in asdict(row).items() if name not in DRIVE_COLUMNS}
+        self._outlet.put(json.dumps(cells) + "\n")
+
+
+class StatusLine:
+    """Prints gap, status and frame rate in a line that is overwritten.
+
+    Parameters
+    ----------
+    session : Session
+        The live measurement.
+    outlet : Outlet
+        Standard output.
+    in_place : bool
+        Whether the output is a terminal, so that the line can be overwritten.
+    """
+
+    def __init__(self, session: Session, outlet: Outlet, *, in_place: bool) -> None:
+        self._session, self._outlet, self._in_place = session, outlet, in_place
+        self._printed_at_s = float("-inf")
+
+    def add(self, row: GapRow, arrived_s: float) -> None:
+        """Print the row if the display interval has passed."""
+        if monotonic() - self._printed_at_s < (EVERY_S if self._in_place else EVERY_S_ELSEWHERE):
+            return
+        self._printed_at_s = monotonic()
+        line = self._line(row)
+        self._outlet.put(f"{CLEARED}{line}" if self._in_place else f"{line}\n")
+
+    def end(self) -> None:
+        """End the line that is overwritten."""
+        if self._in_place:
+            self._outlet.put("\n")
+
+    def _line(self, row: GapRow) -> str:
+        rate_hz = self._session.cadence.rate_hz
+        rate = "" if rate_hz is None else f"  {rate_hz:.2f} Hz"
+        dropped = self._session.cadence.missing + self._session.capture.overflowed
+        exposure = self._session.exposure.words
+        if row.gap_mm is None or row.u_random_mm is None:
+            gap = "no gap"
+        else:
+            u_mm = row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm
+            gap = f"gap {row.gap_mm:.4f} mm, U {2e3 * u_mm:.2f} µm"
+        return f"{gap}  {row.status.value}{rate}  {dropped} dropped{'  ' + exposure if exposure else ''}"
+
+
+def told(message: Message, outlet: Outlet, *, in_place: bool) -> None:
+    """Print a message of the live measurement on the terminal."""
+    # The message overwrites the status line, and the ^C that a terminal shows.
+    outlet.put(f"{CLEARED if in_place else ''}fingervision: {message.words}\n")
 
 
 @dataclass(frozen=True, slots=True)

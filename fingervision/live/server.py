@@ -4,7 +4,11 @@ import asyncio
 import errno
 import html
 import os
+import re
+import secrets
 import socket
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from threading import Event
 
@@ -20,15 +24,93 @@ from fingervision.live.access import Access
 from fingervision.live.commands import modules
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard
 from fingervision.live.half_open import PatientProtocol
-from fingervision.live.page_files import PAGE, files, index
 from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
-from fingervision.live.page_token import VIEWER_FILE, kept_token
 from fingervision.live.pen import Pen
 from fingervision.live.picture_watch import PictureWatch
-from fingervision.live.save_gaps import save_gaps
 from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
-from fingervision.storage.out_folder import out_folder
+from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.out_folder import make_out_folder, out_folder
+
+# Saving of the gaps that the browser page shows.
+
+DRIVE_COLUMNS = ("run", "input_mm", "force_n")
+SAVED_GAPS = "live_gaps.csv"
+
+
+def save_gaps(view: View) -> Path:
+    """Save the gaps in memory in the format of gaps.csv; for a recording, save the table that `measure` wrote.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    if view.table is not None:
+        return view.table
+    make_out_folder(view.out)
+    path = view.out / SAVED_GAPS
+    rows = list(view.rows(view.oldest_row, view.row_count))
+    is_driven = any(row.input_mm is not None for row in rows)
+    with GapsCsv(path, DRIVE_COLUMNS if is_driven else ()) as table:
+        table.add(rows)
+    return path
+
+
+# Token in the address of the browser page, stored in the output folder for reconnecting after a restart.
+
+TOKEN_FILE, VIEWER_FILE = ".live_token", ".live_viewer_token"
+TOKEN_BYTES = 18
+
+
+def kept_token(out: Path, file_name: str = TOKEN_FILE) -> str:
+    """Read the token from a folder, or create a token file that only this user can read.
+
+    Parameters
+    ----------
+    out : Path
+        The folder.
+    file_name : str
+        `TOKEN_FILE` for users who control the live view, `VIEWER_FILE` for users who only watch.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    path = out / file_name
+    with out_folder(out):
+        with suppress(FileNotFoundError, UnicodeDecodeError):
+            found = path.read_text(encoding="ascii").strip()
+            if re.fullmatch(r"[A-Za-z0-9_-]{24,}", found) and path.stat().st_mode & 0o077 == 0:
+                return found
+        path.unlink(missing_ok=True)
+        token = secrets.token_urlsafe(TOKEN_BYTES)
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
+            file.write(token + "\n")
+    return token
+
+
+# Files of the browser page, one script per topic; every file panel_NAME.js is loaded as a panel automatically.
+
+PAGE = Path(__file__).parent / "page"
+SCRIPTS = "<!-- scripts -->"
+LAST = "live.js"
+
+
+@cache
+def files() -> frozenset[str]:
+    """Names of the files that the server delivers; any other name gives the error "not found"."""
+    return frozenset(path.name for path in PAGE.iterdir() if path.is_file() and path.name != "index.html")
+
+
+@cache
+def index() -> str:
+    """HTML text of the page, with the scripts of its panels, and the start script last."""
+    panels = sorted(name for name in files() if name.startswith("panel_") and name.endswith(".js"))
+    tags = "\n".join(f'<script type="module" src="/page/{name}"></script>' for name in (*panels, LAST))
+    return (PAGE / "index.html").read_text(encoding="utf-8").replace(SCRIPTS, tags)
+
 
 MESSAGE_BYTES = 4096
 # Largest number of browser pages, each of which takes a share of a core, and of connections, which also fetch files.

@@ -3,11 +3,13 @@
 import secrets
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Any
+
+import numpy as np
 
 from fingervision.domain.errors import StateError
 from fingervision.domain.frame import Frame, LostFrame
@@ -16,9 +18,7 @@ from fingervision.frames.received import Driven
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import Arrival, Capture, Ended, Happening
 from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF, Choices
-from fingervision.live.exposure import Exposure
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
-from fingervision.live.history import History
 from fingervision.live.messages import Message, MessageListener, Messages
 from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.recorder import Recorder
@@ -28,6 +28,95 @@ from fingervision.live.supervisor import Supervisor
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.gaps_csv import GapRow
+from fingervision.vision.grey import full_scale, to_grey
+
+# Measured rows of the last minutes, in a fixed amount of memory.
+
+
+# Number of rows: ten minutes at 25 frames per second.
+ROWS_KEPT = 15_000
+STATUSES = tuple(Status)
+# Columns of a row: frame, time_s, status and thirteen numbers; two further columns hold input and force.
+COLUMNS_KEPT = 16
+
+
+class History:
+    """Ring buffer of measured rows.
+
+    Parameters
+    ----------
+    kept : int
+        Number of rows that are kept.
+    """
+
+    def __init__(self, kept: int = ROWS_KEPT) -> None:
+        # Filling the array makes the operating system allocate its memory now. NaN represents an empty cell, only here.
+        self._cells = np.full((kept, COLUMNS_KEPT + 2), np.nan)
+        self.count = 0
+        self._lock = Lock()
+
+    def add(self, row: GapRow) -> None:
+        """Add a row; if the buffer is full, the oldest row is dropped."""
+        cells = [*astuple(row)[:COLUMNS_KEPT], row.input_mm, row.force_n]
+        cells[2] = STATUSES.index(row.status)
+        with self._lock:
+            self._cells[self.count % len(self._cells)] = [np.nan if cell is None else cell for cell in cells]
+            self.count += 1
+
+    @property
+    def oldest(self) -> int:
+        """Number of the oldest row in the buffer, counted from the first row of the measurement."""
+        return max(0, self.count - len(self._cells))
+
+    def rows(self, after: int = 0, before: int | None = None) -> Iterator[GapRow]:
+        """Rows in the buffer with numbers from `after` to `before` - 1, counted since the start of the measurement."""
+        with self._lock:
+            last = self.count if before is None else min(before, self.count)
+            asked = np.arange(max(after, self.count - len(self._cells)), last)
+            kept = self._cells[asked % len(self._cells)].tolist()
+        for frame, time_s, status, *numbers in kept:
+            cells: list[Any] = [None if cell != cell else cell for cell in (time_s, *numbers)]
+            row = GapRow(int(frame), cells[0], STATUSES[int(status)], *cells[1:-2])
+            yield row if cells[-2] is None else replace(row, input_mm=cells[-2], force_n=cells[-1])
+
+
+# Check of the illumination in the picture: overexposed, too dark, or fluctuating.
+
+
+# Every eighth pixel along both axes is sufficient.
+STEP_PX = 8
+# A white background is usual, but a picture of which a larger share is white shows no fingers.
+WHITE_SHARE = 0.99
+# If the 99th percentile of the grey levels is below this share of full scale, the contrast is low.
+DARK_SHARE, BRIGHTEST_PERCENT = 0.25, 99.0
+# The brightest parts are the background; it may change by at most this share of full scale over 50 frames.
+CHANGE_SHARE, FRAMES_LOOKED_AT = 0.05, 50
+
+
+class Exposure:
+    """Checks the illumination from frame to frame."""
+
+    def __init__(self) -> None:
+        self._ground: deque[float] = deque(maxlen=FRAMES_LOOKED_AT)
+        self.words = ""
+
+    def add(self, frame: Frame) -> None:
+        """Add a frame to the check; afterwards `words` states the problem, or is empty."""
+        sparse: Any = np.ascontiguousarray(frame.pixels[::STEP_PX, ::STEP_PX])
+        grey = to_grey(sparse)
+        scale = full_scale(grey)
+        brightest = int((grey.size - 1) * BRIGHTEST_PERCENT / 100.0)
+        ground = float(np.partition(grey, brightest, axis=None)[brightest]) / scale
+        self._ground.append(ground)
+        if np.count_nonzero(grey == scale) > WHITE_SHARE * grey.size:
+            self.words = "The picture is saturated: lower the exposure or the light."
+        elif ground < DARK_SHARE:
+            self.words = "The picture is too dark: raise the exposure or the light."
+        elif max(self._ground) - min(self._ground) > CHANGE_SHARE:
+            self.words = "The light is changing: switch off automatic exposure, or shield the set-up from other light."
+        else:
+            self.words = ""
+
 
 # The source counts as silent after this time without a frame, or after this number of frame periods if that is longer.
 SILENT_S, SILENT_PERIODS = 0.5, 5.0

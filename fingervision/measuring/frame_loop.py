@@ -1,10 +1,13 @@
 """Measure every frame of a recording in order, and pass on the rows as soon as they are complete."""
 
+import signal
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from time import monotonic
+from types import FrameType
 
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
@@ -12,11 +15,9 @@ from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description, FrameSource
-from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.marked import marked
-from fingervision.measuring.one_polarity import one_polarity
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.series import GapSeries
@@ -25,7 +26,110 @@ from fingervision.measuring.task import Task
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
 from fingervision.storage.recorded_camera import recorded_camera
-from fingervision.vision.pipeline import Settings
+from fingervision.vision.pipeline import Settings, measure_frame
+
+# Determine once per recording whether the fingers are darker or lighter than the background.
+#
+# If the user has not stated the polarity, the first frames decide by majority, because fingers do not change from dark
+# to light within a recording. The majority excludes frames in which the bright regions on either side of a dark object
+# look like two light fingers.
+
+Outcome = GapMeasurement | NoGap | LostFrame
+
+# Number of frames with a gap that decide by majority, and largest number of pixels that are stored until the decision.
+VOTERS, MOST_KEPT_PX = 15, 15_000_000
+
+
+def one_polarity(
+    frames: Iterable[Frame | LostFrame],
+    settings: Settings,
+    votes: Counter[str],
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> Iterator[tuple[Frame | LostFrame, Outcome]]:
+    """Measure frames in order, all with the polarity found in most of the first frames that have a measured gap.
+
+    Parameters
+    ----------
+    frames : iterable of Frame or LostFrame
+        The recording; its frames are read once, in order.
+    settings : Settings
+        Settings of the measurement; a polarity stated in them is kept.
+    votes : Counter of str
+        Counter to which the numbers of first frames with `dark` and `light` fingers are added.
+    is_stopped : callable
+        Called after every frame; if it returns True no more frames are read, and the frames measured so far are still
+        yielded.
+
+    Yields
+    ------
+    (Frame or LostFrame, GapMeasurement or NoGap or LostFrame)
+        Every frame with its result. The first frames with a gap are yielded after all of them have been counted; frames
+        without a gap before them are yielded at once.
+    """
+    source = iter(frames)
+    if settings.fingers_are_dark is None:
+        kept: list[tuple[Frame | LostFrame, Outcome]] = []
+        pixels = 0
+        for item in source:
+            outcome = measure_frame(item, settings) if isinstance(item, Frame) else item
+            if isinstance(outcome, GapMeasurement):
+                votes["dark" if outcome.light_gap else "light"] += 1
+            elif not votes:
+                yield item, outcome
+                if is_stopped():
+                    return
+                continue
+            kept.append((item, outcome))
+            pixels += item.pixels.size if isinstance(item, Frame) else 0
+            if votes.total() >= VOTERS or pixels > MOST_KEPT_PX or is_stopped():
+                break
+        if votes:
+            settings = replace(settings, fingers_are_dark=votes["dark"] >= votes["light"])
+        for item, outcome in kept:
+            is_other = isinstance(outcome, GapMeasurement) and outcome.light_gap != settings.fingers_are_dark
+            yield item, measure_frame(item, settings) if is_other and isinstance(item, Frame) else outcome
+    while not is_stopped():
+        following = next(source, None)
+        if following is None:
+            return
+        yield following, measure_frame(following, settings) if isinstance(following, Frame) else following
+
+
+# Handle Ctrl-C and SIGTERM between two frames, so that no row of the table is incomplete.
+
+
+@contextmanager
+def asked_to_stop() -> Iterator[threading.Event]:
+    """Record the first Ctrl-C or SIGTERM instead of raising it; a second signal is raised as usual.
+
+    Signals are not recorded outside the main thread, nor in a worker process, whose parent process handles them.
+
+    Yields
+    ------
+    threading.Event
+        Event that is set by the first Ctrl-C or SIGTERM.
+    """
+    asked = threading.Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    if threading.current_thread() is not threading.main_thread() or not callable(before[signal.SIGINT]):
+        yield asked
+        return
+
+    def note(number: int, frame: FrameType | None) -> None:
+        restore()
+        asked.set()
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    for number in before:
+        signal.signal(number, note)
+    try:
+        yield asked
+    finally:
+        restore()
+
 
 # Rows are computed and written for this number of frames at once, or for the frames of this time (s) if they are fewer.
 FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4

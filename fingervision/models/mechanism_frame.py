@@ -20,8 +20,7 @@ from fingervision.models.body_assembly import assemble_bodies
 from fingervision.models.contact_pairs import contact_pair
 from fingervision.models.corotational_body import turned_axes
 from fingervision.models.corotational_frame import CorotationalFrame
-from fingervision.models.flexure_energy import misused_energy
-from fingervision.models.flexure_span import span_of
+from fingervision.models.flexure_span import FlexureSpan, span_of
 from fingervision.models.flexure_stress import nominal_stress_mpa
 from fingervision.models.frame_vibration import FrameVibration, SegmentMass, frame_vibration
 from fingervision.models.hinge_correction import HingeTheory
@@ -37,6 +36,35 @@ from fingervision.models.strip_energy import used_in_frame
 from fingervision.models.triangulate import triangulate
 
 Array = NDArray[np.float64]
+
+# Share of a notch flexure's strain energy that is not in the intended deformation, bending of its neck.
+
+
+def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plate_mm: float) -> tuple[float, float]:
+    """Strain energy of a flexure outside its intended deformation, and the flexure's total strain energy (N mm).
+
+    Parameters
+    ----------
+    span : FlexureSpan
+        The flexure.
+    end_loads : ndarray of float, shape (segments, 3)
+        Tension in N and moments in N mm at both ends of every segment, as returned by `CorotationalFrame.end_loads`.
+    compliances : ndarray of float, shape (segments, 3, 3)
+        Compliance of each segment at its end.
+    plate_mm : float
+        Thickness of the plate.
+    """
+    stations = span.stations_mm(plate_mm)
+    tension, first, second = end_loads.T
+    shear = -(first + second) / np.diff(stations)
+    loads = np.column_stack([tension, shear, second])
+    whole = 0.5 * float(np.einsum("mi,mij,mj->", loads, compliances, loads))
+    if not span.flexure.is_notch:  # a leaf bends as a beam in every direction
+        return 0.0, whole
+    at_neck = float(np.interp(0.0, stations, np.append(-first, second[-1])))
+    bent = 0.5 * at_neck**2 * float(np.sum(compliances[:, 2, 2]))
+    return max(whole - bent, 0.0), whole
+
 
 _ACROSS, _BODY = 2.0, 0.05
 """Triangles across thin parts, and edge length over the body's size: the mesh is coarse because bodies deform little,

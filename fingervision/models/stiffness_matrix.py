@@ -31,17 +31,125 @@ from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import ModelFigures
-from fingervision.models.compliance_chain import ComplianceChain
 from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.grip import Part
 from fingervision.models.gripper_bodies import gripper_poses, poses_of_frame
 from fingervision.models.half_frame import half_frame
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.physics import LINEAR, Physics
-from fingervision.models.skeleton import Member, skeleton_of
+from fingervision.models.skeleton import Member, Skeleton, skeleton_of
 from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
 
 Array = NDArray[np.float64]
+
+# Rigid-body transforms of compliance: equations (5) to (8) of Hricko & Havlik (2015), in six dimensions.
+#
+# Equation (6), T = [[R, R P], [0, R]], is used as published: R rotates the axes, and P is the cross-product matrix of
+# equation (8) for the vector from the point whose motion is wanted to the point whose motion is known. In the
+# publication, equation (6) contains 6 by 6 matrices, but the compliance of equation (3) is planar, 3 by 3; in this
+# module every compliance is 6 by 6.
+
+
+def rotation_about_z(angle_rad: float) -> Array:
+    """Equation (7): rotation matrix from axes rotated by the angle to the global axes."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def cross_matrix(arm_mm: Array) -> Array:
+    """Equation (8): the matrix P with P v = p x v."""
+    x, y, z = arm_mm
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def carried(arm_mm: Array) -> Array:
+    """Matrix from the motion of a rigid body at one point to its motion at another point.
+
+    Parameters
+    ----------
+    arm_mm : ndarray of float, shape (3,)
+        Vector from the point where the motion is known to the point where it is wanted.
+
+    Returns
+    -------
+    ndarray of float, shape (6, 6)
+        Matrix of u_wanted = u_known + theta x arm; its transpose transfers loads in the opposite direction.
+    """
+    matrix = np.eye(6)
+    matrix[:3, 3:] = -cross_matrix(arm_mm)
+    return matrix
+
+
+def turned(angle_rad: float) -> Array:
+    """Matrix that transforms displacements and rotations from a member's axes to global axes, shape (6, 6)."""
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = matrix[3:, 3:] = rotation_about_z(angle_rad)
+    return matrix
+
+
+# Compliance of a tree of members: the sum of the members' compliances over the load paths that contain them.
+
+
+class ComplianceChain:
+    """A tree of elastic members, clamped at its root and free elsewhere.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The members.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+
+    @cached_property
+    def _global(self) -> list[Array]:
+        """Compliance of every member at its end, in global axes, by equation (5) of Hricko and Havlik (2015)."""
+        turned_all = []
+        for member in self.skeleton.members:
+            angle = np.arctan2(member.end_mm[1] - member.start_mm[1], member.end_mm[0] - member.start_mm[0])
+            axes = turned(float(angle))
+            turned_all.append(axes @ member.compliance @ axes.T)
+        return turned_all
+
+    def path(self, member: int) -> list[int]:
+        """List the members on the path from the clamp to the end of a given member."""
+        path = []
+        while member >= 0:
+            path.append(member)
+            member = self.skeleton.members[member].parent
+        return path[::-1]
+
+    @cached_property
+    def _whole(self) -> Array:
+        """Motion of each member's end under loads at each member's end, in 6 by 6 blocks; shape (6 n, 6 n)."""
+        members = self.skeleton.members
+        paths = [set(self.path(place)) for place in range(len(members))]
+        total = np.zeros((6 * len(members), 6 * len(members)))
+        for place, compliance in enumerate(self._global):
+            if compliance.any():
+                carry = np.zeros((len(members), 6, 6))
+                for end in range(len(members)):
+                    if place in paths[end]:
+                        carry[end] = carried(_arm(members[place], members[end]))
+                stacked = carry.reshape(-1, 6)
+                total += stacked @ compliance @ stacked.T
+        return total
+
+    def flexibility(self, moved: int, loaded: int) -> Array:
+        """Motion of one member's end under a load at another member's end: equation (12) of Hricko and Havlik (2015).
+
+        Returns
+        -------
+        ndarray of float, shape (6, 6)
+            The transpose is the flexibility with the two members exchanged (reciprocity theorem of Maxwell and Betti).
+        """
+        return self._whole[6 * moved : 6 * moved + 6, 6 * loaded : 6 * loaded + 6]
+
+
+def _arm(known: Member, wanted: Member) -> Array:
+    return np.array([wanted.end_mm[0] - known.end_mm[0], wanted.end_mm[1] - known.end_mm[1], 0.0])
+
 
 KIND = "stiffness_matrix"
 TRUST, SMALL_DISPLACEMENTS_ALONE = 1, True

@@ -4,14 +4,21 @@ Built-in parts are the modules of a package. Any other part is imported when it 
 and checked. A part that cannot be used is omitted and reported with a sentence, and does not affect other parts.
 """
 
+import hashlib
+import importlib.util
 import logging
+import re
+import sys
 import threading
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import Generic, TypeVar
 
+from fingervision import __version__
 from fingervision.plugins.entry import Entry, Refusal
 from fingervision.plugins.faults import (
     PluginError,
@@ -20,10 +27,128 @@ from fingervision.plugins.faults import (
     PluginShapeError,
     PluginVersionError,
 )
-from fingervision.plugins.file_module import check_file, load_file, needs
-from fingervision.plugins.origin import BUILT_IN, SESSION, Origin, of_distribution
-from fingervision.plugins.requirements import unmet
+from fingervision.plugins.origin import BUILT_IN, SESSION, Origin, of_distribution, of_file
 from fingervision.plugins.watched_import import importing, watched
+
+# Required versions of fingervision, stated by a plug-in's distribution or by inline script metadata (PEP 723).
+
+
+# Regular expression for the metadata block, as given in PEP 723.
+SCRIPT = re.compile(r"(?m)^# /// script\s*$\s(?P<content>(?:^#(?:| .*)$\s)+?)^# ///\s*$")
+
+
+def unmet(requires: Iterable[str]) -> str | None:
+    """Return the first stated requirement that this version of fingervision does not meet, such as `>=0.9`.
+
+    The function returns None if all requirements are met.
+
+    Parameters
+    ----------
+    requires : iterable of str
+        Requirements as in PEP 508 (`fingervision>=0.2`); requirements on other distributions and invalid requirements
+        are ignored here.
+    """
+    from packaging.requirements import InvalidRequirement, Requirement
+
+    for words in requires:
+        if not words.lower().lstrip().startswith("fingervision"):
+            continue
+        try:
+            asked = Requirement(words)
+        except InvalidRequirement:
+            continue
+        applies = asked.marker is None or asked.marker.evaluate({"extra": ""})
+        if asked.name.lower() != "fingervision" or not applies:
+            continue
+        if not asked.specifier.contains(__version__, prereleases=True):
+            return str(asked.specifier)
+    return None
+
+
+def stated_in(source: str) -> tuple[str, ...]:
+    """Read the requirements in a file's inline script metadata; empty if there are none or they are not valid TOML."""
+    found = SCRIPT.search(source)
+    if found is None:
+        return ()
+    lines = (line[2:] if line.startswith("# ") else line[1:] for line in found["content"].splitlines())
+    try:
+        stated = tomllib.loads("\n".join(lines)).get("dependencies", [])
+    except tomllib.TOMLDecodeError:
+        return ()
+    return tuple(one for one in stated if isinstance(one, str)) if isinstance(stated, list) else ()
+
+
+# Import of a module from a file that the user named.
+
+SUFFIX = ".py"
+
+
+def check_file(path: Path, what: str) -> Origin:
+    """Refuse a file that cannot be imported, before any of its code runs.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what : str
+        Expected content for the error message, such as `effects` or `an actuator`.
+
+    Raises
+    ------
+    PluginFileError
+        The file does not exist, or is not a Python file.
+    PluginVersionError
+        The inline metadata of the file require another version of fingervision.
+    """
+    origin = of_file(str(path))
+    if not path.exists():
+        raise PluginFileError(f"There is no file {path}: {what} must come from a Python file that exists.")
+    if not path.is_file() or path.suffix.lower() != SUFFIX:
+        raise PluginFileError(
+            f"{what.capitalize()} must come from a Python file (NAME.py), but {path} is not a Python file: name one."
+        )
+    try:
+        source = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise PluginFileError(f"{path} must be a Python file in UTF-8, but could not be read ({error}).") from error
+    missing = unmet(stated_in(source))
+    if missing is not None:
+        raise PluginVersionError(needs(str(path), missing))
+    return origin
+
+
+def needs(who: str, specifier: str) -> str:
+    """Return the error for a plug-in that needs another version of fingervision."""
+    from fingervision import __version__
+
+    return (
+        f"{who} needs fingervision {specifier}, but the installed version is {__version__}: install the required "
+        "version."
+    )
+
+
+def load_file(path: Path) -> ModuleType:
+    """Import a file under a unique module name, so that two files of the same name do not collide.
+
+    A file whose content has changed is imported again.
+    """
+    whole = path.resolve()
+    digest = hashlib.sha256(f"{whole}\n".encode() + whole.read_bytes()).hexdigest()[:16]
+    name = f"_fingervision_file_{digest}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, whole)
+    assert spec is not None  # noqa: S101 - a file NAME.py always has one
+    assert spec.loader is not None  # noqa: S101 - as above
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look up their module during its import
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        sys.modules.pop(name, None)
+        raise
+    return module
+
 
 T = TypeVar("T")
 LOG = logging.getLogger("fingervision.plugins")

@@ -9,13 +9,41 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
+from fingervision.domain.reference_slot import ReferenceSlot
 from fingervision.storage.assumed_response import response_note_beside
 from fingervision.storage.channel_columns import channels_of, read_channels
 from fingervision.storage.csv_columns import read_block, read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
 from fingervision.storage.number_columns import Numbers, numbers_in
-from fingervision.storage.reference_slots import slots_beside
+from fingervision.storage.plain_file import json_of
+from fingervision.storage.run_files import RUN
 from fingervision.storage.summary_json import u_clock_beside
+
+# Reference slots measured in a run on the test bed, from the run.json beside the run's table.
+
+KEY = "reference_slots"
+
+
+def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
+    """Read the reference slots of the run to which a table belongs; empty without a run or without measured slots.
+
+    Parameters
+    ----------
+    table : Path
+        A table in a run folder, or any other table.
+    """
+    try:
+        about = json_of(table.parent / RUN)
+        names = (about["samples"], about.get("joined"))
+        listed = about.get(KEY, []) if table.name in names else []
+        return tuple(
+            ReferenceSlot(*(float(slot[key]) for key in ("size_mm", "u_size_mm", "measured_mm", "u_random_mm")))
+            for slot in listed
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        # The folder belongs to another program, or the run was interrupted.
+        return ()
+
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")

@@ -12,6 +12,7 @@ from fingervision.domain.numbers import MINUS
 from fingervision.storage.number_block import number_block
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.cells import which_mark
+from fingervision.tables.column_names import column_name
 from fingervision.tables.dialect import (
     BY_NAME,
     SAMPLE_LINES,
@@ -22,14 +23,87 @@ from fingervision.tables.dialect import (
     is_value,
     split,
 )
-from fingervision.tables.exchanged_rows import exchanged
 from fingervision.tables.header_pairs import Header
-from fingervision.tables.key_value_rows import rows_of_pairs
 from fingervision.tables.mapping import Entry
 from fingervision.tables.other_rows import is_other_header, other_header, statistics_below
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
 from fingervision.tables.text_header import HEADER_LINES, find_header, first_row, header_below_values, names_in
+from fingervision.tables.times import looks_like_time
+from fingervision.tables.units import known_unit
+from fingervision.tables.words import role_of
+
+# Text logs in which each number has its name before it: `t=0.100 x=0.61 gap=4.2`, as microcontrollers print.
+
+PAIR = re.compile(
+    r"(?<!\d{4}-\d\d-\d\d)([^\W\d]\w*)\s*[=:]\s*([+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?)(?:\s*([^\W\d_]+)(?!\w*\s*[=:]))?"
+)
+"""A name, a number, and a unit, which is not the name of the next number. `T13:24` of a date and time is no pair."""
+MOST_OTHER = 0.05
+"""Largest share of lines without these names: a start-up message, and a line that was cut off."""
+FEWEST_LINES = 3
+
+
+def rows_of_pairs(lines: Sequence[str]) -> list[str] | None:
+    """Write such a log as a table with tabs; None if the lines are no such log.
+
+    A line that differs becomes a comment, so that the rows keep their line numbers.
+    """
+    told = [line for line in lines if line.strip() and not is_comment(line)]
+    first = next((found for line in told[:FEWEST_LINES] if len(found := PAIR.findall(line)) > 1), None)
+    if first is None or len(told) < FEWEST_LINES:
+        return None
+    names = [(name, unit if known_unit(unit) else "") for name, _, unit in first]
+    # The serial monitor of the Arduino IDE writes the time of day before each line: `13:24:07.123 -> x=0.61`.
+    stamped = "time" not in [role_of(name) for name, _ in names] and all(
+        _stamp(line) for line in told if len(PAIR.findall(line)) == len(names)
+    )
+    out: list[str] = []
+    rows = 0
+    for line in lines:
+        found = [] if is_comment(line) else PAIR.findall(line)
+        same = [(name, unit if known_unit(unit) else "") for name, _, unit in found] == names
+        rows += same
+        values = [*([_stamp(line)] if stamped else []), *(value for _, value, _ in found)]
+        out.append("\t".join(values) if same else f"# {line}" if line.strip() else "")
+    if rows < FEWEST_LINES or len(told) - rows > max(1.0, MOST_OTHER * len(told)):
+        return None
+    if stamped:
+        names = [("time", ""), *names]
+    return ["\t".join(f"{name} [{unit}]" if unit else name for name, unit in names), *out]
+
+
+def _stamp(line: str) -> str:
+    """Date or time of day before the first pair of a line; empty if there is none."""
+    first = PAIR.search(line)
+    before = line[: first.start()].strip(" \t[](){}<>|;,-=") if first is not None else ""
+    return before if before and looks_like_time([before]) else ""
+
+
+# Text tables in which each line holds a column.
+
+MOST_LINES = 12
+"""Largest number of lines of a table with one column per line, and smallest ratio of its columns to its lines."""
+LEAST_RATIO = 3
+
+
+def exchanged(lines: Sequence[str], dialect: Dialect) -> list[str] | None:
+    """Exchange rows and columns if each line is a name of a known role and many numbers; None for any other table."""
+    if dialect.separator is None:
+        return None
+    told = [line for line in lines[: 2 * MOST_LINES] if line.strip() and not is_comment(line)]
+    cells = [split(line, dialect.separator) for line in told]
+    if not 2 <= len(cells) <= MOST_LINES or len(lines) > 2 * MOST_LINES:
+        return None
+    wide = dialect.wide
+    if wide < LEAST_RATIO * len(cells) or any(len(row) != wide for row in cells):
+        return None
+    if any(not all(is_value(cell, dialect.decimal) for cell in row[1:]) for row in cells):
+        return None
+    if sum(column_name(row[0]).role is not None for row in cells) < 2:
+        return None
+    return [dialect.separator.join(column) for column in zip(*cells, strict=True)]
+
 
 NUMBER_BEGINS = frozenset("0123456789+-., \t")
 BETWEEN = re.compile(r"[\s,;|]+")

@@ -1,7 +1,8 @@
 """Interpretation of a raw table: role and unit of each column, and open questions."""
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,11 @@ from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels, channels_in
-from fingervision.tables.cell_units import with_units_of_cells
 from fingervision.tables.cells import to_numbers
 from fingervision.tables.clock_leaps import clock_leaps, without_leaps
 from fingervision.tables.column_choice import NEEDED, Findings, choose
 from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
-from fingervision.tables.dialect import NO_NUMBER
+from fingervision.tables.dialect import MISSING, NO_NUMBER
 from fingervision.tables.doubts import doubts
 from fingervision.tables.filler_values import dropped_out, filler_value, without_filler
 from fingervision.tables.long_table import refuse_long_table
@@ -24,6 +24,36 @@ from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import is_day_number, is_epoch, looks_like_time, seconds_of
 from fingervision.tables.unit_readings import unit_question, unit_readings, wrong_unit
 from fingervision.tables.units import factor, known_unit, spelled
+
+# Read cells that contain a number and its unit, such as the durations of MATLAB's timetables (`0.1 sec`).
+
+WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\W\d_]+)")
+
+
+def with_units_of_cells(raw: RawTable) -> RawTable:
+    """Move the unit from the cells of a column to the column's name, if all cells have the same unit."""
+    columns = tuple(_column(column) for column in raw.columns)
+    return raw if columns == raw.columns else replace(raw, columns=columns)
+
+
+def _column(column: RawColumn) -> RawColumn:
+    if isinstance(column.content, Numbers) or column.unit:
+        return column
+    found: list[str] = []
+    units: set[str] = set()
+    for cell in column.content:
+        match = WITH_UNIT.fullmatch(cell)
+        if match is not None and known_unit(match[2]) is not None:
+            found.append(match[1])
+            units.add(match[2])
+        elif cell.lower() in MISSING:
+            found.append(cell)
+        else:
+            return column
+        if len(units) > 1:
+            return column
+    return replace(column, content=found, unit=units.pop()) if units else column
+
 
 DATE = "date"
 """Word used as the unit of times that are written as dates or times of day."""

@@ -15,9 +15,8 @@ import bluesky.plans as bp
 from bluesky import RunEngine
 from bluesky.protocols import Flyable, Movable, Readable, Stoppable, Triggerable
 
-from fingervision.adapters.bluesky import Devices, devices
+from fingervision.adapters.bluesky import Devices, ThreadStatus, devices
 from fingervision.adapters.bluesky_agent import NextRunAgent, run_steps
-from fingervision.adapters.thread_status import ThreadStatus
 from fingervision.domain.errors import DataError, FingervisionError, LimitError, StateError
 from fingervision.tables.read import read_model
 from fingervision.testbed.bed_factory import open_bed

@@ -5,7 +5,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingervision.batch.naming import LONGEST, folder_names
+from fingervision.batch.run import LONGEST, folder_names
 
 # Few letters, the separator among them, so that names clash in every way.
 PART = st.sampled_from(["a", "b", "A", "a__b", "b__a", "__", "x.mp4", "X.mp4"])

@@ -83,11 +83,11 @@ GUARDS = (
         "if len(given) == len(token) and given.swapcase() != token]", ATTACKS, "missing_stale_and_guessed",
     ),
     Guarded(
-        "token's file open to others", f"{LIVE}/page_token.py", "os.O_EXCL, 0o600)", "os.O_EXCL, 0o644)",
+        "token's file open to others", f"{LIVE}/server.py", "os.O_EXCL, 0o600)", "os.O_EXCL, 0o644)",
         ATTACKS, "token_is_its_users_alone",
     ),
     Guarded(
-        "token that others could read", f"{LIVE}/page_token.py", " and path.stat().st_mode & 0o077 == 0", "",
+        "token that others could read", f"{LIVE}/server.py", " and path.stat().st_mode & 0o077 == 0", "",
         ATTACKS, "token_is_its_users_alone",
     ),
     Guarded(

@@ -1,4 +1,4 @@
-"""Print the table of `fingervision/models/fillet_stress.py`: largest stress at a fillet over nominal stress of a neck.
+"""Print the table of `fingervision/models/flexure_stress.py`: largest stress at a fillet over nominal stress of a neck.
 
 A neck of thickness 1 between blocks is loaded in tension and in pure bending, in plane stress.
 """
@@ -7,8 +7,8 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from fingervision.domain.gripper import Material
-from fingervision.models.fillet_stress import DEPTHS, RADII
 from fingervision.models.flexure import Flexure
+from fingervision.models.flexure_stress import DEPTHS, RADII
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import box
 from fingervision.models.plane_stress import PlaneStressPlate

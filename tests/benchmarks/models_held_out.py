@@ -13,8 +13,8 @@ from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.redrawn import redrawn
+from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.models.static_answer import gap_per_input
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper

@@ -14,10 +14,10 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.parameter_sweep import parse_variation, sweep_answers
 from fingervision.models.physics import Physics
+from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.storage.gripper_toml import read_gripper
 
 GRIPPER = Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml"

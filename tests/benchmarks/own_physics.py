@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.report import DiagnosisReport
-from fingervision.models.compliance_chain import ComplianceChain
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import skeleton_of
+from fingervision.models.stiffness_matrix import ComplianceChain
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

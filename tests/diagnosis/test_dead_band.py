@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.report.dead_band_hint import band_words
+from fingervision.diagnosis.report.diagnosis_report import band_words
 from fingervision.domain.effect import History
 
 Array = NDArray[np.float64]

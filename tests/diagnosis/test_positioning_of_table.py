@@ -11,13 +11,15 @@ from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.report.positioning_figures import DEFINITIONS
 from fingervision.diagnosis.report.positioning_of_data import (
+    MODEL,
+    positioning_document,
     positioning_html,
     positioning_of_data,
+    positioning_of_table,
     positioning_section,
+    positioning_words,
 )
-from fingervision.diagnosis.report.positioning_of_table import MODEL, positioning_of_table
 from fingervision.diagnosis.report.positioning_report import PositioningReport
-from fingervision.diagnosis.report.positioning_words import positioning_document, positioning_words
 from fingervision.storage.iso230_table import read_iso230_table
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

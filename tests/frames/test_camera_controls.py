@@ -7,10 +7,9 @@ import cv2
 import pytest
 
 from fingervision.frames import genicam
-from fingervision.frames.camera_controls import control_list, request_of
+from fingervision.frames.camera import LAYOUT, control_list, ranges, request_of
 from fingervision.frames.camera_settings import MSMF, READ, V4L2
 from fingervision.frames.controls import CameraControl
-from fingervision.frames.v4l2_ranges import LAYOUT, ranges
 from tests.frames.test_camera_settings import EXPOSURE, MediaFoundationCamera, UsbCamera
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame, LostFrame
-from fingervision.frames.avi_places import AviPlaces
+from fingervision.frames.file_pictures import AviPlaces
 from fingervision.frames.source import open_source
 from fingervision.frames.told_times import EvenRow, believable
 

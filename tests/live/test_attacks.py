@@ -22,9 +22,7 @@ from fingervision.frames.source import Wish
 from fingervision.live import server
 from fingervision.live.choices import Choices
 from fingervision.live.opening import opened as opened_source
-from fingervision.live.page_files import PAGE, files, index
-from fingervision.live.page_token import kept_token
-from fingervision.live.server import Page, bound
+from fingervision.live.server import PAGE, Page, bound, files, index, kept_token
 from fingervision.live.session import Session
 from tests.live.browser import browser, needs_chromium, opened, shown
 

@@ -17,7 +17,7 @@ from fingervision.live.bed.bench import Bench
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section
-from fingervision.live.comparison.verdict import turns
+from fingervision.live.comparison.comparison import turns
 from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.bed_factory import open_bed
@@ -238,7 +238,7 @@ def test_a_verdict_is_sought_after_a_motion_there_and_back_and_a_long_rest_does_
 
 
 def test_a_prediction_follows_the_inputs_path_where_the_model_has_a_memory(tmp_path: Path) -> None:
-    from fingervision.live.comparison.prediction import Prediction
+    from fingervision.live.comparison.comparison import Prediction
     from fingervision.tables.read import read_model
 
     (tmp_path / "base.csv").write_text("input_mm,gap_mm\n-1,1\n2,10\n")

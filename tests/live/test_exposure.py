@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fingervision.domain.frame import Frame
-from fingervision.live.exposure import Exposure
+from fingervision.live.session import Exposure
 
 
 def words(*levels: int) -> str:

@@ -1,7 +1,7 @@
 """The history returns the newest rows unchanged, in a fixed amount of memory."""
 
 from fingervision.domain.status import Status
-from fingervision.live.history import History
+from fingervision.live.session import History
 from fingervision.storage.gaps_csv import GapRow
 
 

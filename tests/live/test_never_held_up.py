@@ -28,14 +28,13 @@ from fingervision.live import recorder as recorder_module
 from fingervision.live.cadence import Cadence
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import Seen
-from fingervision.live.free_space import minutes_left
 from fingervision.live.opening import opened
-from fingervision.live.outlet import PATIENCE_S, Outlet
 from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.preview import Known, message, state_has_changed
+from fingervision.live.recorder import minutes_left
+from fingervision.live.running import PATIENCE_S, JsonLines, Outlet
 from fingervision.live.session import Session
 from fingervision.live.supervisor import Supervisor
-from fingervision.live.terminal import JsonLines
 from fingervision.storage.gaps_csv import GapRow
 
 HAMMERED_S = 0.5

@@ -21,8 +21,7 @@ from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import open_source
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
-from fingervision.live.playback.frame_reader import FrameReader
-from fingervision.live.playback.playback import Playback
+from fingervision.live.playback.playback import FrameReader, Playback
 from fingervision.live.playback.recorded import is_recording, recorded
 from fingervision.rendering import Camera, render, two_fingers
 from tests.live.browser import browser, needs_chromium, opened, says, shown

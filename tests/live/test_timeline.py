@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingervision.live.timeline import Timeline
+from fingervision.live.capture import Timeline
 
 TICK_S = 1e-6
 steps = st.lists(st.tuples(st.floats(-5.0, 5.0), st.floats(0.001, 3.0)), min_size=1, max_size=40)

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from fingervision.measuring.asked_to_stop import asked_to_stop
+from fingervision.measuring.frame_loop import asked_to_stop
 
 
 def test_the_first_is_noted_and_the_second_raised() -> None:

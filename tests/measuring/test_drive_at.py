@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from fingervision.domain.drive import DriveHistory
 from fingervision.measuring.drive_at import drive_at
 from fingervision.measuring.drive_jumps import within_jump
-from fingervision.measuring.unseen_turns import unseen_turns
+from fingervision.measuring.outcome import unseen_turns
 
 # Rounding of a weighted mean of two doubles.
 ROUNDING = 1e-9

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.measuring.clock.encoder_halts import level_halts
+from fingervision.measuring.clock.log_path import level_halts
 
 STEP_MM = 0.03
 

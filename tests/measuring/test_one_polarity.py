@@ -8,7 +8,7 @@ import numpy as np
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
-from fingervision.measuring.one_polarity import VOTERS, one_polarity
+from fingervision.measuring.frame_loop import VOTERS, one_polarity
 from fingervision.rendering import Camera, Light, render, two_fingers
 from fingervision.vision.pipeline import Settings
 

@@ -13,8 +13,7 @@ from calib.plane import Plane
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.measuring.body_poses import BodyTracker
-from fingervision.measuring.flat_picture import NOWHERE_PX, FlatPicture
+from fingervision.measuring.body_poses import NOWHERE_PX, BodyTracker, FlatPicture
 from fingervision.measuring.pose_uncertainty import SharedErrors
 from fingervision.vision.outline_chunks import EdgeView
 from fingervision.vision.rigid_outline import RigidFit, fit_rigid

@@ -10,7 +10,7 @@ import pytest
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.large_rotation import large_path
-from fingervision.models.mesh_outline import PlaneMesh
+from fingervision.models.reference_mesh import PlaneMesh
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (Debian package calculix-ccx) is absent")
 

@@ -4,14 +4,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingervision.domain.gripper import Gripper
-from fingervision.models.compliance_chain import ComplianceChain
 from fingervision.models.grip import Part
 from fingervision.models.hinge_compliance import beam_compliance
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.notch import notches_of
 from fingervision.models.skeleton import skeleton_of
-from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
-from fingervision.models.twist_transform import carried, turned
+from fingervision.models.stiffness_matrix import ComplianceChain, StiffnessMatrixGripper, carried, turned
 
 arms = st.tuples(*[st.floats(-50.0, 50.0)] * 3).map(np.array)
 ROUNDING = 1e-9

@@ -10,8 +10,8 @@ from skfem.helpers import ddot, eye, grad, mul, trace, transpose
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.physics import Physics
+from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.models.static_answer import equilibria
 
 PENALTY_N_MM = 1e6

@@ -9,8 +9,7 @@ import pytest
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.mesh_outline import ElementSize, mesh_outline
-from fingervision.models.reference_mesh import is_reference
+from fingervision.models.reference_mesh import ElementSize, is_reference, mesh_outline
 from fingervision.storage.gripper_toml import read_gripper
 
 MICRO = Path(__file__).parents[2] / "fingervision" / "models" / "micro_gripper.toml"

@@ -11,8 +11,8 @@ from fingervision.domain.gripper import Gripper, SNLine
 from fingervision.models.endurance import endurance
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium, mechanical_advantage
+from fingervision.models.gripper_figures import operating_figures
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.operating_figures import operating_figures
 from fingervision.models.steady_loads import gap_by_weight_mm, midline_by_weight_mm, thermal_displacement_mm
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 

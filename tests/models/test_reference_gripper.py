@@ -11,10 +11,10 @@ from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.large_rotation import first_touch, large_equilibrium, large_path
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.mesh_outline import PlaneMesh
 from fingervision.models.physics import Physics
 from fingervision.models.published_table import COMSOL_MM, INPUT_MM
 from fingervision.models.redrawn import redrawn
+from fingervision.models.reference_mesh import PlaneMesh
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper
 

@@ -10,10 +10,10 @@ from scipy.sparse.linalg import splu
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box
 from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.models.triangulate import LEAST_QUALITY, PlaneMesh, triangulate
 
 AREA = 1e-6

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.tables.encoding import decode
 from fingervision.tables.read import read_measured_table
+from fingervision.tables.text_file import decode
 
 HEADERS = {
     "gbk": (

@@ -1,36 +1,232 @@
 """The report of a diagnosis, composed from its result."""
 
 import time
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+from scipy.stats import binomtest
 
 from fingervision.diagnosis.design.further_evidence import further_evidence
 from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.answer import Answer
 from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
-from fingervision.diagnosis.inference.hypothesis import Point
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import verdict
+from fingervision.diagnosis.input.commands import LEAST_HOLD
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
-from fingervision.diagnosis.report.dead_band_hint import dead_band_hint
-from fingervision.diagnosis.report.encoder_zero import encoder_zero
-from fingervision.diagnosis.report.force_hint import force_hint
 from fingervision.diagnosis.report.left_out_rows import outlier_rows, outliers
 from fingervision.diagnosis.report.open_parameters import draws_of, limited, open_parameters
 from fingervision.diagnosis.report.residual_channels import by_channel, places
 from fingervision.diagnosis.report.sentences import (
+    COVERAGE_FACTOR,
     answer,
     beyond_the_search,
     input_dominates,
     remaining,
     rows_beyond_model,
 )
+from fingervision.domain.effect import Array, History
+from fingervision.domain.model import PhysicalModel
 from fingervision.domain.parameter import Estimate
-from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect
+from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Verdict
 from fingervision.effects import catalogue
+
+# Advise to measure the force, if it would separate explanations that the gap cannot separate.
+
+SEEN = 0.002
+"""Detectable difference of force as a share of the largest force: the repeatability of an ordinary force sensor,
+averaged over a run."""
+
+
+def force_hint(data: Observations, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
+    """Name explanations with equal gap but different force, if the table has no force.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    alternatives : tuple of Explanation
+        Explanations that the data cannot distinguish, best first.
+    """
+    if data.chain.history.force or len(alternatives) < 2 or not isinstance(data.model.base, PhysicalModel):
+        return ()
+    chain = replace(data.chain, history=replace(data.chain.history, force=True))
+    n = chain.history.input_mm.size
+    forces = [chain.stacked(explanation.values)[-n:] for explanation in alternatives]
+    largest = float(np.max(np.abs(forces[0])))
+    apart = [float(np.sqrt(np.mean((force - forces[0]) ** 2))) for force in forces[1:]]
+    told = ["+".join(e.names) for e, by in zip(alternatives[1:], apart, strict=True) if by > SEEN * largest]
+    if not told:
+        return ()
+    least = min(by for by in apart if by > SEEN * largest)
+    return (
+        f"measure force_n too: {'+'.join(alternatives[0].names)} differs from {', '.join(told)} "
+        f"by {least:.2g} N (RMS) of {largest:.2g} N.",
+    )
+
+
+# Sentence on an offset within one step of the encoder, which may be the encoder's own zero.
+
+OFFSETS = ("input_offset", "rest_gap_error", "edge_bias")
+"""Effects that act like a wrong zero of the encoder."""
+
+
+def encoder_zero(answered: Answer) -> tuple[str, ...]:
+    """Sentence on the zero of the encoder, if an offset of less than one step is named, or remains without a name.
+
+    An encoder reads the distance from its own first line, which may lie anywhere within a step. The motion across many
+    lines shows by how much the record is off in all; it does not show whether the encoder or the stage is the cause.
+    """
+    history, best = answered.data.chain.history, answered.found.best
+    step_mm = history.input_step_mm
+    if step_mm == 0.0 or (answered.data.position_map is not None):
+        return ()
+    about = f"one step of the encoder ({1e3 * step_mm:.3g} um)"
+    named = [name for name in OFFSETS if name in best.names]
+    if named:
+        changed_mm = answered.data.chain.stacked({name: best.values[name] for name in named})
+        size_mm = _of_input(answered, changed_mm - answered.data.chain.stacked({}))[0]
+        if abs(size_mm) > step_mm:
+            return ()
+        return (
+            f"{' and '.join(named)}, {1e3 * size_mm:+.2g} um of input, cannot be distinguished from the encoder's own "
+            f"zero, because the offset is smaller than {about}: unless the encoder was referenced, add "
+            f"{1e3 * step_mm / np.sqrt(12.0):.2g} um of input to its standard uncertainty as a property of the stage.",
+        )
+    size_mm, u_mm = _of_input(answered, answered.data.stacked_mm - answered.data.chain.stacked(best.values))
+    if abs(size_mm) > step_mm:
+        return ()
+    found = (
+        f" (here {1e3 * size_mm:+.2g} um, U = {1e3 * COVERAGE_FACTOR * u_mm:.2g} um, on average over the table)"
+        if abs(size_mm) > COVERAGE_FACTOR * u_mm
+        else ""
+    )
+    return (
+        f"an offset of the input below {about} cannot be distinguished from the encoder's own zero, and is not "
+        f"named{found}.",
+    )
+
+
+def _of_input(answered: Answer, change_mm: Array) -> tuple[float, float]:
+    """Offset of the input (mm) that causes a change of the gap, by generalised least squares, and its uncertainty."""
+    problem, chain = answered.found.problem, answered.data.chain
+    reach = 1e-3 * chain.history.input_span_mm
+    low, high = (chain.with_input(chain.history.input_mm + way).stacked({}) for way in (-reach, reach))
+    offsets, whitener = problem.offsets, problem.whitener
+    # The offsets of the runs are the quantity itself here, and are not fitted.
+    metric = offsets.metric((0.0,) * offsets.channels)
+    columns = whitener.columns(np.stack([(high - low) / (2.0 * reach), change_mm], axis=1))[0]
+    slope, change = columns.T
+    bent = slope - offsets.design @ (metric @ (offsets.design.T @ slope))
+    normal = float(bent @ slope)
+    return float(bent @ change) / normal, normal**-0.5
+
+
+# Describe a stage that rests away from its commanded position: the dead band of a servo.
+
+BY_CHANCE = 1e-3
+"""Significance level: probability of the observed sides of rest if they did not depend on the side of approach."""
+SHORT_SHARE = 0.8
+"""Share of holds that must end short of the command: a stage that comes to rest on both sides has no dead band."""
+FEWEST_IDLE = 2
+"""Least number of steps without a response: a single one may be a wrong row."""
+AT_REST = 3.0
+"""Ratio of the distance from the command to the motion within the settled half of a hold, below which the stage is
+still on its way: an exponential approach covers half of its remaining distance in that time."""
+SIGMAS = 4.0
+"""Distance, in standard errors of the means of two holds, above which the stage followed a step."""
+
+
+def dead_band_hint(data: Observations, before_mm: Array, verdict: Verdict) -> tuple[str, ...]:
+    """Sentence that the stage rests within a band about its commands, if the diagnosis found no effect for it.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    before_mm : ndarray of float, shape (channels * n,)
+        Measured minus predicted by the given model.
+    verdict : Verdict
+        Result of the diagnosis.
+    """
+    history = data.chain.history
+    if verdict is not Verdict.UNKNOWN or not history.commanded:
+        return ()
+    gap = data.chain.stacked({})[: history.input_mm.size]
+    words = band_words(history, gap, before_mm[: history.input_mm.size])
+    return () if words is None else (words,)
+
+
+def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> str | None:
+    """Describe where the stage rests after each step of a command; None if there is no dead band.
+
+    A servo with a dead band stops short of its command, on the side from which it came, or does not answer small steps.
+    The mean over all holds is subtracted, because an offset is no dead band.
+
+    Parameters
+    ----------
+    history : History
+        Commands.
+    gap_of_input_mm, residual_mm : ndarray of float, shape (n,)
+        Gap that the model predicts for the commands, and measured minus predicted gap.
+    """
+    slope = float(np.polyfit(history.input_mm, gap_of_input_mm, 1)[0])
+    steps, rests, answers, errors, creeps = _holds(
+        history, residual_mm / (slope or 1.0), gap_of_input_mm / (slope or 1.0)
+    )
+    if steps.size < LEAST_HOLD:
+        return None
+    followed = np.abs(answers) > SIGMAS * errors
+    idle = np.abs(steps[~followed])
+    words = []
+    if idle.size >= FEWEST_IDLE and float(idle.max()) < float(np.min(np.abs(steps[followed]), initial=np.inf)):
+        words.append(f"{idle.size} steps of up to {idle.max():.2g} mm had no response, but all larger steps had")
+    away = (rests - rests.mean())[followed] * np.sign(steps[followed])
+    short = int(np.sum(away < 0.0))
+    chance = binomtest(short, away.size, 0.5, alternative="greater").pvalue if away.size else 1.0
+    band = float(np.median(-away[away < 0.0])) if short else 0.0
+    still = AT_REST * float(np.median(np.abs(creeps[followed]))) if away.size else 0.0
+    if chance < BY_CHANCE and short >= SHORT_SHARE * away.size and band > still:
+        words.append(
+            f"after {short} of {away.size} steps the stage stopped short of the command, on the side from which it "
+            f"came, by {band:.2g} mm (median)"
+        )
+    if not words:
+        return None
+    return f"the stage comes to rest away from its commands, like a servo with a dead band: {'; '.join(words)}."
+
+
+def _holds(history: History, error_mm: Array, path_mm: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Steps of the command with the settled halves of the holds before and after them; each of shape (k,), in mm.
+
+    Returns
+    -------
+    steps, rests, answers, errors, creeps : ndarray of float
+        Height of the step; settled distance from the command after it; change of the settled position; standard error
+        of this change; change of the position from the third to the last quarter of the hold.
+    """
+    out: list[tuple[float, float, float, float, float]] = []
+    for run in history.runs:
+        borders = [run.start, *(run.start + 1 + np.flatnonzero(np.diff(history.input_mm[run]))), run.stop]
+        settled = [slice(begin + (end - begin) // 2, end) for begin, end in pairwise(borders) if end - begin >= 2]
+        for one, other in pairwise(settled):
+            if min(one.stop - one.start, other.stop - other.start) < LEAST_HOLD // 2:
+                continue
+            step = float(history.input_mm[other.start] - history.input_mm[one.start])
+            place = [path_mm[part] + error_mm[part] for part in (one, other)]
+            scatter = float(np.sqrt(sum(np.var(part, ddof=1) / part.size for part in place)))
+            answer = float(place[1].mean() - place[0].mean())
+            middle = place[1].size // 2
+            creep = float(place[1][middle:].mean() - place[1][:middle].mean()) if middle else 0.0
+            out.append((step, float(error_mm[other].mean()), answer, scatter, creep))
+    columns = np.array(out).reshape(-1, 5)
+    return columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3], columns[:, 4]
+
 
 MEMBERS_SEPARATED = 5
 """Number of explanations, best first, that the next run is designed to separate; the computing time grows with its

@@ -1,19 +1,166 @@
 """Clock offset and its uncertainty for the user; refused if the motion does not determine the offset."""
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 
+from fingervision.domain.effect import Array
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.corner_rounding import Spread
 from fingervision.measuring.clock.correlation import LARGEST_RATE
-from fingervision.measuring.clock.joint_fit import Fit, allowance_for_creep
+from fingervision.measuring.clock.joint_fit import PLAY_STEP, Fit, allowance_for_creep, information, prior_of, solve
 from fingervision.measuring.clock.log_path import LogPath
-from fingervision.measuring.clock.motion_model import Motion
-from fingervision.measuring.clock.offset_covariance import inflation
+from fingervision.measuring.clock.motion_model import Alignment, Motion
 from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
 from fingervision.measuring.clock.rivals import RunnerUp
 from fingervision.measuring.clock.set_points import Jumps
-from fingervision.measuring.clock.stamp_resolution import stamp_resolution_s
+
+# Variance of fitted offset, rate and play, due to the frames' noise and the errors of the path between log rows.
+
+
+# Draws of a log's path within its uncertainty, with the correlation that its errors have.
+
+DRAWS = 48
+"""Number of draws; a variance then has a relative standard uncertainty of a fifth, and a standard deviation of a tenth.
+"""
+SEED = 16
+"""Seed of the draws, so that the same log gives the same uncertainty."""
+ALIKE = 0.5
+"""Share of the variance between rows that all bends have in common. If a corner lies anywhere between two rows,
+interpolation cuts it by 0.0725 of its change of step on average, and by 0.105 as RMS, so that the squared mean is half
+of the mean square.
+"""
+
+TURNS_ALIKE = 1.0
+"""Error that all reversals without a halt have in common, relative to the standard uncertainty of an encoder's
+rounding. If a stage slows down within half a step of an encoder line, the smoothed path turns up to half a step too
+far, which is 1.7 times the rounding's standard uncertainty.
+"""
+
+
+def drawn_paths(path: LogPath) -> Iterator[LogPath]:
+    """Draw paths of the stage that are compatible with the log's rows.
+
+    Three kinds of error are drawn. First, smoothing averages the noise over several rows, so that the errors of
+    neighbouring rows are correlated. Second, the rounding error of an encoder is common to all rows of a halt, a
+    reversal, or a stretch of a stroke. Third, a corner may lie anywhere between two rows, and a smooth curve cuts all
+    corners on the same side. Reversals between two lines of an encoder are cut on the same side as well, by the
+    rounding and by the smoothing.
+
+    Parameters
+    ----------
+    path : LogPath
+        Path with its uncertainty.
+
+    Yields
+    ------
+    LogPath
+    """
+    rng = np.random.default_rng(SEED)
+    time_s, parts, shared = path.drive.time_s, path.parts, path.shared
+    stretch = np.searchsorted(shared.begin_s, time_s, side="right")
+    for _ in range(DRAWS):
+        rows_mm = parts.rows_mm * _averaged(rng.normal(size=parts.rows_mm.size), parts.span)
+        common = np.sqrt(ALIKE) * rng.normal()
+        own = np.sqrt(1.0 - ALIKE) * rng.normal(size=int(parts.interval.max()) + 1)
+        input_mm = path.drive.input_mm + np.interp(time_s, path.rows.time_s, rows_mm)
+        input_mm = input_mm + (common + own[parts.interval]) * parts.between_mm
+        errors_mm = shared.u_mm * rng.normal(size=shared.u_mm.size)
+        errors_mm += TURNS_ALIKE * shared.u_mm * rng.normal() * shared.outward
+        input_mm = input_mm + errors_mm[stretch]
+        yield replace(path, drive=replace(path.drive, input_mm=input_mm))
+
+
+def _averaged(white: Array, span: Array) -> Array:
+    """Mean of white noise over `span` rows about each row, scaled to a variance of 1."""
+    sums = np.append(0.0, np.cumsum(white))
+    rows = np.arange(white.size)
+    half = 0.5 * (span - 1.0)
+    low = np.clip(np.round(rows - half), 0, rows).astype(int)
+    high = np.clip(np.round(rows + half), rows, white.size - 1).astype(int) + 1
+    return np.asarray((sums[high] - sums[low]) / np.sqrt(high - low))
+
+
+CLUSTERS = 24
+"""Number of stretches of the recording whose contributions are regarded as independent: the uncertainty of their
+scatter is then a fifth, and a stretch of an ordinary recording contains one or two moves.
+"""
+
+
+def inflation(motion: Motion, at: Alignment) -> Array:
+    """Ratio of the variance of offset, rate and play to the variance from the fit's own weights; shape (3,).
+
+    The fit's weights treat the log's errors as independent from frame to frame. The true effect of the log's errors is
+    computed by means of other paths that the log permits (`log_errors`): another path changes the prediction, and the
+    fit passes a share of the change on to its parameters (sandwich estimator: White 1980, doi:10.2307/1912934). If the
+    contributions of stretches of the recording to the parameters scatter by more than the log's errors explain, the
+    scatter is used, because the gap then has causes of motion that the model lacks.
+    """
+    solved = solve(motion, at)
+    free_play = at.play_mm > 10.0 * PLAY_STEP
+    normal, jacobian = information(motion, at, solved, free_play=free_play)
+    variance = solved.squares / max(solved.degrees, 1)
+    frames = solved.white.size - solved.weights.size + 2
+    jacobian = jacobian[:frames] / variance
+    prior = prior_of(jacobian.shape[1])
+    of_frames = motion.weighed(jacobian)
+    expected = motion.noise.variance_mm2 * of_frames.T @ of_frames + prior
+    expected_mm = motion.design(at) @ solved.weights
+    for path in drawn_paths(motion.path):
+        changed_mm = replace(motion, path=path).design(at) @ solved.weights - expected_mm
+        pull = jacobian.T @ motion.whitened(changed_mm)
+        expected += np.outer(pull, pull) / DRAWS
+    clusters = min(CLUSTERS, frames // 8)
+    parts = np.array_split(jacobian * solved.white[:frames, None], clusters)
+    pulls = np.stack([part.sum(axis=0) for part in parts])
+    seen = pulls.T @ pulls * (clusters / max(clusters - pulls.shape[1], 1)) + prior
+    bread = np.linalg.pinv(normal)
+    by_fit = np.maximum(np.diag(bread), 1e-300)
+    ratio = np.maximum(np.diag(bread @ expected @ bread), np.diag(bread @ seen @ bread)) / by_fit
+    return ratio[[0, 1, 3]] if free_play else np.array([ratio[0], ratio[1], max(ratio[0], ratio[1])])
+
+
+# Resolution of a log's time stamps, recognised from the times between its rows.
+
+LEAST_S = 1e-4
+"""Resolution (s) below which rounded times do not matter: a tenth of the offset's least standard uncertainty."""
+MOST_KINDS = 12
+"""Most different times between rows of a log with a regular cycle; more indicate times that are not rounded."""
+SAME = 0.02
+"""Deviation from a multiple of the resolution, as a share of it, that the digits of the file explain."""
+MISSING_ROWS = 0.7
+"""Share of the shortest time between rows, if it is the resolution itself, above which the longer ones come from
+missing rows, not from rounding."""
+
+
+def stamp_resolution_s(time_s: Array) -> float:
+    """Resolution of the times (s), if they are visibly rounded: a cycle of 50 ms on a clock of 15.6 ms; else 0.
+
+    Examples
+    --------
+    >>> round(stamp_resolution_s(np.floor(np.arange(0.0, 9.0, 0.05) / 0.0156) * 0.0156), 6)
+    0.0156
+    >>> missing_row = np.array([0.0, 0.1, 0.2, 0.4, 0.5, 0.6, 0.7])
+    >>> stamp_resolution_s(np.arange(0.0, 9.0, 0.05)), stamp_resolution_s(missing_row)
+    (0.0, 0.0)
+    """
+    steps = np.sort(np.diff(time_s))
+    if steps.size < 2 or steps[0] <= 0.0:
+        return 0.0
+    jumps = np.flatnonzero(np.diff(steps) > 0.5 * LEAST_S)
+    if not 1 <= jumps.size < MOST_KINDS:
+        return 0.0
+    kinds = np.array([np.median(part) for part in np.split(steps, jumps + 1)])
+    resolution = float(np.min(np.diff(kinds)))
+    multiples = kinds / resolution
+    if resolution < LEAST_S or np.any(np.abs(multiples - np.round(multiples)) > SAME * np.sqrt(multiples)):
+        return 0.0
+    shortest = (jumps[0] + 1) / steps.size
+    is_missing_rows = round(multiples[0]) == 1 and (kinds.size > 2 or shortest > MISSING_ROWS)
+    return 0.0 if is_missing_rows else resolution
+
 
 FOLLOWED = 0.95
 """Share of the gap's variance explained by the log below which a note says that something else also moves the gap."""

@@ -1,23 +1,198 @@
 """Run a recipe on a test bed: plan it, check it, execute it, record it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.recipe import Recipe
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.samples_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.manual import manual_control
+from fingervision.testbed.run import step_executor
 from fingervision.testbed.run.controls import Controls
+from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 from fingervision.testbed.run.plan import Plan, plan
 from fingervision.testbed.run.plan_feasibility import check_moves
-from fingervision.testbed.run.plan_runner import Progress, Runner
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.run_record import Counts, OnRow, RunRecord
 from fingervision.testbed.run.safety_monitor import Say, Watch
 from fingervision.testbed.run.synchronised_acquisition import Sight
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
+
+# Execute a plan segment by segment; on any failure the motor is stopped first.
+
+
+# Number of frames that synchronise the clocks before anything moves; the last frames must show the fingers.
+FIRST_FRAMES = 75
+# A recorded run begins at rest.
+REST_FRAMES = 5
+# A stage that takes less than this share of the expected time is faster than commanded, because ramps only make a
+# motion longer.
+LEAST_SHARE = 0.5
+
+Progress = Callable[[float, float], None]
+
+
+@dataclass(slots=True)
+class Runner:
+    """Executes a plan, starting where the recorded rows end.
+
+    A simulated test bed, which can replay, executes the whole plan again; rows that are already in the folder are not
+    rendered, measured or written a second time. On a real test bed the interrupted motion segment is repeated, as a new
+    run.
+
+    Parameters
+    ----------
+    plan : Plan
+        The plan.
+    watch : Watch
+        Monitor through which the test bed is operated.
+    on_progress : callable
+        Called with the elapsed part of the expected duration and the whole expected duration (s).
+    """
+
+    plan: Plan
+    watch: Watch
+    on_progress: Progress
+    _slots: list[dict[str, float]] = field(default_factory=list)
+
+    def follow(self, last: SampleRow) -> None:
+        """Continue after the last row of an earlier run; must be called first."""
+        if self.watch.bed.replays:
+            self.watch.record.follow_replayed(last)
+        else:
+            self.watch.record.follow(last, self.watch.bed.clock.now_s())
+
+    def execute(self) -> Counts:
+        """Execute the plan to its end.
+
+        Raises
+        ------
+        StoppedError
+            The user ended the run.
+        DeviceError, LimitError, StateError
+            A limit was reached, an instrument failed, or no fingers are in view; the motor is then at rest.
+        """
+        watch, actuator, replays = self.watch, self.watch.bed.actuator, self.watch.bed.replays
+        try:
+            # The motor of a simulation moves only while this thread lets time pass.
+            with watch.controls.listening((lambda: None) if replays else actuator.stop):
+                self._execute()
+        except BaseException:
+            actuator.stop()
+            if not replays:
+                # No later readings will improve the last positions: write their rows now. A test bed that replays
+                # records these frames again.
+                with suppress(FingervisionError):
+                    watch.record.write(at_once=True)
+            raise
+        return watch.record.counts
+
+    def found(self) -> dict[str, Any]:
+        """Results of the run for run.json."""
+        counts = self.watch.record.counts
+        return {
+            "frames": counts.recorded,
+            "frames_with_gap": counts.with_gap,
+            "frames_lost": counts.lost,
+            "clocks": self.watch.sight.clocks(),
+            "reference_slots": self._slots,
+        }
+
+    def _execute(self) -> None:
+        watch, record = self.watch, self.watch.record
+        if not watch.bed.replays:
+            # The position of a real stage is unknown at the start: home the stage first, but only with the fingers in
+            # view.
+            watch.find_fingers()
+            watch.say(f"homed: {manual_control.home(watch.bed):.3f} mm")
+        for _ in range(FIRST_FRAMES - 1):
+            watch.look()
+        watch.find_fingers()
+        first = self._first_leg()
+        total_s, done_s = sum(self.plan.seconds), sum(self.plan.seconds[:first])
+        foreseen_s = moved_s = 0.0
+        record.event("began", f"The plan has {len(self.plan.legs)} motion segments.")
+        self._rest(first)
+        for number, (leg, seconds) in enumerate(zip(self.plan.legs, self.plan.seconds, strict=True)):
+            if number < first:
+                continue
+            watch.leg = leg
+            words = f"Step {leg.step}: {leg.words}."
+            record.event("leg", words, leg=number, step=leg.step, frame=record.counts.recorded)
+            began_s, from_mm = watch.bed.clock.now_s(), watch.sight.position.newest
+            self._do(leg, number)
+            if isinstance(leg.act, Go) and leg.act.frames is None:
+                moved_s += watch.bed.clock.now_s() - began_s
+                foreseen_s += abs(leg.act.to_mm - from_mm) / leg.act.speed_mm_s
+            done_s += seconds
+            self.on_progress(done_s, total_s)
+        record.write(at_once=True)
+        if moved_s < LEAST_SHARE * foreseen_s:
+            self._warn_of_speed(moved_s, foreseen_s)
+        record.event(
+            "clocks", "The instruments' clocks were compared with the test bed's clock.", **watch.sight.clocks()
+        )
+        record.event("ended", f"{record.counts.recorded} frames were recorded.")
+
+    def _warn_of_speed(self, moved_s: float, foreseen_s: float) -> None:
+        words = (
+            f"warning: the recorded motions took {moved_s:.3g} s, but should take {foreseen_s:.3g} s at the speeds of "
+            "the recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract "
+            "tests; `fingervision bed check` prints their command line."
+        )
+        self.watch.say(words)
+        self.watch.record.event("too_fast", words)
+
+    def _first_leg(self) -> int:
+        """Index of the first segment to execute: 0 with replay; without it, the segment that was interrupted."""
+        folder = self.watch.record.folder
+        if self.watch.bed.replays or not folder.resumed:
+            return 0
+        self.watch.record.go_on((datetime.now(UTC) - folder.began_at).total_seconds())
+        legs = [event for event in folder.events_done if event["event"] == "leg"]
+        return int(legs[-1]["leg"]) if legs else 0
+
+    def _do(self, leg: Leg, number: int) -> None:
+        watch = self.watch
+        match leg.act:
+            case Go():
+                step_executor.go(watch, leg.act)
+            case Stand():
+                step_executor.stand(watch, leg.act)
+            case Swing():
+                step_executor.swing(watch, leg.act)
+            case Close():
+                step_executor.close(watch, leg.act)
+            case Slot():
+                self._slots.append(step_executor.slot(watch, leg.act))
+            case Rezero():
+                step_executor.rezero(watch)
+                self._new_run(number, turned=watch.record.turned, rezeroed=True)
+            case Turn():
+                watch.bed.operator.turn_part()
+                self._new_run(number, turned=not watch.record.turned)
+            case Shift():
+                watch.bed.operator.shift_picture()
+                self._new_run(number, turned=watch.record.turned)
+
+    def _new_run(self, leg: int, *, turned: bool, rezeroed: bool = False) -> None:
+        self.watch.record.new_run(turned=turned, rezeroed=rezeroed)
+        self._rest(leg + 1)
+
+    def _rest(self, leg: int) -> None:
+        """Record the pause at the start of a run, if the following segment is recorded continuously."""
+        following = self.plan.legs[leg].act if leg < len(self.plan.legs) else None
+        moves_on = isinstance(following, Swing | Close)
+        if moves_on or (isinstance(following, Go | Stand) and following.frames is None):
+            for _ in range(REST_FRAMES):
+                self.watch.see(record=True)
 
 
 @dataclass(frozen=True, slots=True)
