@@ -16,7 +16,7 @@ light, leave these places where they are.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot
+from math import floor, hypot
 from typing import Any
 
 import cv2
@@ -207,15 +207,18 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     if along_px < tip_px:
         upright = upright[::-1]
         along_px, tip_px = upright.shape[0] - 1 - along_px, upright.shape[0] - 1 - tip_px
-    first, tip = round(along_px), max(0, round(tip_px) - BAND_PX)
-    count = max(0, min(BELOW, (upright.shape[0] - first) // BAND_PX))
+    first, tip = floor(along_px), max(0, round(tip_px) - BAND_PX)
+    count = max(0, min(BELOW, (upright.shape[0] - 1 - first) // BAND_PX))
     if first < 0 or count == 0:
         return _Look(np.empty((2, 0)), np.empty(0))
-    rows = to_grey(np.ascontiguousarray(upright[first : first + count * BAND_PX]))
+    rows = to_grey(np.ascontiguousarray(upright[first : first + count * BAND_PX + 1])).astype(np.float32)
+    # The bands begin at the measuring height itself and not at a whole row: where the outline is curved, at a rounded
+    # tip, a band half a row higher shows it at another place.
+    rows = rows[:-1] + np.float32(along_px - first) * np.diff(rows, axis=0)
     size = (rows.shape[1], count)
-    below = np.asarray(cv2.resize(rows.astype(np.float32), size, interpolation=cv2.INTER_AREA), dtype=np.float64)
+    below = np.asarray(cv2.resize(rows, size, interpolation=cv2.INTER_AREA), dtype=np.float64)
     # The edge is measured at the measuring height, and the first band is centred half a band towards the root.
-    inner_px = across_px + end.slope * (first - along_px + 0.5 * (BAND_PX - 1))
+    inner_px = across_px + end.slope * 0.5 * (BAND_PX - 1)
     level = float(np.interp(inner_px, np.arange(below.shape[1]), below[0]))
     inwards = 1 if is_left else -1
     rises = (inwards > 0) is seen.gap.light_gap
@@ -223,7 +226,7 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     outside = opposite[inwards * (inner_px - opposite) > 0.0]
     outer_px = float(outside.max() if is_left else outside.min()) if outside.size else float("nan")
     sides = ((rises, inner_px), (not rises, outer_px))
-    sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides]) - inner_px
+    sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides]) - across_px
     ends = sorted((inner_px, inner_px - BAND_PX * inwards if np.isnan(outer_px) else outer_px))
     bands = min(BEYOND, tip // BAND_PX)
     if not bands:

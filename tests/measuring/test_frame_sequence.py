@@ -70,6 +70,20 @@ def test_true_motions_are_never_refused(motion: str) -> None:
     assert refused(MOTIONS[motion], lambda k, levels: None) == []
 
 
+@pytest.mark.parametrize("radius_px", [8.0, 14.0])
+def test_rounded_tips_that_stand_between_rows_are_not_torn(radius_px: float) -> None:
+    # The stage turns, and the measuring height of one frame is rounded to another row than that of its neighbours.
+    results = []
+    for k in range(COUNT):
+        gap_px, tip_px = 70.0 + 2.0 * (k == 6), 70.3 + 0.3 * (k == 6)
+        scene = two_fingers(
+            gap_px, below_tip_px=6.0, width_px=60.0, radius_px=radius_px, tip_at_px=tip_px, frame=SIZE_PX
+        )
+        frame = Frame(render(scene, Camera(noise_grey=1.0), np.random.default_rng(k)), k, k / 25)
+        results.append((frame, measure_frame(frame, SETTINGS)))
+    assert all(isinstance(outcome, GapMeasurement) for _, outcome in in_sequence(results))
+
+
 def test_a_push_at_the_camera_a_flash_and_defocus_change_no_finger() -> None:
     def change(k: int, levels: np.ndarray) -> None:
         if k in (4, 5):
