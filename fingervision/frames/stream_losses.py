@@ -98,7 +98,9 @@ class ReferenceChain:
         """Whether a loss may be undetectable, because after a reset or a full cycle the numbers are the same."""
         if missing >= modulus:
             return True
-        is_due = self._key_every is None or self._since_key + 1 + missing >= self._key_every
+        # A camera that halves its rate in the dark leaves the same gap in the times at any picture; only where a key
+        # picture is due by the distance of those before, may it be one that is missing.
+        is_due = self._key_every is not None and self._since_key + 1 + missing >= self._key_every
         return missing > before.number and is_due
 
     def _missing(self, tick: int | None) -> int:
