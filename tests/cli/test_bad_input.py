@@ -204,7 +204,7 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     (diagnose("below.csv"), 1, "-0.01 in data row 8"),
     (diagnose("short.csv"), 1, "Line 3"),
     (diagnose("text.csv"), 1, "two numbers"),
-    (diagnose("json.csv"), 1, "two numbers"),
+    (diagnose("json.csv"), 1, "JSON"),
     (diagnose("binary.csv"), 1, "zero bytes"),
     (diagnose("grouped.csv"), 1, "0_0"),
     (diagnose("arabic.csv"), 1, "\u0661"),

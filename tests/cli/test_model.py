@@ -225,7 +225,7 @@ def test_a_part_is_gripped(tmp_path: Path) -> None:
     ("options", "sentence"),
     [
         (("--object-mm", "-1"), "--object-mm must be the positive width"),
-        (("--object-mm", "nan"), "--object-mm must be the positive width"),
+        (("--object-mm", "nan"), "--object-mm must be a number"),
         (("--object-mm", "3000"), "is it in micrometres"),
         (("--object-mm", "3", "--object-n-mm", "0"), "--object-n-mm must be a positive stiffness"),
         (("--object-n-mm", "5"), "--object-n-mm, the stiffness of the part, needs its width too: add --object-mm"),
