@@ -140,7 +140,7 @@ def playback(recordings: dict[str, Path], tmp_path: Path) -> Playback:
 def test_wrong_wishes_are_refused_in_a_sentence(playback: Playback) -> None:
     refused = [
         {"do": "seek"},
-        {"do": "seek", "frame": "3"},
+        {"do": "seek", "frame": "three"},
         {"do": "seek", "frame": 1.5},
         {"do": "seek", "frame": 10**30},
         {"do": "step", "by": None},
