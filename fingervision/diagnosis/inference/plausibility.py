@@ -68,7 +68,8 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
 
     A mistaken column is a hypothesis beside the effects: the gap follows the model with a gain of -1, of a ratio of
     units, or of any size that no effect has, and no effect acts. It is asked about if it leaves less than half of the
-    variance and if its odds against the most probable explanation by effects are 20 to 1 or more.
+    variance and if its odds against the most probable explanation by effects are 20 to 1 or more. A gain of 0 is a gap
+    that has nothing to do with the input.
 
     Parameters
     ----------
@@ -81,22 +82,28 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
         effect has; a delay, for example, can mirror a motion.
     """
     units = [each for unit in UNITS for each in (unit, 1.0 / unit)]
-    gains = [(gain, 0) for gain in (-1.0, *units, *(-each for each in units))]
+    gains = [(gain, 0) for gain in (0.0, -1.0, *units, *(-each for each in units))]
     free = _free_gain(data, problem)
     if free is not None and (free < 0.0 or not 1.0 / LARGEST_RATIO < free < LARGEST_RATIO):
         gains.append((free, 1))
     searched = any(rival.names for rival in rivals)
     able = [each for each in gains if (searched or each[0] > 0.0) and _leaves_less(data, problem, each[0])]
-    tried = [(_cost(data, problem, *each), each[0]) for each in able]
+    # Three kinds of mistake are equally likely beforehand: a column of something else, a sign, and one of many ratios.
+    price = {gain: 2.0 * float(np.log(3.0 * (1 if gain in (0.0, -1.0) else len(gains)))) for gain, _ in gains}
+    tried = [(_cost(data, problem, *each) + price[each[0]], each[0]) for each in able]
     if not tried:
         return None
-    price = 2.0 * float(np.log(len(gains)))
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     physical = min(rival.bic(rows) + choices(problem, rival) for rival in rivals)
     cost, gain = min(tried)
-    if cost + price > physical - STRONG:
+    if cost > physical - STRONG:
         return None
-    if gain < 0.0:
+    if gain == 0.0:
+        words = (
+            "the measured gap does not follow the input at all: check which columns hold the input and the gap, and "
+            "whether they belong to the same measurement."
+        )
+    elif gain < 0.0:
         far = "" if 1.0 / LARGEST_RATIO < -gain < LARGEST_RATIO else f", and {-gain:.3g} times as far"
         words = (
             f"the measured gap falls where the model predicts a rise{far}: input_mm or the gap is mirrored (its sign "
@@ -150,12 +157,12 @@ def _cost(data: Observations, problem: Problem, gain: float, fitted: int) -> flo
 
 
 def _leaves_less(data: Observations, problem: Problem, gain: float) -> bool:
-    """Whether a gain leaves less than half of the variance of the disagreement, and of the gap itself."""
+    """Whether a gain leaves less than half of the variance of the disagreement and, unless it is 0, of the gap."""
     n = data.chain.history.input_mm.size
     kept = ~problem.whitener.aside[:n]
     gap, moved = data.table.gap_mm[kept], _moved(data)[:n][kept]
     left, disagreement, all_of_it = (float(np.var(each)) for each in (gap - gain * moved, gap - moved, gap))
-    return left < HALF * min(disagreement, all_of_it)
+    return left < HALF * (min(disagreement, all_of_it) if gain else disagreement)
 
 
 def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Finding | None:
