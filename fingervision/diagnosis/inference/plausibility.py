@@ -20,8 +20,8 @@ LARGEST_RATIO = 3.0
 """Largest ratio of measured to predicted motion (or its inverse) that effects may cause: the catalogue's scale, lever
 and input errors together reach 1.3 * 1.3 * 1.2 = 2.03."""
 HALF = 0.5
-"""Largest share of the variance, both of the disagreement and of the gap itself, that a mistake in the table may leave,
-if it is the mistake and not an effect that explains the table."""
+"""Largest share of the variance of the disagreement and (unless the gap does not follow the input at all) of the gap
+itself that a mistake in the table may leave, if it is the mistake and not an effect that explains the table."""
 SWAPPED_SIGMAS = 6.0
 """Standard errors by which the gap must lead at reversals before exchanged directions are suspected: the residual of
 any other effect leads by far less."""
