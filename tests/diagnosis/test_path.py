@@ -83,7 +83,9 @@ def test_columns_that_cannot_be_right_get_a_sentence_and_no_name(tmp_path: Path,
     report = moved(tmp_path, u, gap + 0.001 * rng.standard_normal(400)).report
     assert report.verdict is Verdict.UNKNOWN
     assert report.effects == ()
-    assert {"mirrored": "mirrored", "micrometres": "units", "unrelated": ""}[wrong] in (report.unknown or "")
+    assert {"mirrored": "mirrored", "micrometres": "units", "unrelated": "does not follow"}[wrong] in (
+        report.unknown or ""
+    )
 
 
 @pytest.mark.slow
