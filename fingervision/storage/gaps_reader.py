@@ -47,7 +47,10 @@ class GapsReader:
                 status = os.fstat(file.fileno())
                 identity = status.st_dev, status.st_ino
                 file.seek(self._place - len(self._last_line))
-                is_same = identity == self._file and file.read(len(self._last_line)) == self._last_line
+                # Until its header is written, a file has nothing that could have been read of it.
+                is_same = (
+                    self._place > 0 and identity == self._file and file.read(len(self._last_line)) == self._last_line
+                )
                 if not is_same:
                     file.seek(0)
                 text = file.read()

@@ -108,7 +108,16 @@ def free_port() -> int:
 
 
 def is_listened_at(port: int) -> bool:
-    """Whether a server listens on the port; no connection is made, because ffmpeg only serves its first client."""
+    """Whether a server listens on the port, or serves a client there.
+
+    No connection is made, because ffmpeg only serves its first client. A live view that waits for its camera may be
+    that client as soon as ffmpeg listens, and ffmpeg then listens no more.
+    """
+    connections = Path("/proc/net/tcp")
+    if connections.is_file():
+        rows = [line.split() for line in connections.read_text(encoding="ascii").splitlines()[1:]]
+        # Own address and state of each connection, in hexadecimal digits; 01 is established, 0A is listening.
+        return any(int(row[1].split(":")[1], 16) == port and row[3] in ("01", "0A") for row in rows)
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -119,3 +119,15 @@ def test_a_growing_table_that_is_replaced_is_read_anew(tmp_path: Path) -> None:
         with pytest.raises(DataError, match="6 cells"):
             reader.refresh()
         assert len(reader.rows) == 3
+
+
+@pytest.mark.parametrize("begun", ["", "frame,time_s,sta"])
+def test_a_table_that_was_met_before_its_header_is_read_once_it_is_there(tmp_path: Path, begun: str) -> None:
+    path = tmp_path / "gaps.csv"
+    path.write_text(begun)
+    reader = GapsReader(path)
+    assert not reader.refresh()
+    with path.open("r+") as table:  # the same file, as the program goes on that writes it
+        table.write("frame,time_s,status,gap_mm\n0,0.0,ok,0.5\n1,0.04,ok,0.6\n")
+    assert not reader.refresh()
+    assert [row.gap_mm for row in reader.rows] == [0.5, 0.6]
