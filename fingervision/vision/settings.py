@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from calib.camera_response import CameraResponse, standard_response
+from fingervision.domain.camera import ASSUMED_CAMERA, CameraModel
 from fingervision.domain.direction import Direction
 from fingervision.domain.region import Region
 
@@ -32,6 +33,8 @@ class Settings:
         Whether the fingers are darker than the background; None determines it in every frame.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
+    camera : CameraModel
+        What is known about the camera beside its response: point spread, noise, sharpening, lag, defect pixels.
     """
 
     below_tip_px: float
@@ -42,3 +45,4 @@ class Settings:
     bits: int | None = None
     fingers_are_dark: bool | None = None
     is_outline: bool = False
+    camera: CameraModel = ASSUMED_CAMERA

@@ -1,0 +1,193 @@
+"""The camera that took a recording, as far as it is known: what lies between the light and the stored levels.
+
+Each property has its standard uncertainty and its origin: stated by the user or by a tag of the file, calibrated with
+pictures of its own, learnt from the recording, or assumed.
+"""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from calib.camera_response import CameraResponse, standard_response
+
+
+class Origin(StrEnum):
+    """Where a property of the camera is known from."""
+
+    STATED = "stated"
+    CALIBRATED = "calibrated"
+    LEARNT = "learnt"
+    ASSUMED = "assumed"
+
+
+@dataclass(frozen=True, slots=True)
+class CameraQuantity:
+    """One number of the camera.
+
+    Parameters
+    ----------
+    value : float
+        The number; its unit is that of the property.
+    u : float or None
+        Standard uncertainty; None if it is not known.
+    origin : Origin
+        Where the number is known from.
+    """
+
+    value: float
+    u: float | None = None
+    origin: Origin = Origin.ASSUMED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OtherResponse:
+    """Another possible response, which contributes its squared displacement of an edge to the variance.
+
+    Parameters
+    ----------
+    response : CameraResponse
+        The other response.
+    weight : float
+        Factor of the squared displacement: the probability of a response that excludes the others; 1/3 if the true
+        response may be anything between the two (a rectangular distribution, JCGM 100:2008, 4.3.7).
+    """
+
+    response: CameraResponse
+    weight: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResponseEstimate:
+    """The response by which stored levels are converted to light, and the responses that are possible beside it.
+
+    The variance of an edge's position due to the response is the sum of weight times squared displacement over the
+    other responses.
+
+    Parameters
+    ----------
+    curve : CameraResponse
+        The response that is used.
+    others : tuple of OtherResponse
+        Other possible responses; empty if the response is known.
+    origin : Origin
+        Where the response is known from.
+    words : str
+        Sentence on what could not be learnt, with what to do; empty if there is nothing to say.
+    """
+
+    curve: CameraResponse
+    others: tuple[OtherResponse, ...] = ()
+    origin: Origin = Origin.ASSUMED
+    words: str = ""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the response is stated or calibrated, so that no other one is possible."""
+        return not self.others
+
+
+@dataclass(frozen=True, slots=True)
+class PointSpread:
+    """Spread of a point of light: a Gaussian, a disc of twice its sigma and a Gaussian of 1.8 times its sigma.
+
+    Parameters
+    ----------
+    sigma_px : CameraQuantity
+        Standard deviation of the Gaussian, without the width of the pixel (pixels).
+    disc_share, wing_share : float
+        Share of the light in the disc (defocus) and in the wider Gaussian; they may be slightly negative.
+    skew : float
+        Third moment (coma) relative to the cube of sigma, positive towards larger coordinates in the picture.
+    """
+
+    sigma_px: CameraQuantity
+    disc_share: float = 0.0
+    wing_share: float = 0.0
+    skew: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseLaw:
+    """Variance of the light of one pixel over its mean light, both as shares of full scale (photon transfer).
+
+    Parameters
+    ----------
+    dark_variance : CameraQuantity
+        Variance without light.
+    variance_per_light : CameraQuantity
+        Increase of the variance per light.
+    correlation : float
+        Correlation of neighbouring pixels; 0 for a raw picture.
+    """
+
+    dark_variance: CameraQuantity
+    variance_per_light: CameraQuantity
+    correlation: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class DefectPixels:
+    """A dead or hot pixel, or a row or column of them, which stands still while the fingers move.
+
+    Parameters
+    ----------
+    x_px, y_px : int or None
+        Column and row; None if the defect extends along all of them.
+    excess : float
+        Excess of the level over that of the neighbours, as a share of full scale.
+    """
+
+    x_px: int | None
+    y_px: int | None
+    excess: float
+
+
+# Response assumed for a camera that does not state its response, and the other standard response; the true response is
+# taken to lie between the two.
+ASSUMED_RESPONSE = ResponseEstimate(
+    standard_response("linear"), (OtherResponse(standard_response("srgb"), 1.0 / 3.0),), Origin.ASSUMED
+)
+# Error of the model of an edge as a share of its contrast, if the recording does not show it: that of the better
+# lenses (a prior from rendered and real recordings without compression).
+DISCREPANCY = CameraQuantity(0.003)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraModel:
+    """Everything that is known about a camera; the default is a camera about which nothing is known.
+
+    Parameters
+    ----------
+    response : ResponseEstimate
+        Conversion of stored levels to light.
+    point_spread : PointSpread or None
+        Spread of a point of light; None if no straight flank has shown it.
+    noise : NoiseLaw or None
+        Noise over light; None if it is not known.
+    sharpening : CameraQuantity
+        Overshoot of an edge beyond its plateaus, as a share of its contrast.
+    lag : CameraQuantity
+        Displacement of an edge by a temporal filter, in frames: pixels of lag per pixel of motion from frame to frame.
+    defects : tuple of DefectPixels
+        Pixels that do not follow the light.
+    defects_origin : Origin
+        Whether the defects were looked for.
+    discrepancy : CameraQuantity
+        Standard deviation of an edge's profile about the best model, as a share of the contrast.
+    """
+
+    response: ResponseEstimate = ASSUMED_RESPONSE
+    point_spread: PointSpread | None = None
+    noise: NoiseLaw | None = None
+    sharpening: CameraQuantity = CameraQuantity(0.0)
+    lag: CameraQuantity = CameraQuantity(0.0)
+    defects: tuple[DefectPixels, ...] = field(default=())
+    defects_origin: Origin = Origin.ASSUMED
+    discrepancy: CameraQuantity = DISCREPANCY
+
+
+ASSUMED_CAMERA = CameraModel()
+
+
+def stated_camera(response: CameraResponse) -> CameraModel:
+    """Camera of a known response, about which nothing else is known."""
+    return CameraModel(ResponseEstimate(response, (), Origin.STATED))
