@@ -13,7 +13,6 @@ from fingervision.diagnosis.inference.plausibility import mistaken_column, mixed
 from fingervision.diagnosis.inference.refitted_search import Refitted, refitted_search
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
-from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.report.diagnosis_report import diagnosis_report
 from fingervision.diagnosis.report.positioning_of_data import positioning_of_data
 from fingervision.diagnosis.report.positioning_report import PositioningReport
@@ -22,6 +21,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import DiagnosisReport
 from fingervision.effects.trial import EffectAnswerError
 from fingervision.models.corrected import CorrectedModel
+from fingervision.motion.repeated_targets import NoRepeatedTargets
 
 MOST_DRIVES = 2
 """Number of times that a dynamic model is recomputed with the effects found."""

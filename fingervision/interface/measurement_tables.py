@@ -9,8 +9,8 @@ from fingervision.domain.errors import MissingLibraryError, UsageError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.status import Status
 from fingervision.interface.column_tables import measured_from_columns
-from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.in_memory import MeasuredInMemory
+from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.storage.assumed_response import response_note
 from fingervision.storage.gaps_csv import COLUMNS, FORCE_PLACES, MM_PLACES, TIME_PLACES, GapRow
 from fingervision.storage.line_file import cell

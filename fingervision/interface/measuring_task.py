@@ -164,7 +164,7 @@ def _gauges(gauges: Any) -> tuple[Gauge, ...]:
 
 def _drive(drive: Any, columns: Path | None) -> tuple[DriveHistory, int]:
     """Read the log; a log with rows only on change gets rows in its rests, whose number is returned, too."""
-    from fingervision.stage_record.on_change import with_rests  # needed with a drive only
+    from fingervision.motion.log_on_change import with_rests  # needed with a drive only
 
     return with_rests(_log(drive, columns))
 

@@ -9,7 +9,7 @@ from fingervision.live.bed.bench import Bench
 from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.live_gauges import put_live_gauges
 from fingervision.live.session import Session
-from fingervision.measuring.drive_at import drive_at
+from fingervision.motion.drive_at import drive_at
 from fingervision.storage.out_folder import make_out_folder
 from fingervision.tables.read import read_drive
 from fingervision.testbed.run.run_metadata import SIMULATION, write_expected

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import OutputError
 from fingervision.domain.status import Status
-from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.series import GapSeries
+from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.storage.durable import replaced
 
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130

@@ -9,13 +9,13 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import FrameSource
 from fingervision.gauges.recording import GaugeRecording
-from fingervision.measuring.clock.clock_offset import ClockOffset
-from fingervision.measuring.drive_at import drive_at
 from fingervision.measuring.frame_loop import Prepared, Progress, measure_frames, prepared
 from fingervision.measuring.outcome import Clock, clock_for, summary_of, undriven
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.task import Task, task_for_frames
+from fingervision.motion.clock.clock_offset import ClockOffset
+from fingervision.motion.drive_at import drive_at
 from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
 from fingervision.storage.gauges_csv import GaugeRow, GaugeRows
 

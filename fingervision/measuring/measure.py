@@ -11,8 +11,7 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import FrameSource
 from fingervision.gauges.recording import GaugeRecording
-from fingervision.measuring.clock.clock_offset import ClockOffset
-from fingervision.measuring.clock.common_clock import join_drive
+from fingervision.measuring.drive_clock import join_drive
 from fingervision.measuring.frame_loop import Progress, measure_frames, prepared
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.outcome import clock_drawn, clock_for, summary_of, undriven
@@ -22,6 +21,7 @@ from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.task import Task, task_for_frames
+from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.storage.summary_json import write_summary
 

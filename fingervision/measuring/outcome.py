@@ -10,17 +10,17 @@ import numpy as np
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
-from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
-from fingervision.measuring.clock.common_clock import clock_of, refusal, sentence
-from fingervision.measuring.clock.common_clock import in_words as clock_in_words
-from fingervision.measuring.drive_jumps import within_jump
+from fingervision.measuring.drive_clock import clock_of, refusal, sentence
+from fingervision.measuring.drive_clock import in_words as clock_in_words
 from fingervision.measuring.frame_loop import Prepared
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.summary import summarise
 from fingervision.measuring.task import Task, in_words
 from fingervision.measuring.words import COVERAGE_FACTOR
-from fingervision.stage_record.corners import corners
-from fingervision.stage_record.encoder import input_sigma
+from fingervision.motion.clock.clock_offset import ClockOffset, NoClockOffset
+from fingervision.motion.corners import corners
+from fingervision.motion.drive_at import within_jump
+from fingervision.motion.encoder import input_sigma
 
 # Reversals of the stage between two rows of a log, which the interpolated input cuts off.
 

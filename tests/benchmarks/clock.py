@@ -14,8 +14,8 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.measuring.clock.alignment import find_clock_offset
-from fingervision.measuring.clock.clock_offset import NoClockOffset
+from fingervision.motion.clock.alignment import find_clock_offset
+from fingervision.motion.clock.clock_offset import NoClockOffset
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks import drawn_recordings

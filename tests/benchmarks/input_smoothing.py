@@ -11,9 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingervision.stage_record.encoder import input_sigma
-from fingervision.stage_record.local_polynomial_smoothing import smoothed
-from fingervision.stage_record.window_blending import blended
+from fingervision.motion.encoder import input_sigma
+from fingervision.motion.local_polynomial_smoothing import blended, smoothed
 from tests.benchmarks.hidden.design import Kind, draw_design
 from tests.benchmarks.hidden.gripper_table import draw_table
 from tests.benchmarks.hidden.noise import draw_noise, rounded

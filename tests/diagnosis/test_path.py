@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
-from fingervision.diagnosis.input.commands import is_commanded
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.domain.report import Verdict
-from fingervision.stage_record.encoder import on_lines
+from fingervision.motion.encoder import on_lines
+from fingervision.motion.recorded_input import is_commanded
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.report.positioning_figures import DEFINITIONS
 from fingervision.diagnosis.report.positioning_of_data import (
     MODEL,
@@ -20,6 +19,7 @@ from fingervision.diagnosis.report.positioning_of_data import (
     positioning_words,
 )
 from fingervision.diagnosis.report.positioning_report import PositioningReport
+from fingervision.motion.repeated_targets import NoRepeatedTargets
 from fingervision.storage.iso230_table import read_iso230_table
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.input.repeated_targets import RepeatedTargets, repeated_targets
 from fingervision.diagnosis.report.positioning_accuracy import positioning_accuracy
 from fingervision.domain.errors import DataError
+from fingervision.motion.repeated_targets import RepeatedTargets, repeated_targets
 from fingervision.storage.iso230_table import read_iso230_table
 from fingervision.storage.measured_table import read_measured_table
 

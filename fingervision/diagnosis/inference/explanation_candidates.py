@@ -8,7 +8,7 @@ from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation,
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit, scan
 from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
-from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.diagnosis.input.record_nuisances import below_the_input
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 

@@ -15,7 +15,7 @@ from fingervision.diagnosis.inference.map_imitators import LINE_SHARE
 from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
 from fingervision.diagnosis.inference.signatures import derivatives, tangents
-from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.diagnosis.input.record_nuisances import below_the_input
 from fingervision.domain.effect import Array, Flags
 
 LONG = 4000

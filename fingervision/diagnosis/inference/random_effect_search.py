@@ -17,8 +17,8 @@ from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, li
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
-from fingervision.diagnosis.input.input_uncertainty import below_the_input, mean_slope
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.record_nuisances import below_the_input, mean_slope
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
 BESIDE = 3

@@ -11,11 +11,10 @@ from fingervision.diagnosis.inference.null_bootstrap import autoregression
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.path import recorded
 from fingervision.diagnosis.noise.picture_noise import picture_noise
 from fingervision.domain.effect import Array
-from fingervision.stage_record.local_polynomial_smoothing import smoothed
-from fingervision.stage_record.window_blending import blended
+from fingervision.motion.input_path import recorded
+from fingervision.motion.local_polynomial_smoothing import blended, smoothed
 
 RECORDS = 30
 """Number of simulated records: a standard deviation is then known to an eighth."""

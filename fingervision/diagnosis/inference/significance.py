@@ -8,7 +8,7 @@ import numpy as np
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.null_bootstrap import exceeds_noise, jumps_astray, linear_thresholds, price
 from fingervision.diagnosis.inference.signatures import Signatures
-from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.diagnosis.input.record_nuisances import below_the_input
 
 SUSPECTS = 2
 """Number of explanations of the measurement that are also tried on every draw of noise."""

@@ -8,11 +8,11 @@ from scipy.stats import f as fisher
 from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import FORM_SHARE_OF_RIGS, Observations
-from fingervision.diagnosis.input.recorded_input import scatter_in_holds
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.residual_scatter import most_noise
 from fingervision.domain.effect import Array, Flags
 from fingervision.domain.report import Verdict
+from fingervision.motion.recorded_input import scatter_in_holds
 
 STANDING_SHARE = 0.05
 """Largest share of the disagreement, as RMS, that named effects may leave: the inexactness of the catalogue's

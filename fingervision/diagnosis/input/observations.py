@@ -13,11 +13,8 @@ from fingervision.diagnosis.inference.position_map import PositionMap
 from fingervision.diagnosis.inference.run_gains import RunGains
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.driven_model import with_dynamics
-from fingervision.diagnosis.input.path import input_path, turning_readings
-from fingervision.diagnosis.input.recorded_input import RecordedInput
+from fingervision.diagnosis.input.record_nuisances import TurningErrors
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
-from fingervision.diagnosis.input.turning_errors import TurningErrors
-from fingervision.diagnosis.input.unseen_turns import NO_TURNS, UnseenTurns
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
@@ -28,6 +25,8 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
+from fingervision.motion.input_path import NO_TURNS, UnseenTurns, input_path, turning_readings
+from fingervision.motion.recorded_input import RecordedInput
 
 OF_NOISE = 0.1
 """Error of a dynamic model's remainder, as a share of the noise, above which it is recomputed with the effects

@@ -8,14 +8,10 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, tangent
-from fingervision.diagnosis.input.clock_nuisance import clock_columns
 from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.path import dwell_s, input_path, mostly_at_rest, unseen_turns
-from fingervision.diagnosis.input.path import recorded as recorded_rows
-from fingervision.diagnosis.input.recorded_input import RecordedInput
+from fingervision.diagnosis.input.record_nuisances import TurningErrors, clock_columns
 from fingervision.diagnosis.input.row_screening import screened_rows
-from fingervision.diagnosis.input.turning_errors import TurningErrors
 from fingervision.diagnosis.noise.replicates import FEWEST_DEGREES, repeats_in, visits
 from fingervision.domain.effect import REZEROED, Array, History
 from fingervision.domain.errors import DataError
@@ -23,6 +19,9 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
+from fingervision.motion.input_path import dwell_s, input_path, mostly_at_rest, unseen_turns
+from fingervision.motion.input_path import recorded as recorded_rows
+from fingervision.motion.recorded_input import RecordedInput
 
 UNIT_SHARES = (0.1, 3.0)
 """Smallest and largest share of the model's range that the inputs cover, after a change of unit, if the input was
@@ -39,7 +38,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     """
     model, function = at_rest_beside(table, model)
     _refuse_other_inputs(table.input_mm, model.input_range_mm)
-    recorded = RecordedInput.of(table, model)
+    recorded = RecordedInput.of(table, model.base, model.input_range_mm)
     history = _history(table, model, recorded)
     turns = unseen_turns(table, history, recorded.along_mm, commanded=recorded.commanded)
     path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded, turns=turns)

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from fingervision.diagnosis.input.recorded_input import standing_still
 from fingervision.diagnosis.noise.noise_model import LEAST_SHARE, Noise, white_noise
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.noise.restricted_likelihood import noise_of_short_runs
-from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
+from fingervision.diagnosis.noise.spectrum import LEAST_RUN, noise_by_spectrum
 from fingervision.domain.effect import Array, Flags, History
+from fingervision.motion.recorded_input import standing_still
 
 FEWEST_STANDING = 60
 """Total number of samples at rest required to estimate the noise from them."""
@@ -53,7 +53,7 @@ def channel_noises(
         )
 
     everywhere = over(history.runs)
-    standing = () if explained else standing_still(history)
+    standing = () if explained else standing_still(history, LEAST_RUN)
     if sum(hold.stop - hold.start for hold in standing) < FEWEST_STANDING:
         return everywhere
     # Unexplained changes that follow the motion of the stage would count as noise; in holds of the stage they are

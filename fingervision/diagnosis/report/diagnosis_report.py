@@ -16,7 +16,6 @@ from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import verdict
-from fingervision.diagnosis.input.commands import LEAST_HOLD
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.left_out_rows import outlier_rows, outliers
@@ -35,6 +34,7 @@ from fingervision.domain.model import PhysicalModel
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Verdict
 from fingervision.effects import catalogue
+from fingervision.motion.recorded_input import LEAST_HOLD
 
 # Advise to measure the force, if it would separate explanations that the gap cannot separate.
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets, repeated_targets
 from fingervision.diagnosis.report.html_parts import table
 from fingervision.diagnosis.report.positioning_figures import Figure, Visits
 from fingervision.diagnosis.report.positioning_report import PositioningReport, effect_changes, positioning_report
 from fingervision.domain.effect import Array, Flags, Values
+from fingervision.motion.repeated_targets import NoRepeatedTargets, repeated_targets
 
 # Positioning accuracy in report.json, and as table and sentences in report.html.
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.input.repeated_targets import RepeatedTargets
 from fingervision.diagnosis.report.positioning_accuracy import positioning_accuracy
 from fingervision.diagnosis.report.positioning_figures import PositioningAccuracy
 from fingervision.domain.effect import Array, Values
+from fingervision.motion.repeated_targets import RepeatedTargets
 
 
 @dataclass(frozen=True, slots=True)

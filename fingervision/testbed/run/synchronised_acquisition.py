@@ -9,6 +9,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import NoGap
 from fingervision.measuring.rows import Result, RowMaker
+from fingervision.motion.encoder_interpolation import StageTrack
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.bed import Bed
@@ -16,7 +17,6 @@ from fingervision.testbed.camera import BedCamera, Shot
 from fingervision.testbed.clocks.board_clock import ClockJoin
 from fingervision.testbed.clocks.camera_clock import ArrivalClock
 from fingervision.testbed.force_sensor import ForceSensor
-from fingervision.testbed.motion.encoder_interpolation import StageTrack
 from fingervision.testbed.reading import Reading
 from fingervision.vision.pipeline import Settings, measure_frame
 

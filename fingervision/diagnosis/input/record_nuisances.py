@@ -1,0 +1,148 @@
+"""Errors of the recorded input that stand beside every effect: rounding, clock offset, reversals behind an encoder."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis import Problem
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.domain.effect import Array, History
+
+# Systematic error of the recorded input: differences in the stage's motion below this error are not significant.
+
+OF_ROUNDING, OF_NOISE = 0.5, 0.1
+"""Shares of the encoder's rounding error, and of the input's noise, that do not average out over many samples: equal
+positions are rounded equally, whereas noise is smoothed."""
+
+
+def below_the_input(problem: Problem, size_mm: float) -> bool:
+    """Whether a change of the gap is smaller than the change that the input's error or its encoder step may cause."""
+    history = problem.chain.history
+    share = OF_ROUNDING if history.input_step_mm > 0.0 else OF_NOISE
+    return size_mm < share * mean_slope(problem) * history.input_sigma_mm
+
+
+def mean_slope(problem: Problem) -> float:
+    """Mean change of the gap per change of the input, by the model."""
+    history = problem.chain.history
+    gap = problem.chain.stacked({})[: history.input_mm.size]
+    return float(np.ptp(gap)) / history.input_span_mm
+
+
+# Error of a clock offset that was estimated from the same motion, as a random effect.
+
+FREEDOM = 3.0
+"""Factor on the offset's uncertainty for its prior when it is refitted. The offset was found from these same data, so
+that its uncertainty is not independent knowledge: with 3 u the prior adds a ninth of the data's information, whereas
+with u the data would count twice, and the uncertainty of a play that is correlated with the offset would be
+understated."""
+
+
+def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
+    """Change of the stacked prediction per standard deviation of the clock offset's prior; shape (m, 1), or (m, 0).
+
+    Parameters
+    ----------
+    chain : MeasuringChain
+        Model with the recorded input.
+    u_clock_s : float
+        Standard uncertainty of the offset; 0 if both have the same clock.
+    """
+    history = chain.history
+    if u_clock_s == 0.0 or history.time_s is None:
+        return np.zeros((chain.stacked({}).size, 0))
+    # Step of the difference: the offset's uncertainty, but at most half a sample, over which the record is straight.
+    step_s = min(u_clock_s, 0.5 * history.sample_time_s)
+    ends = [chain.with_input(_moved(chain, by_s)).stacked({}) for by_s in (-step_s, step_s)]
+    return np.asarray((ends[1] - ends[0]) * (FREEDOM * u_clock_s / (2.0 * step_s)))[:, None]
+
+
+def _moved(chain: MeasuringChain, by_s: float) -> Array:
+    """Delay the recorded input by `by_s`, run by run."""
+    history = chain.history
+    out = np.empty_like(history.input_mm)
+    for run in history.runs:
+        time_s = history.times[run]
+        out[run] = np.interp(time_s + by_s, time_s, history.input_mm[run])
+    return out
+
+
+MOST_TURNS = 60
+"""Number of reversals above which their errors are left to the noise: they average out, and each costs two
+predictions."""
+SMALL = 0.1
+"""Step of the derivative in standard uncertainties of the input: small compared with a play, which is not linear."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TurningErrors:
+    """Unknown position of each reversal of the stage within the step of its encoder.
+
+    At a reversal the stage is so slow that many readings are rounded to the same line. Their common error does not
+    average out, and an effect with memory, such as a play, keeps the position of the reversal until the play is taken
+    up. Of 46 simulated plays of 50 to 150 um (`tests.benchmarks.world`, rows with encoders, seed 301), the errors fell
+    from 2.2 to 0.45 um RMS, and their mean from 1.05 to -0.16 um, when these errors were random effects: a play follows
+    the largest of several uncertain positions, so that it came out too wide.
+
+    Parameters
+    ----------
+    shapes_mm : ndarray of float, shape (n, turns)
+        Error of the input near each reversal, per standard uncertainty: largest at the reversal, zero one step from it.
+    sigma_mm : float
+        Standard uncertainty of one recorded input.
+    """
+
+    shapes_mm: Array
+    sigma_mm: float
+
+    @classmethod
+    def of(cls, history: History) -> "TurningErrors | None":
+        """Find the reversals of a path that an encoder recorded; None without an encoder, or with too many of them."""
+        step_mm, u = history.input_step_mm, history.input_mm
+        turns = [turn for run in history.runs for turn in _turns(u, run, step_mm)] if step_mm > 0.0 else []
+        if not 0 < len(turns) <= MOST_TURNS:
+            return None
+        shapes = np.zeros((u.size, len(turns)))
+        for k, (near, at) in enumerate(turns):
+            shapes[near, k] = history.input_sigma_mm * (1.0 - np.abs(u[near] - u[at]) / step_mm)
+        return cls(shapes, history.input_sigma_mm)
+
+    @property
+    def apart(self) -> Array:
+        """Share of each row's error that is not an error at a reversal: 0 at a reversal, 1 a step away; shape (n,)."""
+        return np.asarray(1.0 - np.max(self.shapes_mm, axis=1) / self.sigma_mm)
+
+    def columns_mm(self, chain: MeasuringChain, values: Mapping[str, Mapping[str, float]]) -> Array:
+        """Change of the stacked prediction of an explanation per standard uncertainty; shape (m, turns)."""
+        input_mm = chain.history.input_mm
+        found = []
+        for shape in SMALL * self.shapes_mm.T:
+            ends = [chain.with_input(input_mm + way * shape).stacked(values) for way in (-1.0, 1.0)]
+            found.append((ends[1] - ends[0]) / (2.0 * SMALL))
+        return np.stack(found, axis=1)
+
+
+def _turns(input_mm: Array, run: slice, reach_mm: float) -> list[tuple[slice, int]]:
+    """Reversals of a run by more than `reach_mm`: samples around each that lie within this reach, and its sample."""
+    x = input_mm[run]
+    peaks, rising = [0], 0
+    for i in range(1, x.size):
+        ahead = x[i] - x[peaks[-1]]
+        if (rising == 0 and abs(ahead) > reach_mm) or rising * ahead < -reach_mm:
+            rising = 1 if ahead > 0.0 else -1
+            peaks.append(i)
+        elif rising * ahead > 0.0:
+            peaks[-1] = i
+    found = []
+    for (before, at), after in zip(pairwise(peaks), [*peaks[2:], x.size - 1], strict=False):
+        if at == x.size - 1 or after == at:
+            continue
+        far = np.abs(x - x[at]) >= reach_mm
+        low = int(np.max(np.flatnonzero(far[before:at]), initial=-1)) + before + 1
+        beyond = np.flatnonzero(far[at:])
+        high = at + int(beyond[0]) if beyond.size else x.size
+        if beyond.size:
+            found.append((slice(run.start + low, run.start + high), run.start + at))
+    return found

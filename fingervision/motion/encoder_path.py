@@ -1,0 +1,200 @@
+"""Path of a stage between the lines of its encoder: reversals between straight strokes, and halts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.effect import Array
+
+LINES = (48.0, 24.0, 12.0, 6.0, 3.0)
+"""Numbers of encoder lines to which a stroke is fitted; the largest number for which the stroke is straight is used.
+With three lines, the stroke's position at the reversal has an uncertainty of a fifth of a step. If the log has only
+about one row per line, even twelve lines leave an uncertainty of a third of a step.
+"""
+LEAST_ROWS = 6
+"""Least number of rows on each side of a reversal to which a line is fitted."""
+STRAIGHT = 1.3
+"""Ratio of the readings' scatter about a straight stroke to that of rounding, above which the stroke is curved."""
+ALLOWED, LINE_SIGMAS = 0.55, 1.0
+"""Largest distance between a reading and a possible path: 0.55 steps (half a step, plus a tenth of half a step for
+curvature), plus one standard uncertainty of the fitted line. With two standard uncertainties, curved reversals would be
+accepted as sharp if few encoder lines are fitted.
+"""
+
+
+def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: float) -> Array:
+    """Replace a smoothed reversal by two straight strokes that meet there, if every reading allows it.
+
+    Smoothing cuts the corner of a reversal, and no line of the encoder is crossed near it. All reversals are cut
+    towards the inside, so that the fitted play is too small by twice the cut, and the offset is wrong by the time that
+    a stroke takes for the cut. If a stage slows down before it reverses, two straight strokes do not pass through its
+    readings, and the smoothed reversal is kept.
+
+    Parameters
+    ----------
+    time_s, reading_mm, smooth_mm : ndarray of float, shape (n,)
+        Times, readings and smoothed inputs of one run's rows.
+    step_mm : float
+        The encoder's step.
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
+    """
+    out = smooth_mm.copy()
+    turns = _reversals(smooth_mm, step_mm)
+    for before, turn, after in zip([0, *turns], turns, [*turns[1:], smooth_mm.size - 1], strict=False):
+        left = stroke(time_s, reading_mm, turn, np.arange(turn, before - 1, -1), step_mm)
+        right = stroke(time_s, reading_mm, turn, np.arange(turn, after + 1), step_mm)
+        if left is None or right is None or left.speed * right.speed >= 0.0:
+            continue
+        rows = slice(left.nearest, right.nearest + 1)
+        both = np.stack([one.height_mm + one.speed * (time_s[rows] - time_s[turn]) for one in (left, right)])
+        path = both.min(axis=0) if left.speed > 0.0 else both.max(axis=0)
+        if np.max(np.abs(path - reading_mm[rows])) <= allowed_mm(step_mm, left, right):
+            out[rows] = path
+    return out
+
+
+def _reversals(input_mm: Array, step_mm: float) -> list[int]:
+    """Row numbers of the extremes between which a path moves by more than an encoder step; ripples are ignored."""
+    steps = np.diff(input_mm)
+    moves = np.flatnonzero(steps)
+    rows = moves[1:][np.sign(steps[moves[1:]]) != np.sign(steps[moves[:-1]])]
+    found: list[int] = []
+    last, way = 0, 0.0
+    for row in [*rows.tolist(), input_mm.size - 1]:
+        moved = input_mm[row] - input_mm[last]
+        if moved * way > 0.0 or (way == 0.0 and abs(moved) > step_mm):
+            last, way = row, float(np.sign(moved))
+        elif way != 0.0 and abs(moved) > step_mm:
+            found.append(last)
+            last, way = row, -way
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """Straight line through the readings on one side of a reversal.
+
+    Parameters
+    ----------
+    nearest : int
+        Row at which the first line of the encoder was crossed.
+    speed : float
+        Slope, in mm/s.
+    height_mm : float
+        Value at the time of the reversal.
+    u_mm : float
+        Standard uncertainty of `height_mm`, due to the rounding of each row.
+    """
+
+    nearest: int
+    speed: float
+    height_mm: float
+    u_mm: float = 0.0
+
+
+def allowed_mm(step_mm: float, *lines: Stroke) -> float:
+    """Largest distance (mm) between a reading and a path of strokes that agrees with the reading."""
+    return ALLOWED * step_mm + LINE_SIGMAS * max((line.u_mm for line in lines), default=0.0)
+
+
+def stroke(time_s: Array, reading_mm: Array, turn: int, rows: NDArray[np.intp], step_mm: float) -> Stroke | None:
+    """Fit the longest straight stroke to the rows on one side of a reversal; None if there is none."""
+    away = np.abs(reading_mm[rows] - reading_mm[turn])
+    crossed = np.flatnonzero(away > 0.5 * step_mm)
+    for lines in LINES:
+        enough = np.flatnonzero(away > (lines + 0.5) * step_mm)
+        if not enough.size or enough[0] - crossed[0] < LEAST_ROWS:
+            continue
+        taken = rows[int(crossed[0]) : int(enough[0])]
+        x = time_s[taken] - time_s[turn]
+        speed, height = np.polyfit(x, reading_mm[taken], 1)
+        rest = reading_mm[taken] - height - speed * x
+        if np.sqrt(np.sum(rest**2) / (taken.size - 2)) <= STRAIGHT * step_mm / np.sqrt(12.0):
+            away_s = x - x.mean()
+            leverage = 1.0 / x.size + float(x.mean()) ** 2 / float(away_s @ away_s)
+            u_mm = step_mm / np.sqrt(12.0) * np.sqrt(leverage)
+            return Stroke(int(taken[0]), float(speed), float(height), float(u_mm))
+    return None
+
+
+MORE_ROWS = 2
+"""Number of rows by which a halt must be longer than the longest time with one reading during a motion, because each of
+the two changes of the reading may be logged one row late.
+"""
+LONGER = 1.25
+"""Ratio of the time with one reading to the sum of the times with the readings before and after, above which the stage
+halts. A stage that reverses within a step, without a halt, has a ratio of at most 1; a stage whose speed changes, a
+slightly larger one.
+"""
+NEAR = 3
+"""Number of readings on either side from whose times the median is calculated."""
+
+
+def level_halts(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: float) -> Array:
+    """Replace a smoothed halt by its reading, from the end of the preceding stroke to the start of the next one.
+
+    During a halt, a smoothed path continues to move within an encoder step, because the readings permit this motion.
+    Most halts then lie too far in the direction of the motion, and a fit mistakes this error for play and for a clock
+    offset. The true position is anywhere within half a step of the reading, on both sides with equal probability.
+
+    Parameters
+    ----------
+    time_s, reading_mm, smooth_mm : ndarray of float, shape (n,)
+        Times, readings and smoothed inputs of one run's rows.
+    step_mm : float
+        The encoder's step.
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
+    """
+    out = smooth_mm.copy()
+    changes = np.flatnonzero(np.abs(np.diff(reading_mm)) > 0.5 * step_mm)
+    first, last = np.insert(changes + 1, 0, 0), np.append(changes, reading_mm.size - 1)
+    taken_s = time_s[np.minimum(last + 1, time_s.size - 1)] - time_s[first]
+    row_s = float(np.median(np.diff(time_s)))
+    for k in np.flatnonzero(last - first > MORE_ROWS).tolist():
+        begin, end = int(first[k]), int(last[k])
+        # The stage may have had the first reading before the record began, and the last reading after the end.
+        # How long the reading of the last row lasted is unknown: at least one interval between rows is assumed.
+        before_s = max(float(np.median(taken_s[max(k - NEAR, 0) : k])), row_s) if k else 0.0
+        after_s = max(float(np.median(taken_s[k + 1 : k + 1 + NEAR])), row_s) if k + 1 < first.size else 0.0
+        if taken_s[k] <= LONGER * (before_s + after_s) + MORE_ROWS * row_s:
+            continue
+        level_mm = float(reading_mm[begin])
+        rows, path = slice(begin, end + 1), np.full(end + 1 - begin, level_mm)
+        lines = []
+        if k:
+            line = stroke(time_s, reading_mm, begin, np.arange(begin, -1, -1), step_mm)
+            if line is None:
+                line = _entering(begin, level_mm - float(reading_mm[begin - 1]), step_mm / before_s, level_mm, step_mm)
+            rows, path = slice(line.nearest, rows.stop), np.append(np.full(begin - line.nearest, level_mm), path)
+            path = _joined(path, line, time_s[rows] - time_s[begin], level_mm, is_leaving=False)
+            lines.append(line)
+        if k + 1 < first.size:
+            line = stroke(time_s, reading_mm, end, np.arange(end, reading_mm.size), step_mm)
+            if line is None:
+                line = _entering(end, level_mm - float(reading_mm[end + 1]), -step_mm / after_s, level_mm, step_mm)
+            rows, path = slice(rows.start, line.nearest + 1), np.append(path, np.full(line.nearest - end, level_mm))
+            path = _joined(path, line, time_s[rows] - time_s[end], level_mm, is_leaving=True)
+            lines.append(line)
+        if np.max(np.abs(path - reading_mm[rows])) <= allowed_mm(step_mm, *lines):
+            out[rows] = path
+    return out
+
+
+def _entering(row: int, came_mm: float, speed_mm_s: float, level_mm: float, step_mm: float) -> Stroke:
+    """Stroke that ends (with a negative speed: begins) at a halt, through the encoder line next to the halt."""
+    way = float(np.sign(came_mm))
+    return Stroke(row, way * speed_mm_s, level_mm - 0.5 * way * step_mm)
+
+
+def _joined(path: Array, line: Stroke, since_s: Array, level_mm: float, *, is_leaving: bool) -> Array:
+    """Replace the path outside the halt by the stroke."""
+    at_mm = line.height_mm + line.speed * since_s
+    is_outside = (at_mm - level_mm) * line.speed > 0.0 if is_leaving else (at_mm - level_mm) * line.speed < 0.0
+    return np.where(is_outside, at_mm, path)

@@ -1,0 +1,279 @@
+"""Path of the input between the rows of a table: turns, rows without a gap, readings at rest, and held commands."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.effect import Array, Flags, History, InputPath
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.motion.corners import Corner, corners
+
+# Where the stage turned between two rows, as far as the rows beside the reversals show it.
+
+SIGMA = 0.5
+"""Standard deviation of a place before the gap is looked at, as a share of its range."""
+MOST_TURNS = 200
+"""Number of reversals above which their places are left to the noise: they average out, and each costs a column."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenTurns:
+    """Corners of the motion between the rows, and where the stage turned at the reversals among them.
+
+    A stage that stops for a moment, or slows down before it reverses, turns between the farther row beside the reversal
+    and the place at which the continued motions meet. An effect with memory, such as a play, keeps this place until the
+    play is taken up, so that the gap tells where it was.
+
+    Parameters
+    ----------
+    corners : tuple of Corner
+        The corners, sorted by row.
+    short_by : tuple of float
+        For each of `reversals`, share of the way from the meeting place back to the row at which the stage turned.
+    random : bool
+        Whether the places are random effects, so that they contribute to the uncertainty of the effects.
+    """
+
+    corners: tuple[Corner, ...]
+    short_by: tuple[float, ...] = ()
+    random: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.short_by:
+            object.__setattr__(self, "short_by", tuple(corner.short_by[0] for corner in self.reversals))
+
+    @cached_property
+    def reversals(self) -> tuple[Corner, ...]:
+        """The corners at which the stage reversed at a place that the rows do not determine."""
+        return tuple(corner for corner in self.corners if corner.free)
+
+    @property
+    def ranges(self) -> Array:
+        """Least and largest `short_by` of each reversal; shape (reversals, 2)."""
+        return np.array([corner.short_by for corner in self.reversals]).reshape(-1, 2)
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviation of each `short_by` before the gap is looked at; shape (reversals,)."""
+        return np.asarray(SIGMA * (self.ranges[:, 1] - self.ranges[:, 0]))
+
+    @property
+    def price(self) -> float:
+        """-2 log of the probability of the places before the gap is looked at, up to a constant."""
+        return float(np.sum(((np.array(self.short_by) - self.ranges[:, 0]) / self.sigmas) ** 2))
+
+    @property
+    def uncertain(self) -> int:
+        """Number of reversals whose place is estimated from the gap."""
+        return len(self.reversals) if len(self.reversals) <= MOST_TURNS else 0
+
+    @cached_property
+    def points(self) -> Mapping[int, list[tuple[float, float]]]:
+        """Times and inputs of the points of the path that follow a row, by the row's index."""
+        shares = dict(zip(self.reversals, self.short_by, strict=True))
+        return {corner.after: corner.points(shares.get(corner, corner.short_by[0])) for corner in self.corners}
+
+    def turned(self, short_by: Array) -> "UnseenTurns":
+        """Return the same corners with other turning points; shape (reversals,)."""
+        return replace(self, short_by=tuple(short_by.tolist()))
+
+
+NO_TURNS = UnseenTurns(())
+"""A motion without corners between its rows."""
+
+
+AT_REST_S = 5.0
+"""Shortest time between rows that count as separate readings at rest: in ISO 230-2 a stage rests for some seconds at
+each target, while cameras and data loggers record a motion at least every few seconds."""
+AT_REST_REVISITED_S = 1.0
+"""Shortest time between readings at rest if rows return to exactly equal inputs: such inputs are set-points, not
+samples of a motion."""
+AT_REST_SHARE = 0.5
+"""Share of rows read at rest above which rows give no information on their neighbours' input."""
+REVISITED_SHARE = 0.5
+"""Share of rows with an input that also occurs in another row, above which the record consists of set-points."""
+OVERSHOOT = 0.5
+"""Overshoot beyond an outermost target, as a share of the distance to its neighbour: any value larger than the play has
+the same effect."""
+ARRIVED = 0.5
+"""Share of the time between two readings after which the stage has arrived at the later reading's input."""
+FINE_STEPS = 8
+"""Points of the path per sample after a command's jump: the resolution with which a delay places the jump."""
+FINE_S = 1.5
+"""Time after a jump for which the path has `FINE_STEPS` points per sample: longer than the longest delay of the
+catalogue."""
+
+
+def readings_at_rest(table: MeasuredTable) -> Flags:
+    """Whether the stage moved, arrived and rested before each row was read, instead of being read in motion.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        One value for each row of the path; False for the first row of each run.
+    """
+    input_mm, time_s, runs = recorded(table)
+    out = np.zeros(input_mm.size, dtype=bool)
+    if time_s is None:
+        return out
+    apart = AT_REST_REVISITED_S if _revisits(input_mm, runs) else AT_REST_S
+    for run in runs:
+        out[run.start + 1 : run.stop] = np.diff(time_s[run]) >= apart
+    return out
+
+
+def mostly_at_rest(table: MeasuredTable) -> bool:
+    """Whether most rows that follow another row of their run were read at rest."""
+    _, _, runs = recorded(table)
+    follows = np.delete(readings_at_rest(table), [run.start for run in runs])
+    return bool(follows.size and np.mean(follows) > AT_REST_SHARE)
+
+
+def recorded(table: MeasuredTable) -> tuple[Array, Array | None, tuple[slice, ...]]:
+    """All rows with an input: input and time, each of shape (m,), and the runs."""
+    along = table.path
+    if along is None:
+        return table.input_mm, table.time_s, table.runs
+    return along.input_mm, along.time_s, along.runs
+
+
+def _revisits(input_mm: Array, runs: tuple[slice, ...]) -> bool:
+    """Whether most rows return to an earlier input of the stage; rows in which the stage only waits do not count."""
+    visits = np.concatenate([input_mm[run][np.flatnonzero(np.diff(input_mm[run], prepend=np.inf))] for run in runs])
+    _, counts = np.unique(visits, return_counts=True)
+    return float(np.sum(counts[counts > 1])) > REVISITED_SHARE * visits.size
+
+
+def unseen_turns(table: MeasuredTable, history: History, along_mm: Array, *, commanded: bool) -> UnseenTurns:
+    """Find the corners of a motion between the rows; none of a command, or between readings at rest.
+
+    Parameters
+    ----------
+    table : MeasuredTable
+        The measured table.
+    history : History
+        History of the measured rows.
+    along_mm : ndarray of float, shape (m,)
+        Smoothed input of every recorded row.
+    commanded : bool
+        Whether the input is a command that keeps its value until it jumps.
+    """
+    _, time_s, runs = recorded(table)
+    if time_s is None or commanded:
+        return NO_TURNS
+    rest = readings_at_rest(table)
+    found = corners(along_mm, time_s, runs, history.input_sigma_mm)
+    return UnseenTurns(tuple(corner for corner in found if not rest[corner.after : corner.after + 2].any()))
+
+
+def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
+    """Rows of the path that were read at rest at the previous row's input, where the stage reverses.
+
+    In ISO 230-2 cycles the outermost target is read twice: between the readings the stage overshoots the target and
+    returns from the other side.
+    """
+    input_mm, _, runs = recorded(table)
+    rest = readings_at_rest(table)
+    found = []
+    for run in runs:
+        for i in range(run.start + 2, run.stop - 1):
+            if not rest[i] or input_mm[i] != input_mm[i - 1]:
+                continue
+            if (input_mm[i - 1] - input_mm[i - 2]) * (input_mm[i + 1] - input_mm[i]) < 0.0:
+                found.append(i)
+    return np.array(found, dtype=np.intp)
+
+
+def input_path(
+    table: MeasuredTable,
+    history: History,
+    along_mm: Array,
+    *,
+    commanded: bool,
+    turns: UnseenTurns,
+    overshoots: bool = False,
+) -> InputPath | None:
+    """Build the path on which effects with memory depend.
+
+    Parameters
+    ----------
+    table : MeasuredTable
+        The measured table.
+    history : History
+        History of the measured rows.
+    along_mm : ndarray of float, shape (m,)
+        Smoothed input of every recorded row.
+    commanded : bool
+        Whether the input is a command that keeps its value until it jumps.
+    turns : UnseenTurns
+        Corners of the motion between the rows, and where the stage turned.
+    overshoots : bool
+        Whether the stage went beyond its targets where it reversed between two readings of the same target.
+
+    Returns
+    -------
+    InputPath or None
+        None if the measured rows contain the whole path.
+    """
+    _, time_s, runs = recorded(table)
+    if time_s is None:
+        return None
+    rows = np.arange(along_mm.size) if table.path is None else table.path.rows
+    rest = readings_at_rest(table)
+    between = turns.points
+    if table.path is None and not commanded and not rest.any() and not between:
+        return None
+    over = set(turning_readings(table).tolist()) if overshoots else set[int]()
+    owner_of = np.full(along_mm.size, -1, dtype=np.intp)
+    owner_of[rows] = np.arange(rows.size)
+    inputs: list[float] = []
+    times: list[float] = []
+    owners: list[int] = []
+    place = np.zeros(along_mm.size, dtype=np.intp)
+    path_runs: list[slice] = []
+    for run in runs:
+        begin, jumped_s = len(inputs), -np.inf
+        for i in range(run.start, run.stop):
+            step_s = time_s[i] - time_s[i - 1] if i > run.start else 0.0
+            if i in over:
+                inputs.append(along_mm[i] + OVERSHOOT * (along_mm[i - 1] - along_mm[i - 2]))
+                times.append(time_s[i - 1] + 0.5 * ARRIVED * step_s)
+                owners.append(-1)
+            if rest[i]:
+                inputs.append(along_mm[i])
+                times.append(time_s[i - 1] + ARRIVED * step_s)
+                owners.append(int(owner_of[i]))
+            elif commanded and i > run.start:
+                jumps = along_mm[i] != along_mm[i - 1]
+                jumped_s = time_s[i] if jumps else jumped_s
+                if jumps or time_s[i] - jumped_s < FINE_S:
+                    # A command keeps its old value until the sample at which the new value is recorded.
+                    inputs += [along_mm[i - 1]] * (FINE_STEPS - 1)
+                    times += [time_s[i - 1] + step_s * k / FINE_STEPS for k in range(1, FINE_STEPS)]
+                    owners += [int(owner_of[i - 1])] * (FINE_STEPS - 1)
+            place[i] = len(inputs)
+            inputs.append(along_mm[i])
+            times.append(time_s[i])
+            owners.append(int(owner_of[i]))
+            for at_s, at_mm in between.get(i, ()):
+                inputs.append(at_mm)
+                times.append(at_s)
+                owners.append(-1)
+        path_runs.append(slice(begin, len(inputs)))
+    along = replace(history, input_mm=np.array(inputs), time_s=np.array(times), runs=tuple(path_runs))
+    places: NDArray[np.intp] = place[rows]
+    return InputPath(along, places, np.array(owners, dtype=np.intp))
+
+
+def dwell_s(table: MeasuredTable) -> float:
+    """Shortest time for which the stage was at rest before a reading (s); 0 if any row was read in motion."""
+    _, time_s, runs = recorded(table)
+    rest = readings_at_rest(table)
+    firsts = np.array([run.start for run in runs])
+    if time_s is None or not np.delete(rest, firsts).all() or rest.size == firsts.size:
+        return 0.0
+    steps = np.concatenate([np.diff(time_s[run]) for run in runs])
+    return (1.0 - ARRIVED) * float(np.min(steps))

@@ -1,1 +1,0 @@
-"""Analysis of a recorded stage position from any source: noise, encoder step, encoder lines, smoothing."""

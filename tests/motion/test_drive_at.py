@@ -1,0 +1,70 @@
+"""Input of the drive at a frame's time: interpolated, but neither extrapolated nor interpolated between two runs."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.measuring.outcome import unseen_turns
+from fingervision.motion.drive_at import drive_at, within_jump
+
+# Rounding of a weighted mean of two doubles.
+ROUNDING = 1e-9
+
+LINE = DriveHistory(np.array([1.0, 2.0, 4.0]), np.array([0.0, 3.0, 9.0]))
+TWO_RUNS = DriveHistory(
+    np.array([0.0, 1.0, 3.0, 4.0]), np.array([0.0, 1.0, 5.0, 6.0]), ("a", "a", "b", "b"), np.array([1.0, 2.0, 3.0, 4.0])
+)
+
+
+@given(st.floats(1.0, 4.0))
+def test_a_straight_drive_is_followed_exactly(time_s: float) -> None:
+    state = drive_at(LINE, time_s)
+    assert state is not None
+    assert state.input_mm == pytest.approx(3.0 * (time_s - 1.0), abs=ROUNDING)
+    assert state.run == ""
+    assert state.force_n is None
+
+
+@given(st.one_of(st.floats(max_value=1.0, exclude_max=True), st.floats(min_value=4.0, exclude_min=True)))
+def test_nothing_is_extrapolated(time_s: float) -> None:
+    assert drive_at(LINE, time_s) is None
+
+
+def test_a_frame_belongs_to_the_run_that_brackets_it() -> None:
+    inside = drive_at(TWO_RUNS, 3.5)
+    assert inside is not None
+    assert (inside.run, inside.input_mm, inside.force_n) == ("b", 5.5, 3.5)
+    assert drive_at(TWO_RUNS, 2.0) is None
+    last = drive_at(TWO_RUNS, 1.0)
+    first = drive_at(TWO_RUNS, 3.0)
+    assert last is not None
+    assert first is not None
+    assert (last.run, first.run) == ("a", "b")
+
+
+def test_a_jump_between_two_rests_has_no_input_inside() -> None:
+    times = np.arange(12.0)
+    log = DriveHistory(times, np.where(times < 6.0, 0.2, 0.9))
+    assert drive_at(log, 5.5) is None
+    assert [drive_at(log, at).input_mm for at in (5.0, 6.0, 4.5)] == [0.2, 0.9, 0.2]  # type: ignore[union-attr]
+    assert within_jump(log, np.array([4.5, 5.0, 5.5, 6.0, 20.0])).tolist() == [False, False, True, False, False]
+
+
+def test_a_ramp_between_corners_and_an_encoder_step_are_no_jumps() -> None:
+    corners = DriveHistory(np.array([0.0, 1.0, 4.0, 5.0, 8.0, 9.0]), np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0]))
+    assert drive_at(corners, 2.5).input_mm == pytest.approx(0.5)  # type: ignore[union-attr]
+    slow = np.round(np.arange(0.0, 40.0, 0.2) * 0.05 / 0.03) * 0.03
+    encoder = DriveHistory(np.arange(slow.size) * 0.2, slow)
+    assert all(drive_at(encoder, at) is not None for at in encoder.time_s[:-1] + 0.1)
+
+
+def test_turns_between_the_rows_of_a_log_are_counted_with_their_distance() -> None:
+    time_s = np.arange(0.0, 20.0, 0.1) + 0.03
+    strokes = 2.0 * np.abs((time_s / 4.0) % 1.0 * 2.0 - 1.0)
+    turned, missed_mm = unseen_turns(DriveHistory(time_s, strokes))
+    assert turned == 9
+    assert missed_mm == pytest.approx(0.042, abs=0.002)
+    corners = DriveHistory(np.arange(0.0, 20.0, 0.1), 2.0 * np.abs((np.arange(0.0, 20.0, 0.1) / 4.0) % 1.0 * 2.0 - 1.0))
+    assert unseen_turns(corners) == (0, 0.0)
